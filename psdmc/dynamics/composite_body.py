@@ -1,0 +1,94 @@
+"""Composite rigid body: the mass matrix from bodies gathered tip to base (Walker and Orin 1982; Featherstone 2008, 6.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.frames import (
+    Body,
+    Frame,
+    inward,
+    joint_angle,
+    joint_offset,
+    to_previous,
+    turn_by,
+)
+from psdmc.dynamics.newton_euler import PLAIN, Choices, turned_body
+from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, cross, multiply, transpose
+
+
+def mass_matrix(
+    frames: Sequence[Frame],
+    bodies: Sequence[Body],
+    drive_inertia: Sequence[Scalar],
+    q: Sequence[Scalar],
+    choices: Choices = PLAIN,
+) -> tuple[tuple[Scalar, ...], ...]:
+    """M(q), n x n and symmetric (kg m^2, kg m, kg by joint kinds)."""
+    n = len(frames)
+    rows: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
+    angles = [joint_angle(frame, value) for frame, value in zip(frames, q, strict=True)]
+    turns = [turn_by(angle) for angle in angles]
+    offsets = [joint_offset(frame, value) for frame, value in zip(frames, q, strict=True)]
+    composite = bodies[n - 1]
+    for i in reversed(range(n)):
+        rows[i][i] = drive_inertia[i]
+        force, moment = unit_rate_momentum(frames[i], composite)
+        for j in reversed(range(i + 1)):
+            along = moment[2] if frames[j].kind == "revolute" else force[2]
+            rows[i][j] = rows[i][j] + along
+            rows[j][i] = rows[i][j]
+            if j > 0:
+                force = to_previous(frames[j], inward(turns[j], force))
+                moment = to_previous(frames[j], inward(turns[j], moment))
+                moment = add(moment, cross(offsets[j], force))
+        if i > 0:
+            angle = angles[i]
+            double = turn_by(angle + angle) if choices.fold_double_angle and angle is not None else None
+            before = turned_body(composite, turns[i], double)
+            composite = joined(bodies[i - 1], shifted(in_previous(frames[i], before), offsets[i]))
+    return tuple(tuple(row) for row in rows)
+
+
+def unit_rate_momentum(frame: Frame, body: Body) -> tuple[Vector, Vector]:
+    """Momentum and angular momentum about the frame's origin of a body that moves at unit rate along the joint."""
+    hx, hy, _ = body.moment
+    if frame.kind == "prismatic":
+        return (0.0, 0.0, body.mass), (hy, -hx, 0.0)
+    xx, yy, _, _, xz, yz = body.second
+    return (-hy, hx, 0.0), (-xz, -yz, xx + yy)
+
+
+def in_previous(frame: Frame, body: Body) -> Body:
+    """A body about frame i before its turn, along the axes of frame i-1 (origin unmoved)."""
+    if frame.is_parallel:
+        return body
+    xx, yy, zz, xy, xz, yz = body.second
+    second: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    s = multiply(multiply(frame.rotation, second), transpose(frame.rotation))
+    return Body(
+        body.mass, to_previous(frame, body.moment), (s[0][0], s[1][1], s[2][2], s[0][1], s[0][2], s[1][2])
+    )
+
+
+def shifted(body: Body, offset: Vector) -> Body:
+    """A body about a point that lies at `offset`, about the origin instead: h + m p, S + h p^T + p h^T + m p p^T."""
+    px, py, pz = offset
+    hx, hy, hz = body.moment
+    xx, yy, zz, xy, xz, yz = body.second
+    gx, gy, gz = hx + body.mass * px, hy + body.mass * py, hz + body.mass * pz
+    second = (
+        xx + px * (hx + gx),
+        yy + py * (hy + gy),
+        zz + pz * (hz + gz),
+        xy + hx * py + px * gy,
+        xz + hx * pz + px * gz,
+        yz + hy * pz + py * gz,
+    )
+    return Body(body.mass, (gx, gy, gz), second)
+
+
+def joined(a: Body, b: Body) -> Body:
+    """Two bodies about one frame as one."""
+    second = tuple(x + y for x, y in zip(a.second, b.second, strict=True))
+    return Body(a.mass + b.mass, add(a.moment, b.moment), second)  # type: ignore[arg-type]

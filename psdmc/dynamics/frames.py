@@ -1,0 +1,147 @@
+"""Joint frames, the turn that a joint makes, and bodies: what every algorithm here starts from.
+
+Frame i sits in frame i-1 at   rotation @ Rz(q + offset), translation          (revolute)
+                         or    rotation, translation + rotation @ z q          (prismatic)
+and carries one rigid body whose parameters are about frame i itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from psdmc.dynamics.scalar import Matrix, Scalar, Vector, sincos, transform, transpose
+from psdmc.robot.chain import Chain, JointKind, Placement
+
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One joint's constant geometry as plain floats, so that exact zeros and ones stay visible.
+
+    rotation     3 x 3, frame i at q + offset = 0 in frame i-1
+    translation  m, origin of frame i at q = 0 in frame i-1
+    offset       rad, added to a revolute joint's q
+    """
+
+    kind: JointKind
+    rotation: Matrix
+    translation: Vector
+    offset: float = 0.0
+
+    @property
+    def is_parallel(self) -> bool:
+        """Whether its axis has the direction of the joint's before it."""
+        return self.rotation == IDENTITY
+
+
+class Turn(NamedTuple):
+    """A rotation about z by its sine and cosine; None stands for no rotation at all."""
+
+    sine: Scalar
+    cosine: Scalar
+
+    def outward(self, v: Vector) -> Vector:
+        """Rz^T v: from the frame before the turn into the frame after it."""
+        s, c = self.sine, self.cosine
+        return (c * v[0] + s * v[1], c * v[1] - s * v[0], v[2])
+
+    def inward(self, v: Vector) -> Vector:
+        """Rz v: from the frame after the turn into the frame before it."""
+        s, c = self.sine, self.cosine
+        return (c * v[0] - s * v[1], s * v[0] + c * v[1], v[2])
+
+
+class Body(NamedTuple):
+    """A rigid body about some frame as its pseudo-inertia: integrals of 1, r and r r^T over its mass.
+
+    mass    kg
+    moment  kg m, (hx, hy, hz) = mass times centre of mass
+    second  kg m^2, (xx, yy, zz, xy, xz, yz); the inertia is Ixx = yy + zz, Ixy = -xy and so on
+
+    In this form a body moved, turned or added to another costs fewest operations (Wensing, Kim, Slotine 2018 call the
+    4 x 4 matrix of all ten the pseudo-inertia).
+    """
+
+    mass: Scalar
+    moment: Vector
+    second: tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+
+
+NO_BODY = Body(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
+    """Plain-float copy of a 3 x 3 array."""
+    rows = tuple(tuple(float(x) for x in row) for row in values)
+    return rows  # type: ignore[return-value]
+
+
+def as_vector(values: Sequence[float]) -> Vector:
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)
+
+
+def frames_of(chain: Chain) -> tuple[Frame, ...]:
+    """The chain's own joint frames, none moved."""
+    return tuple(frame_at(joint.kind, joint.placement) for joint in chain.joints)
+
+
+def frame_at(kind: JointKind, placement: Placement, offset: float = 0.0) -> Frame:
+    return Frame(
+        kind, as_matrix(placement.rotation.tolist()), as_vector(placement.translation.tolist()), offset
+    )
+
+
+def base_acceleration(chain: Chain) -> Vector:
+    """Gravity as an upward acceleration of the base, m/s^2 in the base frame."""
+    gx, gy, gz = chain.gravity.tolist()
+    return (-gx, -gy, -gz)
+
+
+def turn_by(angle: Scalar | None) -> Turn | None:
+    return None if angle is None else Turn(*sincos(angle))
+
+
+def outward(turn: Turn | None, v: Vector) -> Vector:
+    return v if turn is None else turn.outward(v)
+
+
+def inward(turn: Turn | None, v: Vector) -> Vector:
+    return v if turn is None else turn.inward(v)
+
+
+def joint_angle(frame: Frame, q: Scalar) -> Scalar | None:
+    """Angle of the frame's turn about z, rad; None where it makes none."""
+    if frame.kind == "revolute":
+        return q + frame.offset if frame.offset else q
+    return frame.offset if frame.offset else None
+
+
+def joint_offset(frame: Frame, q: Scalar) -> Vector:
+    """Origin of frame i in frame i-1, m."""
+    if frame.kind == "revolute":
+        return frame.translation
+    x, y, z = frame.translation
+    slide = (frame.rotation[0][2] * q, frame.rotation[1][2] * q, frame.rotation[2][2] * q)
+    return (x + slide[0], y + slide[1], z + slide[2])
+
+
+def to_previous(frame: Frame, v: Vector) -> Vector:
+    """Constant part of the rotation, from frame i (before its turn) into frame i-1."""
+    return v if frame.is_parallel else transform(frame.rotation, v)
+
+
+def from_previous(frame: Frame, v: Vector) -> Vector:
+    return v if frame.is_parallel else transform(transpose(frame.rotation), v)
+
+
+def body_from_parameters(x: Sequence[Scalar]) -> Body:
+    """Ten standard parameters (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about any frame, as a Body about it."""
+    m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = x[:10]
+    half_trace = 0.5 * (ixx + iyy + izz)
+    return Body(
+        m, (hx, hy, hz), (half_trace - ixx, half_trace - iyy, half_trace - izz, -ixy, -ixz, -iyz)
+    )

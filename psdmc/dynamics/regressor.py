@@ -1,0 +1,142 @@
+"""The joint-torque regressor: torques as a matrix times the standard parameters.
+
+Each body's wrench is linear in its parameters; a column is that wrench for one parameter alone, dotted with the twist
+of each joint below it, carried into the body's frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from psdmc.dynamics.frames import Frame, from_previous, outward
+from psdmc.dynamics.newton_euler import PLAIN, Choices, Forward, LinkMotion, Spin, sweep_outward
+from psdmc.dynamics.scalar import (
+    ZERO,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    multiply,
+    transform,
+    transpose,
+)
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Placement
+
+Twist = tuple[Vector, Vector]
+"""Linear velocity of a frame's origin and angular velocity, along the frame's axes."""
+
+DRIVE = PARAMETERS_PER_LINK - 1
+
+
+def regressor(
+    frames: Sequence[Frame],
+    link_frames: Sequence[Placement],
+    wanted: Collection[int],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd_r: Sequence[Scalar],
+    base: Vector,
+    qd_r: Sequence[Scalar] | None = None,
+) -> tuple[dict[int, Scalar], ...]:
+    """Y with torque[i] = sum over parameters p of Y[i][p] x[p]; entries that are zero for every state are left out.
+
+    link_frames  n, the frame that each link's parameters are about, in its joint frame
+    wanted       indices into x (11 per link, link by link) whose columns are computed
+    qd_r         with it, the Slotine-Li regressor of M qdd_r + C qd_r + g; else qd
+    """
+    n = len(frames)
+    forward = sweep_outward(frames, q, qd, qd if qd_r is None else qd_r, qdd_r, base, PLAIN)
+    rows: tuple[dict[int, Scalar], ...] = tuple({} for _ in range(n))
+    twists: list[Twist] = []
+    for k, frame in enumerate(frames):
+        twists = [carried(frame, forward, k, twist) for twist in twists]
+        twists.append(own_twist(frame))
+        motion = seen_from(link_frames[k], forward.motions[k])
+        seen = [twist_in(link_frames[k], twist) for twist in twists]
+        for name in range(DRIVE):
+            column = PARAMETERS_PER_LINK * k + name
+            if column in wanted:
+                force, moment = unit_wrench(name, motion)
+                for i, (linear, angular) in enumerate(seen):
+                    _put(rows[i], column, linear, force, angular, moment)
+        if PARAMETERS_PER_LINK * k + DRIVE in wanted:
+            rows[k][PARAMETERS_PER_LINK * k + DRIVE] = qdd_r[k]
+    return rows
+
+
+def _put(
+    row: dict[int, Scalar], column: int, linear: Vector, force: Vector, angular: Vector, moment: Vector
+) -> None:
+    value = (
+        linear[0] * force[0]
+        + linear[1] * force[1]
+        + linear[2] * force[2]
+        + (angular[0] * moment[0] + angular[1] * moment[1] + angular[2] * moment[2])
+    )
+    row[column] = value
+
+
+def own_twist(frame: Frame) -> Twist:
+    axis: Vector = (0.0, 0.0, 1.0)
+    return (ZERO, axis) if frame.kind == "revolute" else (axis, ZERO)
+
+
+def carried(frame: Frame, forward: Forward, k: int, twist: Twist) -> Twist:
+    """A twist of frame k-1 at the origin and along the axes of frame k."""
+    linear, angular = twist
+    state = forward.states[k]
+    moved = add(linear, cross(angular, state.offset))
+    return (
+        outward(state.turn, from_previous(frame, moved)),
+        outward(state.turn, from_previous(frame, angular)),
+    )
+
+
+def twist_in(place: Placement, twist: Twist) -> Twist:
+    """A joint-frame twist at and along a frame placed in it."""
+    rotation, translation = _plain(place)
+    linear, angular = twist
+    moved = add(linear, cross(angular, translation))
+    rows = transpose(rotation)
+    return transform(rows, moved), transform(rows, angular)
+
+
+def seen_from(place: Placement, motion: LinkMotion) -> LinkMotion:
+    """A joint frame's motion as that of a frame placed in it."""
+    rotation, translation = _plain(place)
+    rows = transpose(rotation)
+    field = multiply(multiply(rows, motion.spin.field), rotation)
+    acceleration = add(motion.acceleration, transform(motion.spin.field, translation))
+    differences = (field[2][2] - field[1][1], field[0][0] - field[2][2], field[1][1] - field[0][0])
+    if place.rotation.tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]:
+        differences = motion.spin.differences
+    return LinkMotion(transform(rows, acceleration), Spin(field, differences))
+
+
+def _plain(place: Placement) -> tuple[Matrix, Vector]:
+    rows = tuple(tuple(row) for row in place.rotation.tolist())
+    return rows, tuple(place.translation.tolist())  # type: ignore[return-value]
+
+
+def unit_wrench(name: int, motion: LinkMotion) -> tuple[Vector, Vector]:
+    """Force and moment for one standard parameter of value one (index into PARAMETER_NAMES), others zero."""
+    (ax, ay, az), (u, d) = motion
+    if name == 0:
+        return (ax, ay, az), ZERO
+    if name <= 3:
+        k = name - 1
+        force = (u[0][k], u[1][k], u[2][k])
+        return force, ((0.0, -az, ay), (az, 0.0, -ax), (-ay, ax, 0.0))[k]
+    half = 0.5
+    turn_x, turn_y, turn_z = half * (u[2][1] - u[1][2]), half * (u[0][2] - u[2][0]), half * (u[1][0] - u[0][1])
+    bend_x, bend_y, bend_z = half * (u[2][1] + u[1][2]), half * (u[0][2] + u[2][0]), half * (u[1][0] + u[0][1])
+    moment = (
+        (turn_x, bend_y, -bend_z),
+        (-u[2][0], u[2][1], -d[2]),
+        (-bend_x, turn_y, bend_z),
+        (u[1][0], -d[1], -u[1][2]),
+        (-d[0], -u[0][1], u[0][2]),
+        (bend_x, -bend_y, turn_z),
+    )[name - 4]
+    return ZERO, moment

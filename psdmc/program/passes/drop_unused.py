@@ -1,0 +1,28 @@
+"""Drop what no output needs."""
+
+from __future__ import annotations
+
+from psdmc.program.program import Program
+
+
+def drop_unused(program: Program) -> Program:
+    """Keep only the instructions that some output depends on.
+
+    Needs:  every argument precedes its use.
+    Keeps:  output values, bit for bit; the order of what stays.
+    Gives:  every instruction is an output or an argument.
+    """
+    needed = [False] * len(program.body)
+    for _, index in program.outputs:
+        needed[index] = True
+    for i in reversed(range(len(program.body))):
+        if needed[i]:
+            for a in program.body[i].args:
+                needed[a] = True
+    new_index: dict[int, int] = {}
+    body = []
+    for i, instr in enumerate(program.body):
+        if needed[i]:
+            new_index[i] = len(body)
+            body.append(instr.renumbered(new_index))
+    return Program(tuple(body), tuple((slot, new_index[i]) for slot, i in program.outputs))

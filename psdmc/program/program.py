@@ -1,0 +1,94 @@
+"""PROGRAM: straight-line, single-assignment arithmetic on scalars. The waist between robots and C."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+
+class Op(StrEnum):
+    LOAD = "load"
+    CONST = "const"
+    ADD = "add"
+    SUB = "sub"
+    MUL = "mul"
+    DIV = "div"
+    NEG = "neg"
+    SIN = "sin"
+    COS = "cos"
+
+
+ARITY = {
+    Op.LOAD: 0,
+    Op.CONST: 0,
+    Op.ADD: 2,
+    Op.SUB: 2,
+    Op.MUL: 2,
+    Op.DIV: 2,
+    Op.NEG: 1,
+    Op.SIN: 1,
+    Op.COS: 1,
+}
+COMMUTATIVE = frozenset({Op.ADD, Op.MUL})
+
+
+class Slot(NamedTuple):
+    """One entry of a named vector: an input to load or an output to store."""
+
+    vector: str
+    index: int
+
+    def __str__(self) -> str:
+        return f"{self.vector}[{self.index}]"
+
+
+class Instr(NamedTuple):
+    """One instruction; `args` point at earlier instructions, `slot` belongs to loads, `value` to constants."""
+
+    op: Op
+    args: tuple[int, ...] = ()
+    slot: Slot | None = None
+    value: float | None = None
+
+    def renumbered(self, new_index: list[int] | dict[int, int]) -> Instr:
+        return self._replace(args=tuple(new_index[a] for a in self.args)) if self.args else self
+
+    def canonical(self) -> Instr:
+        """The same instruction with commutative arguments in ascending order."""
+        if self.op in COMMUTATIVE and self.args[0] > self.args[1]:
+            return self._replace(args=(self.args[1], self.args[0]))
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """Instructions in an order in which every argument precedes its use, and what they put out.
+
+    body     instruction i defines value i
+    outputs  (slot, index of the value stored there), in order of storing
+    """
+
+    body: tuple[Instr, ...]
+    outputs: tuple[tuple[Slot, int], ...]
+
+    def inputs(self) -> tuple[Slot, ...]:
+        """Slots read, each once, in order of vector name and index."""
+        return tuple(sorted({i.slot for i in self.body if i.slot is not None}))
+
+    def uses(self) -> list[int]:
+        """How often each value is an argument or an output."""
+        count = [0] * len(self.body)
+        for instr in self.body:
+            for a in instr.args:
+                count[a] += 1
+        for _, index in self.outputs:
+            count[index] += 1
+        return count
+
+    def __iter__(self) -> Iterator[Instr]:
+        return iter(self.body)
+
+    def __len__(self) -> int:
+        return len(self.body)
