@@ -1,0 +1,74 @@
+"""Standard parameters about the file's link frames, moved to the joint frames that the algorithms work in."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.dynamics.frames import Body, body_from_parameters
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement
+
+Array = NDArray[np.float64]
+
+BODY_PARAMETERS = PARAMETERS_PER_LINK - 1
+"""Standard parameters of one rigid body: all of a link's but the joint's drive inertia."""
+
+_INERTIA_ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Where Ixx, Ixy, Iyy, Ixz, Iyz, Izz stand in the matrix, in the order of x."""
+
+
+def second_moments(inertia: Array) -> Array:
+    """The integral of r r^T over the mass from the inertia matrix about the same point: tr(I) / 2 - I."""
+    moments: Array = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return moments
+
+
+def inertia_of(second: Array) -> Array:
+    """The inertia matrix from the integral of r r^T over the mass: tr(S) - S."""
+    matrix: Array = np.trace(second) * np.eye(3) - second
+    return matrix
+
+
+def inertia_matrix(x: Array) -> Array:
+    """3 x 3 inertia matrix, kg m^2, from standard parameters of one link."""
+    matrix = np.zeros((3, 3))
+    for (row, column), value in zip(_INERTIA_ENTRIES, x[4:BODY_PARAMETERS], strict=True):
+        matrix[row, column] = matrix[column, row] = value
+    return matrix
+
+
+def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
+    """(10,) standard parameters of a body; moment and inertia about the origin of the frame they are about."""
+    return np.array([mass, *moment, *(inertia[entry] for entry in _INERTIA_ENTRIES)])
+
+
+def moved(x: Array, frame: Placement) -> Array:
+    """Ten standard parameters about a frame, about the frame that it is placed in instead."""
+    r, p = frame.rotation, frame.translation
+    moment = r @ x[1:4]
+    crossed = np.outer(moment, p)
+    second = r @ second_moments(inertia_matrix(x)) @ r.T + crossed + crossed.T + x[0] * np.outer(p, p)
+    return standard_parameters(x[0], moment + x[0] * p, inertia_of(second))
+
+
+def joint_frame_map(link_frame: Placement) -> Array:
+    """(10, 10) ten standard parameters about a link frame to those about the joint frame it is placed in."""
+    return np.column_stack([moved(unit, link_frame) for unit in np.eye(BODY_PARAMETERS)])
+
+
+def bodies_of(chain: Chain, x: Array) -> tuple[Body, ...]:
+    """Bodies about the joint frames from standard parameters about the link frames.
+
+    x   (n, 11) or (11 n,)   SI, none NaN
+    """
+    rows = np.asarray(x, dtype=np.float64).reshape(len(chain), PARAMETERS_PER_LINK)
+    return tuple(
+        body_from_parameters((joint_frame_map(joint.link_frame) @ row[:BODY_PARAMETERS]).tolist())
+        for joint, row in zip(chain.joints, rows, strict=True)
+    )
+
+
+def drive_inertia_of(x: Array) -> list[float]:
+    """n drive inertias (kg m^2; kg for sliding joints) from standard parameters, (n, 11) or (11 n,)."""
+    drives: list[float] = np.asarray(x).reshape(-1, PARAMETERS_PER_LINK)[:, BODY_PARAMETERS].tolist()
+    return drives
