@@ -11,7 +11,6 @@ from psdmc.dynamics.frames import (
     joint_angle,
     joint_offset,
     to_previous,
-    turn_by,
 )
 from psdmc.dynamics.newton_euler import PLAIN, Choices, turned_body
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, cross, multiply, transpose
@@ -28,7 +27,7 @@ def mass_matrix(
     n = len(frames)
     rows: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
     angles = [joint_angle(frame, value) for frame, value in zip(frames, q, strict=True)]
-    turns = [turn_by(angle) for angle in angles]
+    turns = [angle.turn() for angle in angles]
     offsets = [joint_offset(frame, value) for frame, value in zip(frames, q, strict=True)]
     composite = bodies[n - 1]
     for i in reversed(range(n)):
@@ -43,8 +42,7 @@ def mass_matrix(
                 moment = to_previous(frames[j], inward(turns[j], moment))
                 moment = add(moment, cross(offsets[j], force))
         if i > 0:
-            angle = angles[i]
-            double = turn_by(angle + angle) if choices.fold_double_angle and angle is not None else None
+            double = (angles[i] + angles[i]).turn() if choices.fold_double_angle else None
             before = turned_body(composite, turns[i], double)
             composite = joined(bodies[i - 1], shifted(in_previous(frames[i], before), offsets[i]))
     return tuple(tuple(row) for row in rows)

@@ -1,8 +1,9 @@
 """Joint frames, the turn that a joint makes, and bodies: what every algorithm here starts from.
 
-Frame i sits in frame i-1 at   rotation @ Rz(q + offset), translation          (revolute)
-                         or    rotation, translation + rotation @ z q          (prismatic)
-and carries one rigid body whose parameters are about frame i itself.
+Frame i sits in frame i-1 at   rotation @ Rz(q + offset), translation                        (revolute)
+                         or    rotation @ Rz(offset), translation + rotation @ z q           (prismatic)
+and carries one rigid body whose parameters are about frame i itself. Whole quarter turns of the offset are kept apart,
+so that they exchange sine and cosine exactly and cost nothing.
 """
 
 from __future__ import annotations
@@ -21,20 +22,46 @@ IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Frame:
     """One joint's constant geometry as plain floats, so that exact zeros and ones stay visible.
 
-    rotation     3 x 3, frame i at q + offset = 0 in frame i-1
+    rotation     3 x 3, frame i in frame i-1 where the turn about z is none
     translation  m, origin of frame i at q = 0 in frame i-1
-    offset       rad, added to a revolute joint's q
+    offset       rad, turn about z at q = 0, beside
+    quarters     whole quarter turns, 0 to 3
     """
 
     kind: JointKind
     rotation: Matrix
     translation: Vector
     offset: float = 0.0
+    quarters: int = 0
 
     @property
     def is_parallel(self) -> bool:
         """Whether its axis has the direction of the joint's before it."""
         return self.rotation == IDENTITY
+
+
+class Angle(NamedTuple):
+    """A turn about z: `value` rad and `quarters` quarter turns; a value of None is zero."""
+
+    value: Scalar | None
+    quarters: int
+
+    def __add__(self, other: Angle) -> Angle:  # type: ignore[override]
+        if self.value is None or other.value is None:
+            value = other.value if self.value is None else self.value
+        else:
+            value = self.value + other.value
+        return Angle(value, (self.quarters + other.quarters) % 4)
+
+    def turn(self) -> Turn | None:
+        """Its sine and cosine; None where it is no turn at all."""
+        if self.value is None and self.quarters == 0:
+            return None
+        s, c = (0.0, 1.0) if self.value is None else sincos(self.value)
+        return Turn(*((s, c), (c, -s), (-s, -c), (-c, s))[self.quarters])
+
+
+NO_TURN = Angle(None, 0)
 
 
 class Turn(NamedTuple):
@@ -89,20 +116,14 @@ def frames_of(chain: Chain) -> tuple[Frame, ...]:
     return tuple(frame_at(joint.kind, joint.placement) for joint in chain.joints)
 
 
-def frame_at(kind: JointKind, placement: Placement, offset: float = 0.0) -> Frame:
-    return Frame(
-        kind, as_matrix(placement.rotation.tolist()), as_vector(placement.translation.tolist()), offset
-    )
+def frame_at(kind: JointKind, placement: Placement) -> Frame:
+    return Frame(kind, as_matrix(placement.rotation.tolist()), as_vector(placement.translation.tolist()))
 
 
 def base_acceleration(chain: Chain) -> Vector:
     """Gravity as an upward acceleration of the base, m/s^2 in the base frame."""
     gx, gy, gz = chain.gravity.tolist()
     return (-gx, -gy, -gz)
-
-
-def turn_by(angle: Scalar | None) -> Turn | None:
-    return None if angle is None else Turn(*sincos(angle))
 
 
 def outward(turn: Turn | None, v: Vector) -> Vector:
@@ -113,11 +134,12 @@ def inward(turn: Turn | None, v: Vector) -> Vector:
     return v if turn is None else turn.inward(v)
 
 
-def joint_angle(frame: Frame, q: Scalar) -> Scalar | None:
-    """Angle of the frame's turn about z, rad; None where it makes none."""
+def joint_angle(frame: Frame, q: Scalar) -> Angle:
+    """The frame's turn about z at q."""
+    value = frame.offset if frame.offset else None
     if frame.kind == "revolute":
-        return q + frame.offset if frame.offset else q
-    return frame.offset if frame.offset else None
+        value = q if value is None else q + value
+    return Angle(value, frame.quarters)
 
 
 def joint_offset(frame: Frame, q: Scalar) -> Vector:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector, joint_angle, joint_offset
-from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, cross, multiply, sincos, transform
+from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, cross, multiply, transform
 from psdmc.robot.chain import Placement
 
 
@@ -19,9 +19,9 @@ def forward_kinematics(
     for frame, value in zip(frames, q, strict=True):
         origin = add(origin, transform(rotation, joint_offset(frame, value)))
         rotation = rotation if frame.is_parallel else multiply(rotation, frame.rotation)
-        angle = joint_angle(frame, value)
-        if angle is not None:
-            rotation = _turned(rotation, *sincos(angle))
+        turn = joint_angle(frame, value).turn()
+        if turn is not None:
+            rotation = _turned(rotation, turn.sine, turn.cosine)
         placed.append((rotation, origin))
     return tuple(placed)
 

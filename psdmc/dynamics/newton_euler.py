@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from psdmc.dynamics.frames import (
+    NO_TURN,
     Body,
     Frame,
     Turn,
@@ -30,7 +31,6 @@ from psdmc.dynamics.frames import (
     joint_offset,
     outward,
     to_previous,
-    turn_by,
 )
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, transform, transpose, multiply
 
@@ -164,7 +164,7 @@ def sweep_outward(
     compound_turns: list[Turn | None] = []
     motions: list[LinkMotion] = []
     rates, group = AT_REST, AT_REST
-    angle: Scalar | None = None
+    angle = NO_TURN
     group_rates: tuple[Scalar, Scalar, Scalar] = (0.0, 0.0, 0.0)
     previous = LinkMotion(base, spin_of(AT_REST))
     last = len(frames) - 1
@@ -175,13 +175,12 @@ def sweep_outward(
         joins = choices.compound and i > 0 and frame.is_parallel
         if not joins:
             group = _rates_before_turn(frame, rates)
-            group_rates, angle = (0.0, 0.0, 0.0), None
-        angle = own_angle if angle is None else angle if own_angle is None else angle + own_angle
+            group_rates, angle = (0.0, 0.0, 0.0), NO_TURN
+        angle = angle + own_angle
         if frame.kind == "revolute":
             group_rates = (group_rates[0] + qd[i], group_rates[1] + qd_r[i], group_rates[2] + qdd_r[i])
         same = qd[i] is qd_r[i] and group.w is group.w_r
-        own_turn = turn_by(own_angle)
-        turn = own_turn if angle is own_angle else turn_by(angle)
+        own_turn, turn = own_angle.turn(), angle.turn()
         shifted = from_previous(frame, add(previous.acceleration, transform(previous.spin.field, offset)))
         if folded and i == last:
             before = _rates_before_turn(frame, rates)
@@ -282,9 +281,7 @@ def inverse_dynamics(
 
 def _folded_body(frame: Frame, body: Body, q: Scalar, turn: Turn | None, choices: Choices) -> Body:
     angle = joint_angle(frame, q)
-    if angle is None or not choices.fold_double_angle:
-        return turned_body(body, turn)
-    return turned_body(body, turn, turn_by(angle + angle))
+    return turned_body(body, turn, (angle + angle).turn() if choices.fold_double_angle else None)
 
 
 def sweep_inward(
@@ -312,9 +309,7 @@ def sweep_inward(
         force = to_previous(frame, inward(own_turn, force))
         joins = choices.compound and i > 0 and frame.is_parallel
         if joins:
-            turned = moment if is_folded else _compound_inward(turn, moment)
-            if is_folded:
-                turned = inward(forward.compound_turns[i - 1], moment)
+            turned = inward(forward.compound_turns[i - 1] if is_folded else turn, moment)
             gathered = (gathered[0] + turned[0], gathered[1] + turned[1], 0.0)
             moment = add((0.0, 0.0, moment[2]), cross(state.offset, force))
         else:
@@ -323,6 +318,3 @@ def sweep_inward(
             moment = add(moment, cross(state.offset, force))
     return tuple(torques)
 
-
-def _compound_inward(turn: Turn | None, moment: Vector) -> Vector:
-    return inward(turn, moment)
