@@ -86,7 +86,8 @@ class Symbol:
     def __truediv__(self, other: Symbol | Number) -> Symbol | float:
         if not isinstance(other, Symbol):
             return _product(self.tracer, self, 1.0 / other)
-        return _quotient(self.tracer, self, other)
+        divisor = other.constant_value()
+        return _quotient(self.tracer, self, other) if divisor is None else self / divisor
 
     def __rtruediv__(self, other: Number) -> Symbol | float:
         return 0.0 if other == 0 else _quotient(self.tracer, self.tracer.constant(float(other)), self)

@@ -1,0 +1,167 @@
+"""Sparse equivalent link parameters: the model's freedom placed on few link parameters, all others exactly zero.
+
+Infinitely many link parameters give the same torques. Any set of parameters whose regressor columns form a basis of all
+columns can carry a model; such sets are the bases of a matroid, so the greedy choice by weight is the lightest. What a
+parameter costs depends on its neighbours, so a search by PROGRAM cost refines the choice (lower/search.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psdmc.dynamics.frames import Body
+from psdmc.dynamics.parameters import BODY_PARAMETERS, joint_frame_map
+from psdmc.dynamics.regressor import DRIVE, regressor
+from psdmc.dynamics.scalar import Scalar
+from psdmc.lower.reframe import Reframed
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Placement
+
+PSEUDO_NAMES = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz", "Im")
+"""A link's parameters in pseudo-inertia form, in the order of carriers."""
+
+WEIGHTS = dict(m=6.0, hx=10.0, hy=10.1, hz=10.2, xx=4.0, yy=4.1, zz=4.2, xy=6.0, xz=6.1, yz=6.2, Im=1.0)
+"""Operations that a parameter adds to Newton-Euler, roughly; the start of the search."""
+
+INDEPENDENT = 1e-7
+"""A column counts as independent where this part of its length is left beside the columns already chosen. Coarse on
+purpose: a carrier that is barely independent would carry huge values."""
+
+EXACT = 1e-11
+"""Transfer entries below this, relative to the largest of their column's, are rounding of an exact zero."""
+
+STATES = 48
+SEED = 20211
+
+
+def pseudo_map() -> Array:
+    """(11, 11): standard parameters of one link to its pseudo-inertia form, about the same frame."""
+    matrix = np.zeros((11, 11))
+    matrix[:4, :4] = np.eye(4)
+    for row, inertia in enumerate((4, 6, 9), start=4):
+        matrix[row, [4, 6, 9]] = 0.5
+        matrix[row, inertia] -= 1.0
+    for row, product in ((7, 5), (8, 7), (9, 8)):
+        matrix[row, product] = -1.0
+    matrix[10, 10] = 1.0
+    return matrix
+
+
+def link_map(place: Placement) -> Array:
+    """(11, 11): standard parameters about a link frame to pseudo-inertia form about the joint frame it is placed in."""
+    matrix = np.zeros((11, 11))
+    matrix[:BODY_PARAMETERS, :BODY_PARAMETERS] = joint_frame_map(place)
+    matrix[10, 10] = 1.0
+    return np.asarray(pseudo_map() @ matrix)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CarrierSpace:
+    """Which link parameters can carry a model, and how.
+
+    r, the rank of all columns; l, the model's base parameters
+
+    columns  (r, 11 n)  regressor columns in pseudo-inertia form about the re-framed joint frames, as coordinates in a
+                        basis of their span
+    target   (r, l)     what theta_b has to give, in the same coordinates
+    """
+
+    columns: Array
+    target: Array
+
+    @property
+    def count(self) -> int:
+        return int(self.columns.shape[1])
+
+    def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
+        """The basis of least weight, ascending; ties go to the earlier parameter."""
+        order = sorted(range(self.count), key=lambda j: (weights[j], j))
+        rank, chosen = self.columns.shape[0], []
+        basis = np.zeros((rank, 0))
+        for j in order:
+            column = self.columns[:, j]
+            length = np.linalg.norm(column)
+            if length == 0.0 or len(chosen) == rank:
+                continue
+            rest = column - basis @ (basis.T @ column)
+            rest -= basis @ (basis.T @ rest)
+            if np.linalg.norm(rest) > INDEPENDENT * length:
+                basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+                chosen.append(j)
+        return tuple(sorted(chosen))
+
+    def exchanges(self, carriers: Sequence[int]) -> list[tuple[int, int]]:
+        """(out, in): pairs whose exchange leaves a basis, by the coefficients of each column in the carriers."""
+        coefficients = np.linalg.solve(self.columns[:, list(carriers)], self.columns)
+        pairs = []
+        for j in range(self.count):
+            if j in carriers or not np.any(self.columns[:, j]):
+                continue
+            largest = np.max(np.abs(coefficients[:, j]))
+            for row, carrier in enumerate(carriers):
+                if abs(coefficients[row, j]) > 1e-6 * max(largest, 1.0):
+                    pairs.append((carrier, j))
+        return pairs
+
+    def transfer(self, carriers: Sequence[int]) -> Array:
+        """(len(carriers), l): theta_b to the carriers' values, with exact zeros and ones."""
+        raw = np.linalg.solve(self.columns[:, list(carriers)], self.target)
+        return cleaned(raw)
+
+
+def cleaned(matrix: Array) -> Array:
+    """Entries within rounding of zero or of +-1 made exact."""
+    scale = np.maximum(np.max(np.abs(matrix), axis=0, keepdims=True, initial=0.0), 1e-300)
+    out = np.where(np.abs(matrix) < EXACT * scale, 0.0, matrix)
+    nearest = np.round(out)
+    return np.asarray(np.where((np.abs(out - nearest) < EXACT) & (np.abs(nearest) == 1), nearest, out))
+
+
+def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
+    """The carriers of a model whose theta_b lifts to standard parameters about the link frames by `representative`."""
+    n = len(reframed.frames)
+    columns = _sampled_columns(reframed)
+    lift = np.zeros((PARAMETERS_PER_LINK * n, representative.shape[1]))
+    for k, place in enumerate(reframed.link_frames):
+        rows = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
+        lift[rows] = link_map(place) @ representative[rows]
+    unused_drives = [j for j in range(DRIVE, 11 * n, 11) if not np.any(lift[j])]
+    columns[:, unused_drives] = 0.0
+    scale = np.linalg.norm(columns, axis=0)
+    scale[scale < 1e-12 * np.max(scale)] = 1.0
+    u, sizes, _ = np.linalg.svd(columns / scale, full_matrices=False)
+    rank = int(np.sum(sizes > 1e-9 * sizes[0]))
+    compact = u[:, :rank].T @ columns
+    compact[:, np.linalg.norm(columns, axis=0) < 1e-12 * np.max(scale)] = 0.0
+    return CarrierSpace(compact, compact @ lift)
+
+
+def _sampled_columns(reframed: Reframed) -> Array:
+    """(STATES n, 11 n) regressor in pseudo-inertia form at fixed random states."""
+    n = len(reframed.frames)
+    q, qd, qdd = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(3, n, STATES))
+    here = [Placement.identity()] * n
+    rows = regressor(
+        reframed.frames, here, range(11 * n), list(q), list(qd), list(qdd), reframed.base
+    )
+    standard = np.zeros((n, STATES, 11 * n))
+    for i, row in enumerate(rows):
+        for column, value in row.items():
+            standard[i, :, column] = value
+    back = np.linalg.inv(pseudo_map())
+    return np.asarray((standard.reshape(n * STATES, n, 11) @ back).reshape(n * STATES, 11 * n))
+
+
+def bodies_from_carriers(
+    n: int, carriers: Sequence[int], values: Sequence[Scalar], unit: float
+) -> tuple[tuple[Body, ...], tuple[Scalar, ...]]:
+    """Bodies and drive inertias whose carriers have these values and all else zero; lengths in units of `unit` m."""
+    rows: list[list[Scalar]] = [[0.0] * PARAMETERS_PER_LINK for _ in range(n)]
+    powers = (2, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0)
+    for carrier, value in zip(carriers, values, strict=True):
+        link, name = divmod(carrier, PARAMETERS_PER_LINK)
+        rows[link][name] = value * unit ** powers[name] if unit != 1.0 else value
+    bodies = tuple(Body(row[0], (row[1], row[2], row[3]), tuple(row[4:10])) for row in rows)  # type: ignore[arg-type]
+    return bodies, tuple(row[10] for row in rows)

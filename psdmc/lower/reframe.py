@@ -1,0 +1,198 @@
+"""Re-frame a chain to modified DH for cheap arithmetic: joint axes as z, frames turned about and slid along them.
+
+Never for E, P or theta_b: joint variables keep their zero, only intermediate frames move. Frame i's x points along the
+common normal from axis i to axis i+1, so that the constant rotation between frames is about x alone and a right angle
+costs nothing. Where a frame's origin sits on its axis is a free choice (`feet`); an axis that slides has only a
+direction and is put through a neighbour's origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from psdmc.dynamics.frames import Frame, as_matrix, as_vector
+from psdmc.dynamics.scalar import Matrix, Vector
+from psdmc.robot.chain import Array, Chain, Placement
+
+Foot = Literal["previous", "next"]
+
+EXACT = 1e-12
+"""Lengths (relative to the chain's reach) and direction cosines below this are rounding of an exact zero."""
+
+DECIMALS = 14
+"""Lengths are kept to this many decimals (1e-14 m), far below what torques can show."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reframed:
+    """A chain's geometry for lowering.
+
+    frames       n
+    base         base acceleration, minus gravity, m/s^2, along the axes that the first frame turns from
+    link_frames  n, the file's link frames in the new joint frames
+    tip          the tip frame in the last new joint frame
+    base_axes    3 x 3, the axes that the first frame turns from, as columns in the chain's base frame
+    """
+
+    frames: tuple[Frame, ...]
+    base: Vector
+    link_frames: tuple[Placement, ...]
+    tip: Placement
+    base_axes: Matrix
+
+
+def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
+    """The chain in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""
+    placed = _placed_at_zero(chain)
+    axes = [_clean(place.rotation[:, 2]) for place in placed]
+    origins = _origins(chain, placed, axes, feet)
+    before, after = _orientations(chain, placed, axes, origins)
+    frames, link_frames = [], []
+    for i, joint in enumerate(chain.joints):
+        rotation = np.eye(3) if i == 0 else _about_x(after[i - 1].T @ before[i])
+        offset = np.zeros(3) if i == 0 else after[i - 1].T @ (origins[i] - origins[i - 1])
+        angle = _angle_about_z(before[i].T @ after[i])
+        quarters = round(angle / (np.pi / 2))
+        rest = angle - quarters * (np.pi / 2)
+        frames.append(
+            Frame(
+                joint.kind,
+                as_matrix(rotation.tolist()),
+                as_vector(_clean_lengths(offset, _reach(chain)).tolist()),
+                0.0 if abs(rest) < EXACT else float(rest),
+                quarters % 4,
+            )
+        )
+        mine = Placement(after[i], origins[i])
+        link_frames.append(_rounded(mine.inverse() @ placed[i] @ joint.link_frame))
+    base = _clean_lengths(before[0].T @ -chain.gravity, float(np.linalg.norm(chain.gravity)))
+    tip = _rounded(Placement(after[-1], origins[-1]).inverse() @ placed[-1] @ chain.tip)
+    base_axes = as_matrix(np.where(np.abs(before[0]) < EXACT, 0.0, before[0]).tolist())
+    return Reframed(tuple(frames), as_vector(base.tolist()), tuple(link_frames), tip, base_axes)
+
+
+def _rounded(place: Placement) -> Placement:
+    """A placement with the rounding of exact zeros and ones removed."""
+    near = np.round(place.rotation)
+    rotation = np.where(np.abs(place.rotation - near) < EXACT, near, place.rotation) + 0.0
+    return Placement(rotation, np.round(place.translation, DECIMALS) + 0.0)
+
+
+def _placed_at_zero(chain: Chain) -> list[Placement]:
+    """Joint frames in the base frame at q = 0."""
+    placed, here = [], Placement.identity()
+    for joint in chain.joints:
+        here = here @ joint.placement
+        placed.append(here)
+    return placed
+
+
+def _reach(chain: Chain) -> float:
+    return float(sum(np.linalg.norm(joint.placement.translation) for joint in chain.joints)) or 1.0
+
+
+def _clean(direction: Array) -> Array:
+    cleaned = np.where(np.abs(direction) < EXACT, 0.0, direction)
+    return np.asarray(cleaned / np.linalg.norm(cleaned))
+
+
+def _clean_lengths(lengths: Array, scale: float) -> Array:
+    """Rounding of zeros removed, and of decimal lengths, so that equal lengths stay equal."""
+    return np.round(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), DECIMALS)
+
+
+def _parallel(a: Array, b: Array) -> bool:
+    return float(np.linalg.norm(np.cross(a, b))) < EXACT
+
+
+def _origins(
+    chain: Chain, placed: Sequence[Placement], axes: Sequence[Array], feet: Sequence[Foot]
+) -> list[Array]:
+    """Origins at q = 0 in the base frame. Parallel neighbours share a level; sliding axes go through a neighbour."""
+    n = len(chain)
+    points = [place.translation for place in placed]
+    for i in reversed(range(n - 1)):
+        if chain.joints[i].kind == "prismatic" and feet[i] == "next":
+            points[i] = points[i + 1]
+    origins: list[Array] = []
+    for i in range(n):
+        sliding = chain.joints[i].kind == "prismatic"
+        if sliding and feet[i] == "previous" and i > 0:
+            points[i] = origins[i - 1]
+        foot = None
+        if feet[i] == "next" and i + 1 < n:
+            foot = _foot(points[i], axes[i], points[i + 1], axes[i + 1])
+        if foot is None and i > 0:
+            foot = _foot(points[i], axes[i], origins[i - 1], axes[i - 1])
+        if foot is None:
+            reference = origins[i - 1] if i > 0 and _parallel(axes[i], axes[i - 1]) else points[i]
+            foot = points[i] + axes[i] * float(axes[i] @ (reference - points[i]))
+        origins.append(foot)
+    return origins
+
+
+def _foot(point: Array, axis: Array, other_point: Array, other_axis: Array) -> Array | None:
+    """Point of the line (point, axis) nearest to the other line; None where they are parallel."""
+    normal = np.cross(axis, other_axis)
+    square = float(normal @ normal)
+    if square < EXACT**2:
+        return None
+    along = float(np.cross(other_point - point, other_axis) @ normal) / square
+    return np.asarray(point + along * axis)
+
+
+def _orientations(
+    chain: Chain, placed: Sequence[Placement], axes: Sequence[Array], origins: Sequence[Array]
+) -> tuple[list[Array], list[Array]]:
+    """Each frame's axes before and after its joint's turn, at q = 0, as columns in the base frame."""
+    n = len(chain)
+    x_before = _first_x(chain, placed[0], axes[0])
+    before, after = [], []
+    for i in range(n):
+        before.append(np.column_stack([x_before, np.cross(axes[i], x_before), axes[i]]))
+        x_after = _normal(axes[i], axes[i + 1], origins[i + 1] - origins[i]) if i + 1 < n else None
+        if x_after is None:
+            x_after = placed[i].rotation[:, 0] if chain.joints[i].kind == "revolute" else x_before
+        elif float(x_after @ x_before) < -EXACT:
+            x_after = -x_after
+        after.append(np.column_stack([x_after, np.cross(axes[i], x_after), axes[i]]))
+        x_before = x_after
+    return before, after
+
+
+def _normal(axis: Array, following: Array, step: Array) -> Array | None:
+    """Direction of the common normal of two axes; None where every perpendicular would do."""
+    normal = np.cross(axis, following)
+    if np.linalg.norm(normal) < EXACT:
+        normal = step - axis * float(axis @ step)
+        if np.linalg.norm(normal) < EXACT:
+            return None
+    return _clean(normal / np.linalg.norm(normal))
+
+
+def _first_x(chain: Chain, first: Placement, axis: Array) -> Array:
+    """The base is free to turn about the first axis: with gravity across it, x goes along gravity's part across."""
+    across = chain.gravity - axis * float(axis @ chain.gravity)
+    if np.linalg.norm(across) < EXACT * (1.0 + float(np.linalg.norm(chain.gravity))):
+        return np.asarray(first.rotation[:, 0])
+    local = first.rotation.T @ across
+    if np.count_nonzero(np.abs(local) > EXACT * np.linalg.norm(across)) == 1:
+        return np.asarray(first.rotation[:, 0])
+    return _clean(across / np.linalg.norm(across))
+
+
+def _about_x(rotation: Array) -> Array:
+    """The rotation about x that this is but for rounding, with exact zeros and ones."""
+    c, s = float(rotation[1, 1]), float(rotation[2, 1])
+    c, s = (0.0 if abs(v) < EXACT else v for v in (c, s))
+    length = np.hypot(c, s)
+    c, s = c / length, s / length
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def _angle_about_z(rotation: Array) -> float:
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))

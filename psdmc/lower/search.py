@@ -1,0 +1,142 @@
+"""Choose among a model's many lowerings by PROGRAM cost.
+
+A coordinate descent over where frames sit on their axes, how the recursions are arranged, the unit of length and which
+parameters carry the model. Deterministic: candidates come in a fixed order, only a strictly lower cost is taken, and the
+budget is a number of traced programs, not a time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from psdmc.dynamics.newton_euler import Choices
+from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace, carrier_space
+from psdmc.lower.factored import Arrangement, trace_dynamics
+from psdmc.lower.reframe import Foot, Reframed, reframe
+from psdmc.program.cost import cost
+from psdmc.program.program import Program
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
+
+BUDGET = 600
+"""Programs traced per function, at 1 to 10 ms each."""
+
+LARGEST_TRANSFER = 1e4
+"""Carriers whose values would be larger multiples of theta_b (in units of the chain) are not considered: torques would
+be small differences of large numbers."""
+
+SINCOS_LANES = 8
+"""Angles that one vector sincos takes at once in code for one state."""
+
+SINCOS_COST = 30.0
+"""Instructions of one vector sincos."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What a lowering is for. In code for one state, angles share a vector sincos; with one state per lane each angle
+    has its own."""
+
+    name: str
+    angles_per_sincos: int
+
+    def score(self, program: Program) -> float:
+        """Operations, with half the weight off those that fuse, and trigonometry."""
+        c = cost(program)
+        calls = math.ceil(c.sincos / self.angles_per_sincos)
+        return c.total - 0.5 * c.fused + 0.1 * c.neg + 8.0 * c.div + SINCOS_COST * calls
+
+
+SINGLE = Target("single", SINCOS_LANES)
+BATCH = Target("batch", 1)
+
+ALL_CHOICES = tuple(
+    Choices(compound, fold, double)
+    for compound, fold, double in product((False, True), repeat=3)
+)
+
+
+class Search:
+    """The descent for one model; geometry is shared between functions."""
+
+    def __init__(self, chain: Chain, representative: Array, theta_b: Array | None, budget: int = BUDGET) -> None:
+        self.chain, self.representative, self.theta_b, self.budget = chain, representative, theta_b, budget
+        self._spaces: dict[tuple[Foot, ...], tuple[Reframed, CarrierSpace]] = {}
+
+    def best(self, name: str, target: Target) -> tuple[Arrangement, Program]:
+        """The cheapest arrangement found for one function, and its PROGRAM."""
+        descent = _Descent(lambda a: trace_dynamics(name, a, self.theta_b), target, self.budget)
+        feet: tuple[Foot, ...] = ("previous",) * len(self.chain)
+        for candidate in _with_flips(feet):
+            descent.consider(self._starts(candidate))
+        descent.consider(self._units(descent.arrangement))
+        while descent.consider(self._exchanges(descent.arrangement)):
+            pass
+        return descent.arrangement, descent.program
+
+    def space(self, feet: tuple[Foot, ...]) -> tuple[Reframed, CarrierSpace]:
+        if feet not in self._spaces:
+            reframed = reframe(self.chain, feet)
+            self._spaces[feet] = reframed, carrier_space(reframed, self.representative)
+        return self._spaces[feet]
+
+    def _starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
+        reframed, space = self.space(feet)
+        weights = [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
+        carriers = space.lightest(weights)
+        transfer = space.transfer(carriers)
+        for choices in ALL_CHOICES:
+            yield Arrangement(reframed, 1.0, carriers, transfer, choices)
+
+    def _units(self, found: Arrangement) -> Iterator[Arrangement]:
+        """Each length of the robot as the unit; not with sliding joints, whose variables would need scaling."""
+        frames = found.reframed.frames
+        if any(frame.kind == "prismatic" for frame in frames):
+            return
+        lengths = {abs(x): None for frame in frames for x in frame.translation if x}
+        for unit in lengths:
+            yield replace(found, unit=unit)
+
+    def _exchanges(self, found: Arrangement) -> Iterator[Arrangement]:
+        space = next(space for reframed, space in self._spaces.values() if reframed is found.reframed)
+        for leaving, entering in space.exchanges(found.carriers):
+            carriers = tuple(sorted({*found.carriers, entering} - {leaving}))
+            transfer = space.transfer(carriers)
+            if np.max(np.abs(transfer)) < LARGEST_TRANSFER:
+                yield replace(found, carriers=carriers, transfer=transfer)
+
+
+class _Descent:
+    """The cheapest arrangement so far, and what is left of the budget."""
+
+    arrangement: Arrangement
+    program: Program
+
+    def __init__(self, trace: Callable[[Arrangement], Program], target: Target, budget: int) -> None:
+        self._trace, self._target, self._left, self._score = trace, target, budget, math.inf
+
+    def consider(self, candidates: Iterator[Arrangement]) -> bool:
+        """Try candidates in order, moving to each that is cheaper; whether any was."""
+        improved = False
+        for candidate in candidates:
+            if self._left == 0:
+                return False
+            self._left -= 1
+            program = self._trace(candidate)
+            score = self._target.score(program)
+            if score < self._score:
+                self.arrangement, self.program, self._score, improved = candidate, program, score, True
+        return improved
+
+
+def _with_flips(feet: tuple[Foot, ...]) -> Iterator[tuple[Foot, ...]]:
+    """The feet given, then each joint's moved to the other common normal, one at a time, then all of them."""
+    yield feet
+    other: Foot = "next"
+    for i in range(len(feet) - 1):
+        yield (*feet[:i], other, *feet[i + 1 :])
+    yield (other,) * len(feet)
