@@ -1,0 +1,71 @@
+"""Equal constants made the same float: coefficients that differ by less than their uncertainty are one constant."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+EXACT = (0.5, 1.0, 2.0)
+"""Constants known beforehand: a coefficient that may be one of these is."""
+
+SMALLEST_UNCERTAINTY = 1e-15
+
+
+class Constants:
+    """A growing table of magnitudes. `merged` returns each value's entry, so that equal ones are equal bit for bit.
+
+    The most certain values are entered first and stand for the less certain ones near them: no value moves by more
+    than its own uncertainty and its entry's, and no doubtful value joins two certain ones.
+    """
+
+    def __init__(self) -> None:
+        self._entries: Array = np.array(EXACT)
+        self._uncertainty: Array = np.full(len(EXACT), SMALLEST_UNCERTAINTY)
+
+    def merged(self, values: Array, uncertainty: Array) -> Array:
+        """Entries of the table, of the values' signs; `uncertainty` is relative. Shapes (k,), (k,) -> (k,)."""
+        out = np.abs(values)
+        uncertainty = np.maximum(uncertainty, SMALLEST_UNCERTAINTY)
+        decade = np.floor(np.log10(uncertainty)).astype(int)
+        for present in np.unique(decade):
+            chosen = np.flatnonzero(decade == present)
+            out[chosen] = self._looked_up(out[chosen], uncertainty[chosen])
+        return np.copysign(out, values)
+
+    def _looked_up(self, values: Array, uncertainty: Array) -> Array:
+        """Entries near values of about equal uncertainty; values near none become entries."""
+        nearest = self._nearest(values)
+        tolerance = (uncertainty + self._uncertainty[nearest]) * values
+        known = np.abs(self._entries[nearest] - values) <= tolerance
+        out = np.where(known, self._entries[nearest], values)
+        if not known.all():
+            unknown = np.flatnonzero(~known)
+            out[unknown] = self._entered(values[unknown], uncertainty[unknown])
+        return out
+
+    def _nearest(self, values: Array) -> NDArray[np.int64]:
+        right = np.clip(np.searchsorted(self._entries, values), 1, len(self._entries) - 1)
+        is_left = values - self._entries[right - 1] < self._entries[right] - values
+        return right - is_left
+
+    def _entered(self, values: Array, uncertainty: Array) -> Array:
+        """One new entry per run of neighbours: its most certain member, of several the smallest."""
+        order = np.lexsort((uncertainty, values))
+        ordered, doubt = values[order], uncertainty[order]
+        gap = np.diff(ordered) > (doubt[1:] + doubt[:-1]) * ordered[1:]
+        run = np.concatenate([[0], np.cumsum(gap)])
+        by_certainty = np.lexsort((ordered, doubt, run))
+        first = by_certainty[np.searchsorted(run[by_certainty], np.arange(run[-1] + 1))]
+        entries = ordered[first]
+        self._insert(entries, doubt[first])
+        out = np.empty_like(values)
+        out[order] = entries[run]
+        return out
+
+    def _insert(self, entries: Array, uncertainty: Array) -> None:
+        joined = np.concatenate([self._entries, entries])
+        order = np.argsort(joined, kind="stable")
+        self._entries = joined[order]
+        self._uncertainty = np.concatenate([self._uncertainty, uncertainty])[order]

@@ -1,0 +1,177 @@
+"""Polynomials as a diagram of nested Horner forms, equal parts shared, also where equal up to a constant factor.
+
+PSDM-2021, section 4.1: take the rows in some order, group the terms that agree in all remaining rows, and write what a
+group's members differ in as a small polynomial in the row just taken, whose coefficients are sums over the groups
+further in. Built here from the innermost row outward, so that each group is known by the nodes it is made of: scaled
+until its leading coefficient is one, it is looked up among the nodes of its row, and only its factor travels on.
+(Decision diagrams with multiplicative edge values are the same thing.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.lower.expanded_constants import Constants
+from psdmc.lower.expanded_terms import Terms
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+NOTHING, ONE = 0, 1
+"""Node numbers: no child, and the constant one. Others count from 2, innermost row first."""
+
+LEADING_SHARE = 0.0123
+"""A group is scaled by the highest power whose coefficient is at least this part of its largest: small enough to find
+the highest power nearly always (one multiplication less there), large enough not to magnify rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Level:
+    """All nodes of one row: value = sum over powers k = 0..2 of ratio[k] * child[k] * row ** k. m nodes.
+
+    row    which row of the terms' exponents
+    first  number of the first node
+    child  (m, 3) int    node numbers further in
+    ratio  (m, 3) float  zero where there is no child; the leading one is 1
+    """
+
+    row: int
+    first: int
+    child: Integers
+    ratio: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagram:
+    """levels, innermost row first; polynomial `output[k]` is factor[k] times node root[k]."""
+
+    levels: tuple[Level, ...]
+    output: Integers
+    root: Integers
+    factor: Array
+
+
+def nested_horner(terms: Terms, rows: Sequence[int]) -> Diagram:
+    """The diagram of all polynomials in `terms`, rows taken in the given order, outermost first."""
+    order, differs = _sorted(terms, rows)
+    constants = Constants()
+    coefficient, uncertainty = terms.coefficient[order], terms.uncertainty[order]
+    exponents, output = terms.exponents[:, order], terms.output[order]
+    node = np.full(len(terms), ONE, dtype=np.int64)
+    member = np.arange(len(terms))
+    levels: list[Level] = []
+    count = 2
+    for depth in reversed(range(len(rows))):
+        row = rows[depth]
+        power = exponents[row][member]
+        if not power.any():
+            continue
+        starts = differs[member] <= depth
+        group = np.cumsum(starts) - 1
+        parts = _Groups.gather(group, power, node, coefficient, uncertainty)
+        level, node = parts.as_level(row, count, constants)
+        coefficient, uncertainty = parts.leading()
+        member = member[starts]
+        if level is not None:
+            levels.append(level)
+            count += len(level.child)
+    factor = constants.merged(coefficient, uncertainty / np.abs(coefficient))
+    return Diagram(tuple(levels), output[member], node, factor)
+
+
+def _sorted(terms: Terms, rows: Sequence[int]) -> tuple[Integers, Integers]:
+    """Terms in order of output and rows; and how far out each differs from the one before.
+
+    differs[t]: 0 where the output differs, else 1 + the position in `rows` of the outermost row that does.
+    """
+    keys = [terms.output, *(terms.exponents[row] for row in rows)]
+    order = np.lexsort(keys[::-1])
+    differs = np.full(len(terms), len(keys), dtype=np.int64)
+    for position in reversed(range(len(keys))):
+        key = keys[position][order]
+        differs[1:][key[1:] != key[:-1]] = position
+    differs[0] = 0
+    return order, differs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Groups:
+    """Groups of one row before they are looked up: child node, coefficient and its uncertainty per power, (g, 3)."""
+
+    child: Integers
+    coefficient: Array
+    uncertainty: Array
+    lead: Integers
+
+    @staticmethod
+    def gather(
+        group: Integers, power: NDArray[np.uint8], node: Integers, coefficient: Array, uncertainty: Array
+    ) -> _Groups:
+        shape = (int(group[-1]) + 1, 3)
+        child = np.full(shape, NOTHING, dtype=np.int64)
+        values, doubts = np.zeros(shape), np.zeros(shape)
+        child[group, power], values[group, power], doubts[group, power] = node, coefficient, uncertainty
+        large = np.abs(values) >= LEADING_SHARE * np.abs(values).max(axis=1, keepdims=True)
+        lead = 2 - np.argmax(large[:, ::-1], axis=1)
+        return _Groups(child, values, doubts, lead)
+
+    def leading(self) -> tuple[Array, Array]:
+        """Each group's factor and its uncertainty."""
+        index = np.arange(len(self.lead))
+        return self.coefficient[index, self.lead], self.uncertainty[index, self.lead]
+
+    def as_level(self, row: int, first: int, constants: Constants) -> tuple[Level | None, Integers]:
+        """New nodes, if any, and each group's node; groups that do not contain the row are nodes already."""
+        node = self.child[:, 0].copy()
+        contains = self.child[:, 1:].any(axis=1)
+        if not contains.any():
+            return None, node
+        child = self.child[contains]
+        table = np.concatenate([child.astype(np.float64), self._ratios(contains, constants)], axis=1)
+        unique, inverse = np.unique(table, axis=0, return_inverse=True)
+        node[contains] = first + inverse.ravel()
+        return Level(row, first, unique[:, :3].astype(np.int64), unique[:, 3:]), node
+
+    def _ratios(self, contains: NDArray[np.bool_], constants: Constants) -> Array:
+        factor, doubt = (values[contains, None] for values in self.leading())
+        value, uncertainty = self.coefficient[contains], self.uncertainty[contains]
+        present = value != 0.0
+        ratio = value / factor
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relative = uncertainty / np.abs(value) + doubt / np.abs(factor)
+        relative[np.arange(len(value)), self.lead[contains]] = 0.0
+        ratio[present] = constants.merged(ratio[present], relative[present])
+        return ratio
+
+
+def operations(diagram: Diagram) -> tuple[int, int]:
+    """Multiplications and additions that the diagram takes, squares of rows shared."""
+    multiplications, additions = 0, 0
+    for level in diagram.levels:
+        present = level.child != NOTHING
+        additions += int(present.sum() - len(level.child))
+        multiplications += _products_with_constants(level) + _products_with_row(level)
+    scaled = np.abs(diagram.factor) != 1.0
+    scaled &= diagram.root != ONE
+    pairs = np.stack([diagram.root[scaled], np.abs(diagram.factor[scaled])], axis=1)
+    return multiplications + len(np.unique(pairs, axis=0)), additions
+
+
+def _products_with_constants(level: Level) -> int:
+    """Distinct constant times child, up to sign."""
+    scaled = (level.child > ONE) & (np.abs(level.ratio) != 1.0)
+    pairs = np.stack([level.child[scaled], np.abs(level.ratio[scaled])], axis=1)
+    return len(np.unique(pairs, axis=0))
+
+
+def _products_with_row(level: Level) -> int:
+    square, linear = level.child[:, 2] != NOTHING, level.child[:, 1] != NOTHING
+    highest = np.where(square, 2, 1)
+    index = np.arange(len(highest))
+    is_row_itself = (level.child[index, highest] == ONE) & (np.abs(level.ratio[index, highest]) == 1.0)
+    products = np.where(square & linear, 2, 1) - is_row_itself
+    return int(products.sum()) + int(square.any())

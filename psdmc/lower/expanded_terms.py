@@ -1,0 +1,159 @@
+"""What the expanded lowering starts from: a function's outputs as sums of monomials, read off E, P and theta_b."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.chain import Chain
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+COEFFICIENT_NOISE = 1e-13
+"""Uncertainty of a coefficient, relative to the largest one of its joint (and parameter): rounding of the derivation,
+a tenth of the accuracy that every lowering must keep."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Terms:
+    """Polynomials as lists of monomials: value[output] = sum of coefficient * product over rows of row ** exponent.
+
+    t terms over r rows: the 5 n of E, then one per base parameter where these stay symbols.
+
+    output       (t,) int      which polynomial the term belongs to
+    exponents    (r, t) uint8  0..2
+    coefficient  (t,) float    not zero
+    uncertainty  (t,) float    absolute; coefficients closer than this may be equal
+    """
+
+    output: Integers
+    exponents: NDArray[np.uint8]
+    coefficient: Array
+    uncertainty: Array
+
+    def __post_init__(self) -> None:
+        t = self.output.shape[0]
+        if self.exponents.shape[1:] != (t,) or self.coefficient.shape != (t,) or self.uncertainty.shape != (t,):
+            raise ValueError("output, exponents, coefficient and uncertainty differ in length")
+
+    def __len__(self) -> int:
+        return int(self.output.shape[0])
+
+    def where(self, keep: NDArray[np.bool_]) -> Terms:
+        return Terms(
+            self.output[keep], self.exponents[:, keep], self.coefficient[keep], self.uncertainty[keep]
+        )
+
+
+def torque_terms(model: DynamicsModel, theta: bool) -> Terms:
+    """tau[0..n-1]; with `theta` over rows of E and theta_b, else with its values baked in.
+
+    InputError where the model was not expanded, or its parameters are to be baked and unknown.
+    """
+    E, P = _expanded(model)
+    if theta:
+        return _with_parameter_rows(E, P)
+    weights = [sparse.coo_array((matrix @ _known(model)).reshape(-1, 1)) for matrix in P]
+    return _stacked(E, weights)
+
+
+def regressor_terms(model: DynamicsModel) -> Terms:
+    """Y[i, k] as output i * l + k."""
+    E, P = _expanded(model)
+    with_rows = _with_parameter_rows(E, P)
+    parameter = np.argmax(with_rows.exponents[E.shape[0] :], axis=0)
+    return Terms(
+        with_rows.output * model.l + parameter,
+        with_rows.exponents[: E.shape[0]],
+        with_rows.coefficient,
+        with_rows.uncertainty,
+    )
+
+
+def _expanded(model: DynamicsModel) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
+    if model.E is None or model.P is None:
+        raise InputError(
+            f"{model.chain.name}: the expanded lowering needs E and P, and this model has none",
+            "derive it without --no-expand, or choose --lowering factored",
+        )
+    return model.E, model.P
+
+
+def _known(model: DynamicsModel) -> Array:
+    if model.theta_b is None:
+        raise InputError(
+            f"{model.chain.name}: base parameters are unknown and cannot become constants",
+            "calibrate the model first, or emit the functions that take theta_b",
+        )
+    return model.theta_b
+
+
+def _stacked(E: NDArray[np.uint8], weights: list[sparse.coo_array]) -> Terms:
+    """One term per entry of each joint's (p, columns) weights; the uncertainty goes by columns."""
+    functions, outputs, columns, values, uncertainties = [], [], [], [], []
+    for joint, weight in enumerate(weights):
+        entries = sparse.coo_array(sparse.csr_array(weight))
+        value, column = entries.data, entries.col
+        largest = np.zeros(weight.shape[1])
+        np.maximum.at(largest, column, np.abs(value))
+        keep = np.abs(value) > COEFFICIENT_NOISE * largest[column]
+        functions.append(entries.row[keep])
+        columns.append(column[keep])
+        values.append(value[keep])
+        uncertainties.append(COEFFICIENT_NOISE * largest[column[keep]])
+        outputs.append(np.full(int(keep.sum()), joint, dtype=np.int64))
+    rows = E[:, np.concatenate(functions)]
+    if weights[0].shape[1] > 1:
+        one_hot = np.arange(weights[0].shape[1])[:, None] == np.concatenate(columns)
+        rows = np.concatenate([rows, one_hot.astype(np.uint8)])
+    return Terms(np.concatenate(outputs), rows, np.concatenate(values), np.concatenate(uncertainties))
+
+
+def _with_parameter_rows(E: NDArray[np.uint8], P: tuple[sparse.csr_array, ...]) -> Terms:
+    return _stacked(E, [sparse.coo_array(matrix) for matrix in P])
+
+
+def mass_matrix_terms(torque: Terms, n: int) -> Terms:
+    """M[i, j], i <= j, as output i * n + j: what multiplies qdd[j] in tau[i]."""
+    accelerations = torque.exponents[4 * n : 5 * n]
+    column = np.argmax(accelerations, axis=0)
+    upper = accelerations.any(axis=0) & (column >= torque.output)
+    exponents = torque.exponents.copy()
+    exponents[4 * n : 5 * n] = 0
+    entries = Terms(torque.output * n + column, exponents, torque.coefficient, torque.uncertainty)
+    return entries.where(upper)
+
+
+def nonlinear_terms(torque: Terms, n: int) -> Terms:
+    """h[i]: what is left of tau[i] at rest accelerations."""
+    return torque.where(~torque.exponents[4 * n : 5 * n].any(axis=0))
+
+
+def gravity_terms(torque: Terms, n: int) -> Terms:
+    """g[i]: what is left of tau[i] at rest."""
+    return torque.where(~torque.exponents[3 * n : 5 * n].any(axis=0))
+
+
+def with_gravity(terms: Terms, chain: Chain) -> Terms:
+    """Gravity's terms times |g| (m/s^2), which E leaves to y."""
+    n = len(chain)
+    at_rest = ~terms.exponents[3 * n : 5 * n].any(axis=0)
+    factor = np.where(at_rest, np.linalg.norm(chain.gravity), 1.0)
+    return Terms(
+        terms.output, terms.exponents, terms.coefficient * factor, terms.uncertainty * factor
+    )
+
+
+def joined(first: Terms, second: Terms, offset: int) -> Terms:
+    """Both lists of terms, the second's outputs renumbered to follow at `offset`."""
+    return Terms(
+        np.concatenate([first.output, second.output + offset]),
+        np.concatenate([first.exponents, second.exponents], axis=1),
+        np.concatenate([first.coefficient, second.coefficient]),
+        np.concatenate([first.uncertainty, second.uncertainty]),
+    )
