@@ -1,0 +1,108 @@
+"""From a DH table to a serial robot.
+
+Standard: each row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next, which is the link's frame;
+the joint frame sits after Rz(theta + q), and the rest is the link frame's constant placement in it.
+Modified (Craig): Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and joint frame and link frame are one.
+A prismatic joint adds q to d instead, which commutes with Rz(theta).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from psdmc.robot.chain import Array, Joint, Placement
+from psdmc.robot.dh import DhJoint, DhLink, DhRobot, read_dh
+from psdmc.robot.draft import Draft, Snap
+from psdmc.robot.inertia import physical_fault, standard_parameters
+from psdmc.robot.snap import ROUNDING, snap_rotation
+from psdmc.robot.zeros import COM_NAMES, canonical
+
+
+def dh_draft(text: str, source: str, gravity: Array | None, snap: float) -> Draft:
+    """The robot in the file; gravity overrides the file's; rotations within `snap` (rad) of exact ones replaced."""
+    robot = read_dh(text, source)
+    joints, snaps = _placed_joints(robot, snap)
+    return Draft(
+        name=robot.name,
+        convention=robot.convention,
+        base_name="base",
+        tip_name=joints[-1].link_name,
+        joints=joints,
+        parameters=tuple(_parameters(row) for row in robot.joints),
+        zeros=tuple(row.link.zero for row in robot.joints),
+        drives=tuple(row.drive_inertia is not None for row in robot.joints),
+        gravity=np.array(robot.gravity) if gravity is None else gravity,
+        tip=joints[-1].link_frame,
+        snaps=snaps,
+        notes=_faults(robot),
+    )
+
+
+def link_name(number: int) -> str:
+    """Links have no names in a DH table; they are counted from 1."""
+    return f"link{number}"
+
+
+def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tuple[Snap, ...]]:
+    snaps: list[Snap] = []
+    joints: list[Joint] = []
+    before = Placement.identity()
+    for number, row in enumerate(robot.joints, start=1):
+        twist = _exact(_about_x(row.alpha), f"alpha of joint '{row.name}'", snap, snaps)
+        offset = Placement(_exact(_about_z(row.theta), f"theta of joint '{row.name}'", snap, snaps), np.zeros(3))
+        if robot.convention == "standard":
+            placement = before @ offset
+            link = Placement(twist, np.array([row.a, 0.0, row.d]))
+        else:
+            placement = before @ Placement(twist, twist @ [row.a, 0.0, row.d]) @ offset
+            link = Placement.identity()
+        joints.append(Joint(row.name, link_name(number), row.kind, placement, link, row.limits))
+        before = link
+    return tuple(joints), tuple(snaps)
+
+
+def _exact(rotation: Array, where: str, snap: float, snaps: list[Snap]) -> Array:
+    result, angle = snap_rotation(rotation, snap)
+    if angle > ROUNDING:
+        snaps.append(Snap(where, angle))
+    return result
+
+
+def _about_x(angle: float) -> Array:
+    s, c = math.sin(angle), math.cos(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def _about_z(angle: float) -> Array:
+    s, c = math.sin(angle), math.cos(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _parameters(row: DhJoint) -> Array:
+    """(11,) about the link's frame, with what the file says to be zero zero before it meets an unknown."""
+    mass, com, inertia = settled(row.link)
+    drive = 0.0 if row.drive_inertia is None else row.drive_inertia
+    return np.append(standard_parameters(mass, com, inertia), drive)
+
+
+def settled(link: DhLink) -> tuple[float, Array, Array]:
+    """Mass, centre of mass and inertia about it, zero where the file's `zero` list says so."""
+    zero = canonical(link.zero)
+    com_and_inertia = [
+        0.0 if name in zero else value
+        for name, value in zip(COM_NAMES, (*link.com, *link.inertia_com), strict=True)
+    ]
+    mass = 0.0 if "m" in zero else link.mass
+    return mass, np.array(com_and_inertia[:3]), np.array(com_and_inertia[3:])
+
+
+def _faults(robot: DhRobot) -> tuple[str, ...]:
+    notes = []
+    for number, row in enumerate(robot.joints, start=1):
+        mass, _, inertia = settled(row.link)
+        fault = physical_fault(mass, inertia)
+        if fault:
+            notes.append(f"link '{link_name(number)}': {fault}: not physical")
+    return tuple(notes)

@@ -1,0 +1,40 @@
+"""What a reader hands over: a chain whose assumptions are not settled yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from psdmc.robot.chain import Array, Joint, Placement
+
+
+@dataclass(frozen=True, slots=True)
+class Snap:
+    """One rotation that was replaced by a near one with exact zeros: where, and by what angle (rad)."""
+
+    where: str
+    angle: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """A serial robot as its file states it. n joints.
+
+    parameters     n arrays (11,), about the link frames; NaN where unknown; Im 0 where the file says nothing
+    zeros          n tuples of names assumed zero (psdmc.robot.zeros.ZERO_NAMES), by the file
+    drives         n flags: the file makes this joint's drive inertia a parameter
+    gravity        (3,) m/s^2 in the base frame
+    """
+
+    name: str
+    convention: Literal["urdf", "standard", "modified"]
+    base_name: str
+    tip_name: str
+    joints: tuple[Joint, ...]
+    parameters: tuple[Array, ...]
+    zeros: tuple[tuple[str, ...], ...]
+    drives: tuple[bool, ...]
+    gravity: Array
+    tip: Placement
+    snaps: tuple[Snap, ...]
+    notes: tuple[str, ...]

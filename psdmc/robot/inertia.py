@@ -1,0 +1,77 @@
+"""One link's inertia: standard parameters about its frame, and what no real body could have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from psdmc.robot.chain import Array
+
+INERTIA_NAMES = ("xx", "xy", "yy", "xz", "yz", "zz")
+"""Order of the six inertia components within the standard parameters."""
+
+PRODUCT_NOISE = 1e-15
+"""Relative to a link's largest first moment or inertia: smaller entries are rounding of moving it between frames."""
+
+PHYSICAL_TOLERANCE = 1e-6
+"""Relative: files round inertias, so a triangle inequality may fail by this much without a word."""
+
+
+def standard_parameters(mass: float, com: Array, inertia_com: Array) -> Array:
+    """(10,) m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the frame.
+
+    mass  kg, com (3,) m in the frame, inertia_com (6,) kg m^2 about the centre of mass (INERTIA_NAMES).
+    NaN where a number needed is NaN; zero times unknown is zero.
+    """
+    moment = [_times(mass, r) for r in com]
+    x, y, z = com
+    xx, yy, zz = (_times(h, r) for h, r in zip(moment, com, strict=True))
+    xy, xz, yz = _times(moment[0], y), _times(moment[0], z), _times(moment[1], z)
+    shift = np.array([yy + zz, -xy, xx + zz, -xz, -yz, xx + yy])
+    return np.concatenate([[mass], moment, np.asarray(inertia_com) + shift])
+
+
+def about_com(parameters: Array) -> tuple[float, Array, Array]:
+    """Mass, centre of mass (3,) and inertia about it (6,): undoes standard_parameters where the mass is not zero."""
+    mass = float(parameters[0])
+    com = parameters[1:4] / mass if mass else np.zeros(3)
+    shift = standard_parameters(mass, com, np.zeros(6))[4:]
+    return mass, com, parameters[4:10] - shift
+
+
+def without_noise(parameters: Array) -> Array:
+    """Ten parameters with entries that are only rounding set to zero."""
+    clean = np.array(parameters, dtype=float)
+    for group in (slice(1, 4), slice(4, 10)):
+        size = np.max(np.abs(clean[group]))
+        clean[group][np.abs(clean[group]) < PRODUCT_NOISE * size] = 0.0
+    return clean + 0.0
+
+
+def inertia_matrix(six: Array) -> Array:
+    """(3, 3) from six components (INERTIA_NAMES)."""
+    xx, xy, yy, xz, yz, zz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def physical_fault(mass: float, inertia_com: Array) -> str | None:
+    """What forbids a body with this mass (kg) and inertia about its centre of mass (6,), or None; unknowns pass.
+
+    A body exists where the mass is positive (or all is zero) and the principal moments obey the triangle inequality:
+    equivalent to a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018).
+    """
+    if np.isnan(mass) or np.isnan(inertia_com).any():
+        return None
+    if mass == 0.0:
+        return "inertia without mass" if np.any(inertia_com) else None
+    small, middle, large = np.linalg.eigvalsh(inertia_matrix(inertia_com))
+    slack = PHYSICAL_TOLERANCE * max(abs(small), abs(large))
+    if small < -slack:
+        return f"negative principal moment of inertia {small:.3g} kg m^2"
+    if small + middle < large - slack:
+        found = f"{small:.3g} + {middle:.3g} < {large:.3g} kg m^2"
+        return f"principal moments break the triangle inequality ({found})"
+    return None
+
+
+def _times(a: float, b: float) -> float:
+    return 0.0 if a == 0.0 or b == 0.0 else float(a * b)

@@ -1,0 +1,220 @@
+"""A robot file read, with the options that decide what it means: the first stage, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from psdmc.errors import InputError
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
+from psdmc.robot.dh_chain import dh_draft
+from psdmc.robot.draft import Draft, Snap
+from psdmc.robot.urdf_chain import urdf_draft
+from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
+
+SourceFormat = Literal["urdf", "dh"]
+
+DEFAULT_SNAP = 1e-5
+"""rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no calibration is known to this angle."""
+
+DRIVE = PARAMETERS_PER_LINK - 1
+
+
+@dataclass(frozen=True, slots=True)
+class LoadOptions:
+    """What, besides the file, decides the chain; plain values, so that a saved model can be read again with them.
+
+    base, tip      link names of a URDF; None: the root, the end of the longest chain
+    gravity        m/s^2 in the URDF's root or the DH base frame; None: the file's own, or (0, 0, -9.81)
+    drive_inertia  True: drive inertias are parameters; numbers: with these values, joint by joint, kg m^2 (kg)
+    assume_zero    texts such as "link5:mx" or "link5:Ixz@com"
+    snap           rad; 0 keeps the file's rotations but for floating-point noise
+    """
+
+    base: str | None = None
+    tip: str | None = None
+    gravity: tuple[float, float, float] | None = None
+    drive_inertia: bool | tuple[float, ...] = False
+    assume_zero: tuple[str, ...] = ()
+    snap: float = DEFAULT_SNAP
+
+    def as_json(self) -> dict[str, Any]:
+        """Keyword arguments of load_robot_text as plain JSON values."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadedRobot:
+    """A chain and what it was made from.
+
+    source_name   how the file is called in messages
+    snap_report   every rotation that was replaced by a near exact one, with the angle between (rad)
+    """
+
+    chain: Chain
+    source_text: str
+    source_format: SourceFormat
+    source_name: str
+    snap_report: tuple[Snap, ...]
+    options: LoadOptions
+
+    def unsnapped(self) -> LoadedRobot:
+        """The same robot with the file's own rotations, to see what snapping changed."""
+        keywords = self.options.as_json() | {"snap": 0.0}
+        return load_robot_text(self.source_text, self.source_format, source_name=self.source_name, **keywords)
+
+
+def load_robot(
+    path: str | Path,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    gravity: Sequence[float] | None = None,
+    drive_inertia: bool | Sequence[float] = False,
+    assume_zero: Sequence[str] = (),
+    snap: float = DEFAULT_SNAP,
+) -> LoadedRobot:
+    """The robot in a URDF or DH TOML file (told apart by the suffix .toml). Options as in LoadOptions.
+
+    InputError where the file or an option is wrong, naming what and where.
+    """
+    file = Path(path)
+    return load_robot_text(
+        _text_of(file),
+        "dh" if file.suffix.lower() == ".toml" else "urdf",
+        source_name=file.name,
+        base=base,
+        tip=tip,
+        gravity=gravity,
+        drive_inertia=drive_inertia,
+        assume_zero=assume_zero,
+        snap=snap,
+    )
+
+
+def load_robot_text(
+    text: str,
+    source_format: SourceFormat,
+    *,
+    source_name: str = "robot",
+    base: str | None = None,
+    tip: str | None = None,
+    gravity: Sequence[float] | None = None,
+    drive_inertia: bool | Sequence[float] = False,
+    assume_zero: Sequence[str] = (),
+    snap: float = DEFAULT_SNAP,
+) -> LoadedRobot:
+    """The robot in a text, such as the source embedded in a saved model; see load_robot."""
+    options = LoadOptions(
+        base, tip, _gravity(gravity), _drive_option(drive_inertia), tuple(assume_zero), _snap(snap)
+    )
+    if not text.strip():
+        raise InputError(f"{source_name}: the file is empty", "give a URDF or a DH .toml file")
+    draft = _draft(text, source_format, source_name, options)
+    chain = _settled(draft, options, source_name)
+    return LoadedRobot(chain, text, source_format, source_name, draft.snaps, options)
+
+
+def _text_of(file: Path) -> str:
+    try:
+        return file.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file", "give the path of a URDF or DH .toml file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: not a UTF-8 text", "give a URDF or a DH .toml file") from None
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}", "check its path and rights") from None
+
+
+def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> Draft:
+    gravity = None if options.gravity is None else np.array(options.gravity)
+    if source_format == "urdf":
+        return urdf_draft(text, source, options.base, options.tip, gravity, options.snap)
+    if options.base is not None or options.tip is not None:
+        raise InputError(f"{source}: --base and --tip name links of a URDF", "leave them out for a DH table")
+    return dh_draft(text, source, gravity, options.snap)
+
+
+def _settled(draft: Draft, options: LoadOptions, source: str) -> Chain:
+    """The chain with drive inertias and zeros decided."""
+    link_names = [joint.link_name for joint in draft.joints]
+    joint_names = [joint.name for joint in draft.joints]
+    said = parse_statements(options.assume_zero, link_names, joint_names, source)
+    given = _drive_values(draft, options, source)
+    zeros = [
+        (*zero, *more, *(() if drive is not None else ("Im",)))
+        for zero, more, drive in zip(draft.zeros, said, given, strict=True)
+    ]
+    values = [
+        link_values(np.append(x[:DRIVE], drive or 0.0), zero)
+        for x, drive, zero in zip(draft.parameters, given, zeros, strict=True)
+    ]
+    return Chain(
+        name=draft.name,
+        convention=draft.convention,
+        base_name=draft.base_name,
+        tip_name=draft.tip_name,
+        joints=draft.joints,
+        parameters=np.array(values),
+        parameter_span=block_diagonal([link_span(zero) for zero in zeros]),
+        gravity=draft.gravity,
+        tip=draft.tip,
+        notes=(*_snap_notes(draft.snaps), *draft.notes, *_zero_notes(draft, said, values)),
+    )
+
+
+def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:
+    """Each joint's drive inertia where it is a parameter (NaN: unknown), None where it is not."""
+    own = [float(x[DRIVE]) if drive else None for x, drive in zip(draft.parameters, draft.drives, strict=True)]
+    if isinstance(options.drive_inertia, bool):
+        return [value if value is not None or not options.drive_inertia else 0.0 for value in own]
+    if len(options.drive_inertia) != len(own):
+        found, names = len(options.drive_inertia), ", ".join(joint.name for joint in draft.joints)
+        raise InputError(f"{source}: {found} drive inertias for {len(own)} joints", f"one for each of: {names}")
+    return list(options.drive_inertia)
+
+
+def _snap_notes(snaps: Sequence[Snap]) -> list[str]:
+    return [f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in snaps]
+
+
+def _zero_notes(draft: Draft, said: Sequence[Sequence[str]], values: Sequence[Array]) -> list[str]:
+    notes = []
+    for joint, own, more, before, after in zip(
+        draft.joints, draft.zeros, said, draft.parameters, values, strict=True
+    ):
+        names = list(dict.fromkeys((*own, *more)))
+        if not names:
+            continue
+        changed = np.nanmax(np.abs(before[:DRIVE] - after[:DRIVE]), initial=0.0) > 0.0
+        ending = "; the file's values there are dropped" if changed else ""
+        notes.append(f"link '{joint.link_name}': assumed zero: {', '.join(names)}{ending}")
+    return notes
+
+
+def _gravity(gravity: Sequence[float] | None) -> tuple[float, float, float] | None:
+    if gravity is None:
+        return None
+    values = [float(g) for g in gravity]
+    if len(values) != 3 or not np.isfinite(values).all():
+        raise InputError(f"gravity {list(gravity)} is not three finite numbers", "for example --gravity 0 0 -9.81")
+    return (values[0], values[1], values[2])
+
+
+def _drive_option(drive_inertia: bool | Sequence[float]) -> bool | tuple[float, ...]:
+    if isinstance(drive_inertia, bool):
+        return drive_inertia
+    values = tuple(float(value) for value in drive_inertia)
+    if not all(np.isfinite(value) and value >= 0.0 for value in values):
+        raise InputError(f"drive inertias {list(values)} are not all finite and positive", "in kg m^2 (kg)")
+    return values
+
+
+def _snap(snap: float) -> float:
+    if not 0.0 <= snap <= 0.1:
+        raise InputError(f"snap is {snap} rad, expected 0 to 0.1", "the default is 1e-5")
+    return float(snap)

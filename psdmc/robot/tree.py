@@ -1,0 +1,146 @@
+"""Which joints of a URDF's tree are the robot: from the base link to the tip link."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from psdmc.errors import InputError
+from psdmc.robot.urdf import MOVABLE, UrdfJoint, UrdfRobot
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """to_base: joints from the root to the base link; path: from there to the tip, fixed ones included."""
+
+    base: str
+    tip: str
+    to_base: tuple[UrdfJoint, ...]
+    path: tuple[UrdfJoint, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def movable(self) -> tuple[UrdfJoint, ...]:
+        return tuple(joint for joint in self.path if joint.is_movable)
+
+
+def find_route(robot: UrdfRobot, base: str | None, tip: str | None, source: str) -> Route:
+    """The chain from base (default: the root) to tip (default: see default_tip).
+
+    InputError where a link is unknown, the tip is not below the base, no joint moves, or joints cannot be modelled.
+    """
+    for role, link in (("base", base), ("tip", tip)):
+        if link is not None and link not in robot.inertials:
+            raise InputError(f"{source}: {role} link '{link}' does not exist", f"links: {listed(robot.inertials)}")
+    start = robot.root if base is None else base
+    end, notes = (tip, ()) if tip is not None else default_tip(robot, start, source)
+    path = joints_between(robot, start, end)
+    if path is None:
+        raise InputError(
+            f"{source}: tip link '{end}' is not below base link '{start}'", f"below it: {listed(_below(robot, start))}"
+        )
+    to_base = joints_between(robot, robot.root, start) or ()
+    route = Route(start, end, to_base, path, notes)
+    if not route.movable:
+        raise InputError(f"{source}: no movable joint between '{start}' and '{end}'", "choose other --base or --tip")
+    _refuse_unsupported(route, source)
+    return Route(start, end, to_base, path, (*notes, *_locked_note(robot, route)))
+
+
+def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, ...] | None:
+    """Joints from link `start` down to link `end`; None where it is not below."""
+    above = {joint.child: joint for joint in robot.joints}
+    path: list[UrdfJoint] = []
+    link = end
+    while link != start:
+        if link not in above:
+            return None
+        path.append(above[link])
+        link = above[link].parent
+    return tuple(reversed(path))
+
+
+def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[str, ...]]:
+    """The end of the path with most movable joints, and a note where there was a choice.
+
+    Several such paths (the fingers of a gripper): the link where they part, if the way there moves more joints than
+    each goes on with; else nobody can tell which arm is meant, and InputError lists the ends.
+    """
+    depth = _movable_depths(robot, base)
+    most = max(depth.values())
+    ends = [j.child for j in robot.joints if j.is_movable and depth.get(j.child) == most and j.parent in depth]
+    if most == 0:
+        raise InputError(f"{source}: no movable joint below link '{base}'", f"joint types: {', '.join(MOVABLE)}")
+    if len(ends) == 1:
+        return _fixed_end(robot, ends[0]), ()
+    parting = _parting_link(robot, base, ends)
+    if depth[parting] <= most - depth[parting]:
+        raise InputError(f"{source}: several chains end in {listed(ends)}", "choose one with --tip LINK")
+    note = f"tip '{parting}': there the chain parts towards {listed(ends)}; --tip chooses another"
+    return parting, (note,)
+
+
+def listed(names: Sequence[str] | dict[str, object], most: int = 12) -> str:
+    """Names in quotes for a message, cut off where there are many."""
+    quoted = [f"'{name}'" for name in names]
+    return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
+
+
+def _movable_depths(robot: UrdfRobot, base: str) -> dict[str, int]:
+    """Links from base down, each with the number of movable joints above it."""
+    depth = {base: 0}
+    queue = [base]
+    while queue:
+        link = queue.pop(0)
+        for joint in robot.joints_below(link):
+            depth[joint.child] = depth[link] + joint.is_movable
+            queue.append(joint.child)
+    return depth
+
+
+def _below(robot: UrdfRobot, base: str) -> list[str]:
+    return [link for link in _movable_depths(robot, base) if link != base]
+
+
+def _fixed_end(robot: UrdfRobot, link: str) -> str:
+    """The far end of the longest way over fixed joints (tool flanges); the file's first where several are as long."""
+    distance = {link: 0}
+    queue = [link]
+    while queue:
+        here = queue.pop(0)
+        for joint in robot.joints_below(here):
+            if not joint.is_movable:
+                distance[joint.child] = distance[here] + 1
+                queue.append(joint.child)
+    return max(distance, key=lambda name: distance[name])
+
+
+def _parting_link(robot: UrdfRobot, base: str, ends: Sequence[str]) -> str:
+    """The last link that the ways from base to all of the ends share."""
+    ways = [[joint.child for joint in joints_between(robot, base, end) or ()] for end in ends]
+    shared = base
+    for links in zip(*ways, strict=False):
+        if any(link != links[0] for link in links):
+            break
+        shared = links[0]
+    return shared
+
+
+def _refuse_unsupported(route: Route, source: str) -> None:
+    problems = [
+        f"joint '{joint.name}': type '{joint.type}' is not supported"
+        for joint in route.movable
+        if joint.type not in MOVABLE
+    ]
+    problems += [f"joint '{joint.name}': mimics another joint" for joint in route.movable if joint.is_mimic]
+    if problems:
+        hint = "psdmc models independent revolute, continuous, prismatic and fixed joints"
+        raise InputError(f"{source}: " + "; ".join(problems), hint)
+
+
+def _locked_note(robot: UrdfRobot, route: Route) -> tuple[str, ...]:
+    on_chain = [joint.name for joint in route.movable]
+    locked = [joint.name for joint in robot.joints if joint.is_movable and joint.name not in on_chain]
+    if not locked:
+        return ()
+    return (f"locked at zero, their bodies' inertia counted: {listed(locked, len(locked))}",)

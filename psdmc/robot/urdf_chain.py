@@ -1,0 +1,181 @@
+"""From a URDF to a serial robot: joints placed by the file's own numbers, bodies merged by Pinocchio."""
+
+from __future__ import annotations
+
+import math
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+import numpy as np
+import pinocchio
+
+from psdmc.errors import InputError
+from psdmc.robot.chain import Array, Joint, Placement
+from psdmc.robot.draft import Draft, Snap
+from psdmc.robot.inertia import physical_fault, without_noise
+from psdmc.robot.snap import ROUNDING, snap_axis, snap_placement, snap_rotation, snap_translation
+from psdmc.robot.tree import Route, find_route
+from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
+from psdmc.robot.xml_text import parse_xml
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+"""m/s^2 in the root frame, as in Pinocchio."""
+
+
+def urdf_draft(
+    text: str, source: str, base: str | None, tip: str | None, gravity: Array | None, snap: float
+) -> Draft:
+    """The chain from base to tip; gravity in the root frame; rotations within `snap` (rad) of exact ones replaced."""
+    robot = read_urdf(text, source)
+    route = find_route(robot, base, tip, source)
+    joints, tip_frame, snaps = _placed_joints(route, snap)
+    base_rotation, base_snaps = _base_rotation(route, snap)
+    root_gravity = np.array(STANDARD_GRAVITY) if gravity is None else gravity
+    bodies = merged_parameters(text, source, [joint.name for joint in route.movable])
+    bare = [joint.link_name for joint, x in zip(joints, bodies, strict=True) if not x.any()]
+    return Draft(
+        name=robot.name,
+        convention="urdf",
+        base_name=route.base,
+        tip_name=route.tip,
+        joints=joints,
+        parameters=tuple(np.append(x, 0.0) for x in bodies),
+        zeros=tuple(("m",) if joint.link_name in bare else () for joint in joints),
+        drives=(False,) * len(joints),
+        gravity=base_rotation.T @ root_gravity + 0.0,
+        tip=tip_frame,
+        snaps=(*base_snaps, *snaps),
+        notes=(*route.notes, *(f"link '{link}' has no inertia: none assumed" for link in bare), *_faults(robot)),
+    )
+
+
+def merged_parameters(text: str, source: str, movable: list[str]) -> list[Array]:
+    """Ten standard parameters per movable joint, of all bodies that move with it, about its child link's frame."""
+    pruned = tostring(_serial_tree(text, source, movable), encoding="unicode")
+    try:
+        model = pinocchio.buildModelFromXML(pruned)
+    except ValueError as error:
+        raise InputError(f"{source}: Pinocchio cannot read it: {error}", "check it with check_urdf") from None
+    return [
+        without_noise(model.inertias[model.getJointId(name)].toDynamicParameters()) for name in movable
+    ]
+
+
+def link_rotation(axis: Array) -> Array:
+    """(3, 3) from a link's frame into a joint frame whose z is the unit axis given in the link; deterministic.
+
+    x is the coordinate axis that the joint's axis is most square to, made square: coordinate axes thus give exact
+    signed permutations, and parallel axes parallel frames.
+    """
+    k = int(np.argmin(np.abs(axis)))
+    x = np.eye(3)[k] - axis[k] * axis
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(axis, x), axis]) + 0.0
+
+
+def origin(joint: UrdfJoint) -> Placement:
+    """Where the child link's frame sits in the parent's at q = 0: Rz(yaw) Ry(pitch) Rx(roll)."""
+    (sr, sp, sy), (cr, cp, cy) = [[f(angle) for angle in joint.rpy] for f in (math.sin, math.cos)]
+    rotation = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    return Placement(rotation, np.array(joint.xyz))
+
+
+def _placed_joints(route: Route, snap: float) -> tuple[tuple[Joint, ...], Placement, list[Snap]]:
+    """Joint frames one in the other, the tip in the last, and what was snapped on the way.
+
+    Each origin is snapped as it is read, so that products of exact rotations stay exact; then once more what several
+    merged ones came to.
+    """
+    snaps: list[Snap] = []
+    reach = sum(math.hypot(*joint.xyz) for joint in route.path)
+    joints: list[Joint] = []
+    so_far = Placement.identity()
+    for joint in route.path:
+        so_far = so_far @ _snapped(origin(joint), f"joint '{joint.name}'", snap, snaps)
+        if not joint.is_movable:
+            continue
+        axis, angle = snap_axis(np.array(joint.axis), snap)
+        _record(snaps, f"axis of joint '{joint.name}'", angle)
+        link = Placement(link_rotation(axis), np.zeros(3))
+        placement = _merged(so_far @ link.inverse(), f"joint '{joint.name}', merged", snap, snaps, reach)
+        joints.append(_joint(joint, placement, link))
+        so_far = link
+    tip = _merged(so_far, f"tip '{route.tip}', merged", snap, snaps, reach)
+    return tuple(joints), tip, snaps
+
+
+def _joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:
+    kind = "prismatic" if joint.type == "prismatic" else "revolute"
+    return Joint(joint.name, joint.child, kind, placement, link, joint.limits)  # type: ignore[arg-type]
+
+
+def _base_rotation(route: Route, snap: float) -> tuple[Array, list[Snap]]:
+    """The base link's rotation in the root frame."""
+    snaps: list[Snap] = []
+    base = Placement.identity()
+    for joint in route.to_base:
+        base = base @ _snapped(origin(joint), f"joint '{joint.name}'", snap, snaps)
+    rotation, angle = snap_rotation(base.rotation, snap)
+    _record(snaps, f"base '{route.base}', merged", angle)
+    return rotation, snaps
+
+
+def _snapped(place: Placement, where: str, snap: float, snaps: list[Snap]) -> Placement:
+    result, angle = snap_placement(place, snap)
+    _record(snaps, where, angle)
+    return result
+
+
+def _merged(place: Placement, where: str, snap: float, snaps: list[Snap], reach: float) -> Placement:
+    result = _snapped(place, where, snap, snaps)
+    return Placement(result.rotation, snap_translation(result.translation, reach))
+
+
+def _record(snaps: list[Snap], where: str, angle: float) -> None:
+    if angle > ROUNDING:
+        snaps.append(Snap(where, angle))
+
+
+def _serial_tree(text: str, source: str, movable: list[str]) -> Element:
+    """The robot with every other joint fixed and pictures left out, for Pinocchio to merge bodies along."""
+    root = parse_xml(text, source, "robot")
+    for element in list(root):
+        if element.tag not in ("link", "joint"):
+            root.remove(element)
+    for link in root.findall("link"):
+        for picture in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(picture)
+    for joint in root.findall("joint"):
+        for mimic in joint.findall("mimic"):
+            joint.remove(mimic)
+        if joint.get("name") not in movable:
+            joint.set("type", "fixed")
+        elif joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            _require_limit(joint)
+    return root
+
+
+def _require_limit(joint: Element) -> None:
+    """Pinocchio asks for a <limit> on revolute joints; continuous ones need not have any."""
+    limit = joint.find("limit")
+    limit = SubElement(joint, "limit") if limit is None else limit
+    for name in ("effort", "velocity"):
+        limit.set(name, limit.get(name, "0"))
+
+
+def _faults(robot: UrdfRobot) -> list[str]:
+    """A note for each link whose inertia no body could have."""
+    notes = []
+    for link, inertial in robot.inertials.items():
+        if inertial is None:
+            continue
+        fault = physical_fault(inertial.mass, np.array(inertial.inertia))
+        if fault:
+            notes.append(f"link '{link}': {fault}: not physical")
+    return notes

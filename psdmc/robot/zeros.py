@@ -1,0 +1,163 @@
+"""Parameters assumed zero: what stays of a link's values, and which parameter vectors remain possible.
+
+A zero about the link frame ("Ixz") strikes a coordinate. A zero about the centre of mass ("rx", "Ixz@com") does not: the
+frame's Ixz is Ixz@com - m rx rz, and survives while rx and rz do. What counts is the span of all parameter vectors that
+obey the statement. They are polynomials in m, r and the inertia about the centre of mass,
+
+    (m, m r, I_com + sum over i, j of m r_i r_j V_ij),
+
+and distinct monomials are linearly independent functions, so that span is the span of the coefficient vectors of the
+monomials that the zeros leave: exact, without sampling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from psdmc.errors import InputError
+from psdmc.robot.chain import PARAMETER_NAMES, PARAMETERS_PER_LINK, Array
+from psdmc.robot.inertia import INERTIA_NAMES, about_com, standard_parameters
+
+COM_NAMES = ("rx", "ry", "rz", *(f"I{name}@com" for name in INERTIA_NAMES))
+ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)
+"""What may be said to be zero of one link."""
+
+BODY = PARAMETERS_PER_LINK - 1
+"""Parameters of the body alone; the drive inertia comes after them."""
+
+
+def canonical(names: Collection[str]) -> tuple[str, ...]:
+    """The same statement in full, in a fixed order: no mass is no body, no first moment puts the centre there."""
+    said = set(names)
+    if "m" in said:
+        said |= set(PARAMETER_NAMES[:BODY]) | set(COM_NAMES)
+    for axis in "xyz":
+        if {f"m{axis}", f"r{axis}"} & said:
+            said |= {f"m{axis}", f"r{axis}"}
+    return tuple(name for name in ZERO_NAMES if name in said)
+
+
+def link_span(names: Collection[str]) -> Array:
+    """(11, k) columns that span the parameters of one link when `names` are zero; reduced column echelon form."""
+    zero = canonical(names)
+    generators = [] if "m" in zero else [_unit("m"), *_moments(zero), *_second_moments(zero)]
+    generators += [
+        _unit(f"I{name}") for name in INERTIA_NAMES if not {"m", f"I{name}@com"} & set(zero)
+    ]
+    if "Im" not in zero:
+        generators.append(_unit("Im"))
+    struck = [PARAMETER_NAMES.index(name) for name in PARAMETER_NAMES if name in zero]
+    columns = column_echelon(np.array(generators).reshape(-1, PARAMETERS_PER_LINK).T)
+    return column_echelon(_vanishing_at(columns, struck))
+
+
+def link_values(parameters: Array, names: Collection[str]) -> Array:
+    """(11,) standard parameters with the statements applied, about the centre of mass first; NaN stays NaN."""
+    zero = canonical(names)
+    values = np.array(parameters, dtype=float)
+    if any(name in COM_NAMES for name in zero) and not np.isnan(values[:BODY]).any():
+        mass, com, inertia = about_com(values)
+        for k, axis in enumerate("xyz"):
+            com[k] = 0.0 if f"r{axis}" in zero else com[k]
+        for k, name in enumerate(INERTIA_NAMES):
+            inertia[k] = 0.0 if f"I{name}@com" in zero else inertia[k]
+        values[:BODY] = standard_parameters(mass, com, inertia)
+    possible = np.any(link_span(zero) != 0.0, axis=1)
+    return np.where(possible, values, 0.0)
+
+
+def block_diagonal(blocks: Sequence[Array]) -> Array:
+    """(11 n, k) from n blocks (11, k_i)."""
+    span = np.zeros((sum(b.shape[0] for b in blocks), sum(b.shape[1] for b in blocks)))
+    row = column = 0
+    for block in blocks:
+        span[row : row + block.shape[0], column : column + block.shape[1]] = block
+        row, column = row + block.shape[0], column + block.shape[1]
+    return span
+
+
+def parse_statements(
+    statements: Iterable[str], link_names: Sequence[str], joint_names: Sequence[str], source: str
+) -> tuple[tuple[str, ...], ...]:
+    """Zero names per link from texts such as "link5:rx" or "link5:Ixz@com"; a joint's name stands for its link.
+
+    InputError names every text that does not fit, and what would.
+    """
+    found: list[list[str]] = [[] for _ in link_names]
+    problems = []
+    for statement in statements:
+        owner, _, name = statement.rpartition(":")
+        index = _index(owner, link_names, joint_names)
+        if index is None:
+            problems.append(f"'{statement}': no link '{owner}'")
+        elif name not in ZERO_NAMES:
+            problems.append(f"'{statement}': no parameter '{name}'")
+        else:
+            found[index].append(name)
+    if problems:
+        links, names = ", ".join(link_names), ", ".join(ZERO_NAMES)
+        raise InputError(
+            f"{source}: assume-zero " + "; ".join(problems), f"write LINK:NAME, links: {links}; names: {names}"
+        )
+    return tuple(tuple(names) for names in found)
+
+
+def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
+    """Reduced column echelon form of (rows, k) columns, dependent ones dropped.
+
+    The entries met here are small integers, so elimination is exact; `tolerance` only guards a division.
+    """
+    work = np.array(columns, dtype=float)
+    rank = 0
+    for row in range(work.shape[0]):
+        pivots = np.flatnonzero(np.abs(work[row, rank:]) > tolerance)
+        if pivots.size == 0:
+            continue
+        work[:, [rank, rank + pivots[0]]] = work[:, [rank + pivots[0], rank]]
+        work[:, rank] /= work[row, rank]
+        others = np.arange(work.shape[1]) != rank
+        work[:, others] -= np.outer(work[:, rank], work[row, others])
+        rank += 1
+    return work[:, :rank] + 0.0
+
+
+def _vanishing_at(columns: Array, rows: Sequence[int]) -> Array:
+    """Columns that span those combinations of the given ones whose entries at `rows` are zero."""
+    order = [*rows, *(k for k in range(columns.shape[0]) if k not in rows)]
+    reordered = column_echelon(columns[order])
+    kept = reordered[:, ~np.any(reordered[: len(rows)] != 0.0, axis=0)]
+    result = np.zeros_like(kept)
+    result[order] = kept
+    return result
+
+
+def _index(owner: str, link_names: Sequence[str], joint_names: Sequence[str]) -> int | None:
+    for names in (link_names, joint_names):
+        if owner in names:
+            return names.index(owner)
+    return None
+
+
+def _unit(name: str) -> Array:
+    vector = np.zeros(PARAMETERS_PER_LINK)
+    vector[PARAMETER_NAMES.index(name)] = 1.0
+    return vector
+
+
+def _moments(zero: Collection[str]) -> list[Array]:
+    return [_unit(f"m{axis}") for axis in "xyz" if f"r{axis}" not in zero]
+
+
+def _second_moments(zero: Collection[str]) -> list[Array]:
+    """Coefficients of m r_i r_j: on the diagonal both other moments of inertia, off it minus the product."""
+    free = [axis for axis in "xyz" if f"r{axis}" not in zero]
+    vectors = []
+    for a, b in combinations_with_replacement(free, 2):
+        if a == b:
+            vectors.append(sum((_unit(f"I{c}{c}") for c in "xyz" if c != a), np.zeros(PARAMETERS_PER_LINK)))
+        else:
+            vectors.append(-_unit(f"I{a}{b}"))
+    return vectors
