@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from psdmc.dynamics.scalar import Scalar
 from psdmc.lower.expanded_diagram import NOTHING, ONE, Diagram, Level
 from psdmc.lower.expanded_orders import cheapest
 from psdmc.lower.expanded_terms import (
@@ -20,7 +19,6 @@ from psdmc.lower.expanded_terms import (
 )
 from psdmc.lower.solve import solve_symmetric
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.dynamics.scalar import Scalar
 from psdmc.program.functions import BY_NAME
 from psdmc.program.pipeline import optimize
 from psdmc.program.program import Program, Slot
@@ -71,9 +69,7 @@ def _terms(model: DynamicsModel, function_name: str, theta: bool) -> Terms:
     return torque
 
 
-def _outputs(
-    tracer: Tracer, model: DynamicsModel, function_name: str, values: dict[int, Scalar]
-) -> Outputs:
+def _outputs(tracer: Tracer, model: DynamicsModel, function_name: str, values: dict[int, Scalar]) -> Outputs:
     n, function = model.n, BY_NAME[function_name]
     if function_name == "mass_matrix":
         return _vector("M", [entry for row in _symmetric(values, n) for entry in row])

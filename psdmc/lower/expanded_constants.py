@@ -39,6 +39,7 @@ class Constants:
         nearest = self._nearest(values)
         tolerance = (uncertainty + self._uncertainty[nearest]) * values
         known = np.abs(self._entries[nearest] - values) <= tolerance
+        known &= self._uncertainty[nearest] <= 10.0 * uncertainty
         out = np.where(known, self._entries[nearest], values)
         if not known.all():
             unknown = np.flatnonzero(~known)

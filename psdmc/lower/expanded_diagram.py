@@ -24,9 +24,9 @@ Integers = NDArray[np.int64]
 NOTHING, ONE = 0, 1
 """Node numbers: no child, and the constant one. Others count from 2, innermost row first."""
 
-LEADING_SHARE = 0.0123
-"""A group is scaled by the highest power whose coefficient is at least this part of its largest: small enough to find
-the highest power nearly always (one multiplication less there), large enough not to magnify rounding."""
+LEADING_SHARE = 0.323
+"""A group is scaled by the highest power whose coefficient is at least this part of its largest: rounding is magnified by
+no more than its inverse, and ratios of one half still count as equal. (0.0123 loses two digits and gains nothing.)"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,6 +19,7 @@ COEFFICIENT_NOISE = 1e-13
 """Uncertainty of a coefficient, relative to the largest one of its joint (and parameter): rounding of the derivation,
 a tenth of the accuracy that every lowering must keep."""
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Terms:
     """Polynomials as lists of monomials: value[output] = sum of coefficient * product over rows of row ** exponent.
@@ -38,7 +39,11 @@ class Terms:
 
     def __post_init__(self) -> None:
         t = self.output.shape[0]
-        if self.exponents.shape[1:] != (t,) or self.coefficient.shape != (t,) or self.uncertainty.shape != (t,):
+        if (
+            self.exponents.shape[1:] != (t,)
+            or self.coefficient.shape != (t,)
+            or self.uncertainty.shape != (t,)
+        ):
             raise ValueError("output, exponents, coefficient and uncertainty differ in length")
 
     def __len__(self) -> int:
@@ -144,9 +149,7 @@ def with_gravity(terms: Terms, chain: Chain) -> Terms:
     n = len(chain)
     at_rest = ~terms.exponents[3 * n : 5 * n].any(axis=0)
     factor = np.where(at_rest, np.linalg.norm(chain.gravity), 1.0)
-    return Terms(
-        terms.output, terms.exponents, terms.coefficient * factor, terms.uncertainty * factor
-    )
+    return Terms(terms.output, terms.exponents, terms.coefficient * factor, terms.uncertainty * factor)
 
 
 def joined(first: Terms, second: Terms, offset: int) -> Terms:

@@ -5,17 +5,52 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from psdmc.program.check import check
+from psdmc.program.cost import cost
+from psdmc.program.passes.absorb_negations import absorb_negations
 from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.passes.factor_common import factor_common
+from psdmc.program.passes.fold_constants import fold_constants
 from psdmc.program.passes.merge_duplicates import merge_duplicates
+from psdmc.program.passes.schedule import schedule
 from psdmc.program.program import Program
 
 Pass = Callable[[Program], Program]
 
-PASSES: tuple[Pass, ...] = (drop_unused, merge_duplicates)
+ROUND: tuple[Pass, ...] = (
+    drop_unused,
+    fold_constants,
+    merge_duplicates,
+    factor_common,
+    merge_duplicates,
+    absorb_negations,
+)
+"""Repeated while it saves operations: a bracket taken out of one sum may equal another, or be a factor itself."""
+
+LAST: tuple[Pass, ...] = (merge_duplicates, drop_unused, schedule)
+
+LONGEST = 10
+"""Rounds at most; two or three are usual."""
 
 
 def optimize(program: Program) -> Program:
-    """The same function of its inputs in fewer operations; InternalError where a pass breaks a PROGRAM's rules."""
-    for apply in PASSES:
+    """The same function of its inputs in fewer operations, up to rounding.
+
+    InternalError, naming the pass, where one breaks a PROGRAM's rules.
+    """
+    for _ in range(LONGEST):
+        shorter = _applied(ROUND, program)
+        if _operations(shorter) >= _operations(program):
+            break
+        program = shorter
+    return _applied(LAST, program)
+
+
+def _applied(passes: tuple[Pass, ...], program: Program) -> Program:
+    for apply in passes:
         program = check(apply(program), after=apply.__name__)
     return program
+
+
+def _operations(program: Program) -> int:
+    counted = cost(program)
+    return counted.total + counted.div + counted.neg

@@ -1,0 +1,80 @@
+"""Let neighbours take a sign change over."""
+
+from __future__ import annotations
+
+from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.program import Instr, Op, Program
+
+
+def absorb_negations(program: Program) -> Program:
+    """Remove negations that the operation after or before them can absorb.
+
+    A use absorbs one as x + -y = x - y, x - -y = x + y, -x * -y = x * y, -x / -y = x / y, --x = x. A producer that
+    nothing else needs absorbs one as -(x - y) = y - x, -(c x) = (-c) x, -((x - y) z) = (y - x) z.
+
+    Needs:  every argument precedes its use.
+    Keeps:  output values, bit for bit but for the sign of a zero; output names and order.
+    Gives:  never more operations than before; every instruction is needed.
+    """
+    program = drop_unused(program)
+    while (after := _absorbed_once(program)) != program:  # each change leaves fewer uses of negations
+        program = after
+    return program
+
+
+def _absorbed_once(program: Program) -> Program:
+    return drop_unused(_into_producers(drop_unused(_into_uses(program))))
+
+
+def _into_uses(program: Program) -> Program:
+    body: list[Instr] = []
+    new_index: list[int] = []
+    for instr in program.body:
+        moved = _absorbed(instr.renumbered(new_index), body)
+        if isinstance(moved, int):
+            new_index.append(moved)
+        else:
+            body.append(moved)
+            new_index.append(len(body) - 1)
+    return Program(tuple(body), tuple((slot, new_index[i]) for slot, i in program.outputs))
+
+
+def _absorbed(instr: Instr, body: list[Instr]) -> Instr | int:
+    """The instruction with its arguments' signs taken over, or the index of the value that it is."""
+    plain = [body[a].args[0] if body[a].op is Op.NEG else None for a in instr.args]
+    match instr.op, plain:
+        case Op.NEG, [int(x)]:
+            return x
+        case Op.ADD, [_, int(y)]:
+            return Instr(Op.SUB, (instr.args[0], y))
+        case Op.ADD, [int(x), None]:
+            return Instr(Op.SUB, (instr.args[1], x))
+        case Op.SUB, [_, int(y)]:
+            return Instr(Op.ADD, (instr.args[0], y))
+        case ((Op.MUL | Op.DIV), [int(x), int(y)]):
+            return Instr(instr.op, (x, y))
+    return instr
+
+
+def _into_producers(program: Program) -> Program:
+    body, uses = list(program.body), program.uses()
+    new_index = list(range(len(body)))
+    for i, instr in enumerate(program.body):
+        if instr.op is Op.NEG and _negate(body, uses, instr.args[0]):
+            new_index[i] = instr.args[0]
+    moved = tuple(instr.renumbered(new_index) for instr in body)
+    return Program(moved, tuple((slot, new_index[i]) for slot, i in program.outputs))
+
+
+def _negate(body: list[Instr], uses: list[int], index: int) -> bool:
+    """Change the sign of a value in place, if that costs nothing and nobody else sees it."""
+    instr = body[index]
+    if uses[index] != 1:
+        return False
+    if instr.op is Op.SUB:
+        body[index] = Instr(Op.SUB, instr.args[::-1])
+        return True
+    if instr.op is Op.CONST and instr.value is not None:
+        body[index] = Instr(Op.CONST, value=-instr.value)
+        return True
+    return instr.op in (Op.MUL, Op.DIV) and any(_negate(body, uses, a) for a in instr.args)

@@ -1,0 +1,144 @@
+"""Take common factors out of sums."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.program import Instr, Op, Program
+
+_SIGNED_SUM = {Op.ADD: (1, 1), Op.SUB: (1, -1)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Term:
+    """sign times a product; a factor is the index of a value or a sum that is yet to be computed."""
+
+    sign: int
+    factors: tuple[int | _Sum, ...]
+
+    def without(self, factor: int) -> _Term:
+        position = self.factors.index(factor)
+        return _Term(self.sign, self.factors[:position] + self.factors[position + 1 :])
+
+
+@dataclass(frozen=True, slots=True)
+class _Sum:
+    terms: tuple[_Term, ...]
+
+
+def factor_common(program: Program) -> Program:
+    """Write a*b + a*c as a*(b + c), over chains of sums and of products of which nothing else uses a part.
+
+    The factor that most terms of a sum share goes first, then again among the others and within the bracket. A sum
+    in which no two terms share a factor stays as it is.
+
+    Needs:  every argument precedes its use.
+    Keeps:  outputs up to rounding (it reorders floating point); output names and order.
+    Gives:  fewer multiplications, as many additions, at most a negation more a sum; every instruction is needed.
+    """
+    uses = program.uses()
+    inside = _parts_of_larger_sums(program, uses)
+    builder = _Builder([], [])
+    for i, instr in enumerate(program.body):
+        grouped = None
+        if instr.op in _SIGNED_SUM and not inside[i]:
+            terms = tuple(_terms(program.body, uses, i, 1))
+            grouped = _grouped(terms)
+            grouped = None if len(grouped) == len(terms) else grouped
+        builder.new_index.append(
+            builder.append(instr.renumbered(builder.new_index)) if grouped is None else builder.total(grouped)
+        )
+    outputs = tuple((slot, builder.new_index[i]) for slot, i in program.outputs)
+    return drop_unused(Program(tuple(builder.body), outputs))
+
+
+def _parts_of_larger_sums(program: Program, uses: list[int]) -> list[bool]:
+    inside = [False] * len(program.body)
+    for instr in program.body:
+        if instr.op in _SIGNED_SUM:
+            for a in instr.args:
+                inside[a] = inside[a] or (uses[a] == 1 and program.body[a].op in _SIGNED_SUM)
+    return inside
+
+
+def _terms(body: tuple[Instr, ...], uses: list[int], index: int, sign: int) -> list[_Term]:
+    """Terms of a chain of sums, left to right (a stack, since chains can be thousands long)."""
+    terms: list[_Term] = []
+    stack = [(index, sign)]
+    while stack:
+        i, own = stack.pop()
+        instr = body[i]
+        if instr.op in _SIGNED_SUM and (i == index or uses[i] == 1):
+            pairs = zip(instr.args, _SIGNED_SUM[instr.op], strict=True)
+            stack.extend([(a, own * s) for a, s in pairs][::-1])
+        else:
+            terms.append(_Term(own, tuple(_factors(body, uses, i))))
+    return terms
+
+
+def _factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[int]:
+    factors: list[int] = []
+    stack = [index]
+    while stack:
+        i = stack.pop()
+        if body[i].op is Op.MUL and uses[i] == 1:
+            stack.extend(body[i].args[::-1])
+        else:
+            factors.append(i)
+    return factors
+
+
+def _grouped(terms: tuple[_Term, ...]) -> tuple[_Term, ...]:
+    """Terms with common factors taken out, most frequent first; where each group stood first."""
+    remaining = list(enumerate(terms))
+    done: list[tuple[int, _Term]] = []
+    while (factor := _most_frequent([term for _, term in remaining])) is not None:
+        sharing = [(at, term) for at, term in remaining if factor in term.factors]
+        remaining = [(at, term) for at, term in remaining if factor not in term.factors]
+        sign = sharing[0][1].sign
+        inner = _grouped(tuple(_Term(t.sign * sign, t.without(factor).factors) for _, t in sharing))
+        bracket = inner[0].factors if len(inner) == 1 and inner[0].sign == 1 else (_Sum(inner),)
+        done.append((sharing[0][0], _Term(sign, (factor, *bracket))))
+    return tuple(term for _, term in sorted(done + remaining, key=lambda item: item[0]))
+
+
+def _most_frequent(terms: list[_Term]) -> int | None:
+    """The factor that most products contain, at least two; of several the earliest value."""
+    count: Counter[int] = Counter()
+    for term in terms:
+        if len(term.factors) > 1:
+            count.update(sorted({f for f in term.factors if isinstance(f, int)}))
+    best = max(count.items(), key=lambda item: (item[1], -item[0]), default=(0, 0))
+    return best[0] if best[1] > 1 else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Builder:
+    """The new body, and where the old one's values are in it."""
+
+    body: list[Instr]
+    new_index: list[int]
+
+    def append(self, instr: Instr) -> int:
+        self.body.append(instr)
+        return len(self.body) - 1
+
+    def total(self, terms: tuple[_Term, ...]) -> int:
+        """The sum of some terms; starts with one that has a plus, if there is any."""
+        plus = next((term for term in terms if term.sign > 0), None)
+        first = terms[0] if plus is None else plus
+        value = self._product(first)
+        for term in terms:
+            if term is not first:
+                op = Op.ADD if term.sign == first.sign else Op.SUB
+                value = self.append(Instr(op, (value, self._product(term))))
+        return value if plus is not None else self.append(Instr(Op.NEG, (value,)))
+
+    def _product(self, term: _Term) -> int:
+        values = [self.new_index[f] if isinstance(f, int) else self.total(f.terms) for f in term.factors]
+        value = values[0]
+        for other in values[1:]:
+            value = self.append(Instr(Op.MUL, (value, other)))
+        return value

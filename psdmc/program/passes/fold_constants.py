@@ -1,0 +1,61 @@
+"""Compute at compile time what does not depend on the inputs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from psdmc.program.program import Instr, Op, Program
+
+_FUNCTIONS: dict[Op, Callable[..., float]] = {
+    Op.ADD: lambda a, b: a + b,
+    Op.SUB: lambda a, b: a - b,
+    Op.MUL: lambda a, b: a * b,
+    Op.DIV: lambda a, b: a / b,
+    Op.NEG: lambda a: -a,
+    Op.SIN: math.sin,
+    Op.COS: math.cos,
+}
+
+
+def fold_constants(program: Program) -> Program:
+    """Replace operations on constants by their results, and drop sums with 0 and products with 0 and 1.
+
+    Needs:  every argument precedes its use; finite inputs (0 * x is taken for 0).
+    Keeps:  output values, bit for bit but for the sign of a zero; output names and order.
+    Gives:  no operation has only constants as arguments, but a division by zero; what is no longer needed stays.
+    """
+    body: list[Instr] = []
+    new_index: list[int] = []
+    for instr in program.body:
+        moved = instr.renumbered(new_index)
+        known = _argument_that_it_equals(moved, body)
+        if known is None:
+            body.append(_folded(moved, body))
+            known = len(body) - 1
+        new_index.append(known)
+    return Program(tuple(body), tuple((slot, new_index[i]) for slot, i in program.outputs))
+
+
+def _folded(instr: Instr, body: list[Instr]) -> Instr:
+    values = [body[a].value for a in instr.args]
+    if not values or any(value is None for value in values) or (instr.op is Op.DIV and values[1] == 0.0):
+        return instr
+    return Instr(Op.CONST, value=_FUNCTIONS[instr.op](*values))
+
+
+def _argument_that_it_equals(instr: Instr, body: list[Instr]) -> int | None:
+    """Index of the value that x + 0, x - 0, x * 1, x / 1 or x * 0 is; None for all else."""
+    if len(instr.args) != 2:
+        return None
+    left, right = instr.args
+    for this, other in ((left, right), (right, left)):
+        value = body[this].value
+        if instr.op is Op.MUL and value == 0.0:
+            return this
+        if (instr.op is Op.ADD and value == 0.0) or (instr.op is Op.MUL and value == 1.0):
+            return other
+    is_neutral = (instr.op is Op.SUB and body[right].value == 0.0) or (
+        instr.op is Op.DIV and body[right].value == 1.0
+    )
+    return left if is_neutral else None
