@@ -1,0 +1,212 @@
+"""The straight-line body of one PROGRAM: what the body template prints, line by line.
+
+Sines and cosines are taken in groups, as early as their angles are known, so that one state's angles share vectors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from psdmc.emit.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
+from psdmc.program.program import Op, Program, Slot
+
+
+def spread(text: str, uniform: bool) -> str:
+    """The text as a `V`."""
+    return f"SPLAT({text})" if uniform else text
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """An input that the body reads first of all; a uniform one is the same for all states."""
+
+    name: str
+    vector: str
+    index: int
+    uniform: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """`const <V or real> name = text;`"""
+
+    name: str
+    text: str
+    uniform: bool
+
+    @property
+    def line(self) -> str:
+        return f"const {'real' if self.uniform else 'V'} {self.name} = {self.text}"
+
+
+@dataclass(frozen=True, slots=True)
+class Store:
+    """`vector[index] = text`, where a uniform text must be spread over the lanes first."""
+
+    vector: str
+    index: int
+    text: str
+    uniform: bool
+
+    @property
+    def line(self) -> str:
+        return f"STORE({self.vector}, {self.index}, {spread(self.text, self.uniform)})"
+
+
+@dataclass(frozen=True, slots=True)
+class Angle:
+    """One angle of a group, and the names that its sine and cosine get (None: not needed)."""
+
+    text: str
+    sine: str | None
+    cosine: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Steps, then the sines and cosines of the angles that they made known; stores come with the last steps."""
+
+    steps: tuple[Step | Store, ...]
+    angles: tuple[Angle, ...]
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A PROGRAM ready to print.
+
+    unused  vectors of the signature that the PROGRAM never reads
+    """
+
+    loads: tuple[Load, ...]
+    sections: tuple[Section, ...]
+    unused: tuple[str, ...]
+
+
+def make_body(
+    program: Program, inputs: tuple[str, ...], sizes: dict[str, int], suffix: str, stores_early: bool
+) -> Body:
+    """Lay out a PROGRAM.
+
+    inputs        vectors of the signature that may be read
+    sizes         output vectors and their lengths; entries that the PROGRAM does not store become zero
+    suffix        of constants: '' or 'f'
+    stores_early  store a value as soon as it is known (large outputs) or all at the end (small ones)
+    """
+    writer = _Writer(program, suffix, stores_early)
+    sections = writer.sections(sizes)
+    read = {slot.vector for slot in program.inputs()}
+    return Body(writer.loads(), sections, tuple(name for name in inputs if name not in read))
+
+
+class _Writer:
+    """Texts of a PROGRAM's values, made in the order in which they are printed."""
+
+    def __init__(self, program: Program, suffix: str, stores_early: bool) -> None:
+        self.program, self.suffix, self.stores_early = program, suffix, stores_early
+        self.names = Names.of(program)
+        self.stores: dict[int, list[Slot]] = {}
+        for slot, index in program.outputs:
+            self.stores.setdefault(index, []).append(slot)
+        self.done = [False] * len(program)
+
+    def loads(self) -> tuple[Load, ...]:
+        return tuple(
+            Load(_load_name(slot), slot.vector, slot.index, slot.vector in UNIFORM_VECTORS)
+            for slot in self.program.inputs()
+        )
+
+    def sections(self, sizes: dict[str, int]) -> tuple[Section, ...]:
+        sections: list[Section] = []
+        for number, group in enumerate(_angle_groups(self.program)):
+            steps = self._steps(_cone(self.program, group))
+            sections.append(Section(steps, tuple(self._angle(a) for a in group), number))
+        steps = [*self._steps(range(len(self.program))), *self._late_stores(), *self._zeros(sizes)]
+        return (*sections, Section(tuple(steps), (), len(sections)))
+
+    def _steps(self, wanted: range | list[int]) -> tuple[Step | Store, ...]:
+        lines: list[Step | Store] = []
+        for i in wanted:
+            if self.done[i]:
+                continue
+            self.done[i] = True
+            if self._has_own_line(i):
+                lines.append(Step(f"t{i}", self._operation(i).text, self.names.uniform[i]))
+            if self.stores_early:
+                lines += self._stores_of(i)
+        return tuple(lines)
+
+    def _has_own_line(self, i: int) -> bool:
+        return self.names.named[i] and self.program.body[i].op in (Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG)
+
+    def _stores_of(self, i: int) -> list[Store]:
+        slots = self.stores.get(i, [])
+        return [Store(s.vector, s.index, self._value(i).text, self.names.uniform[i]) for s in slots]
+
+    def _late_stores(self) -> list[Store]:
+        if self.stores_early:
+            return []
+        return [
+            Store(slot.vector, slot.index, self._value(index).text, self.names.uniform[index])
+            for slot, index in self.program.outputs
+        ]
+
+    def _zeros(self, sizes: dict[str, int]) -> list[Store]:
+        stored = {slot for slot, _ in self.program.outputs}
+        zero = literal(0.0, self.suffix).text
+        return [
+            Store(vector, index, zero, True)
+            for vector, size in sizes.items()
+            for index in range(size)
+            if Slot(vector, index) not in stored
+        ]
+
+    def _angle(self, a: int) -> Angle:
+        taken = {(instr.op, *instr.args) for instr in self.program}
+        sine = f"sin_{a}" if (Op.SIN, a) in taken else None
+        cosine = f"cos_{a}" if (Op.COS, a) in taken else None
+        return Angle(spread(self._value(a).text, self.names.uniform[a]), sine, cosine)
+
+    def _value(self, i: int) -> Expr:
+        """A value as an operand: its name, or its own expression where nothing else uses it."""
+        instr = self.program.body[i]
+        if instr.slot is not None:
+            return Expr(_load_name(instr.slot))
+        if instr.value is not None:
+            return literal(instr.value, self.suffix)
+        if instr.op in (Op.SIN, Op.COS):
+            return Expr(f"{instr.op.value}_{instr.args[0]}")
+        return Expr(f"t{i}") if self.names.named[i] else self._operation(i)
+
+    def _operation(self, i: int) -> Expr:
+        instr = self.program.body[i]
+        return combine(instr.op, [self._value(a) for a in instr.args])
+
+
+def _load_name(slot: Slot) -> str:
+    return f"{slot.vector}_{slot.index}"
+
+
+def _angle_groups(program: Program) -> list[list[int]]:
+    """Angles by how many sines lie beneath them: each group depends on the groups before it only."""
+    level: list[int] = []
+    groups: dict[int, dict[int, None]] = {}
+    for instr in program:
+        below = max((level[a] for a in instr.args), default=0)
+        is_trig = instr.op in (Op.SIN, Op.COS)
+        if is_trig:
+            groups.setdefault(below, {})[instr.args[0]] = None
+        level.append(below + 1 if is_trig else below)
+    return [list(groups[key]) for key in sorted(groups)]
+
+
+def _cone(program: Program, roots: list[int]) -> list[int]:
+    """Everything that the roots depend on, themselves included, in the PROGRAM's order."""
+    needed = [False] * len(program)
+    for root in roots:
+        needed[root] = True
+    for i in reversed(range(max(roots) + 1)):
+        if needed[i]:
+            for a in program.body[i].args:
+                needed[a] = True
+    return [i for i, wanted in enumerate(needed) if wanted]

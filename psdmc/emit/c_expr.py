@@ -1,0 +1,94 @@
+"""PROGRAM -> C expressions: single-use values are written into their use, the rest get names.
+
+The texts hold for one state and for one state per lane alike: a value is `V` (a real, or a vector of them) or uniform
+(the same for all states: constants and what is made of parameters alone), and C lets a scalar stand beside a vector.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from psdmc.program.program import Instr, Op, Program
+
+DEEPEST = 4
+"""Operations nested in one expression: more saves no instruction and reads badly."""
+
+UNIFORM_VECTORS = frozenset({"theta_b"})
+
+_LOOSE, _TIGHT, _UNARY, _ATOM = range(4)
+_SYMBOL = {Op.ADD: ("+", _LOOSE), Op.SUB: ("-", _LOOSE), Op.MUL: ("*", _TIGHT), Op.DIV: ("/", _TIGHT)}
+
+
+@dataclass(frozen=True, slots=True)
+class Expr:
+    """C text of a value, how tightly its outermost operator binds and how deep it is nested."""
+
+    text: str
+    binding: int = _ATOM
+    depth: int = 0
+
+    def beside(self, binding: int, is_right: bool) -> str:
+        """The text as an operand: in brackets unless C would read the same tree without them."""
+        loose = self.binding < binding or (is_right and self.binding in (binding, _UNARY))
+        return f"({self.text})" if loose else self.text
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """How a PROGRAM's values are called in C, decided before any text is made.
+
+    named    values that get a name: outputs, and whatever is used more than once
+    uniform  values that are the same for all states
+    """
+
+    program: Program
+    named: tuple[bool, ...]
+    uniform: tuple[bool, ...]
+
+    @staticmethod
+    def of(program: Program) -> Names:
+        uses = program.uses()
+        outputs = {index for _, index in program.outputs}
+        named = [uses[i] > 1 or i in outputs for i in range(len(program))]
+        uniform: list[bool] = []
+        for instr in program:
+            uniform.append(_is_uniform(instr, uniform))
+        _cut_deep_trees(program, named)
+        return Names(program, tuple(named), tuple(uniform))
+
+
+def _is_uniform(instr: Instr, known: list[bool]) -> bool:
+    if instr.slot is not None:
+        return instr.slot.vector in UNIFORM_VECTORS
+    if instr.op in (Op.SIN, Op.COS):
+        return False
+    return all(known[a] for a in instr.args)
+
+
+def _cut_deep_trees(program: Program, named: list[bool]) -> None:
+    """Name the values at which an expression would nest deeper than DEEPEST."""
+    depth = [0] * len(program)
+    for i, instr in enumerate(program):
+        if not instr.args or instr.op in (Op.SIN, Op.COS):
+            continue
+        below = [0 if named[a] else depth[a] for a in instr.args]
+        for a, levels in zip(instr.args, below, strict=True):
+            if levels == DEEPEST:
+                named[a] = True
+        depth[i] = 1 + max(0 if named[a] else depth[a] for a in instr.args)
+
+
+def literal(value: float, suffix: str) -> Expr:
+    """A constant that reads back as the same number."""
+    return Expr(f"{value!r}{suffix}", _UNARY if str(value).startswith("-") else _ATOM)
+
+
+def combine(op: Op, operands: list[Expr]) -> Expr:
+    """One operation on texts, brackets only where they change the meaning."""
+    depth = 1 + max(operand.depth for operand in operands)
+    if op is Op.NEG:
+        return Expr(f"-{operands[0].beside(_UNARY, is_right=True)}", _UNARY, depth)
+    symbol, binding = _SYMBOL[op]
+    left, right = operands
+    text = f"{left.beside(binding, is_right=False)} {symbol} {right.beside(binding, is_right=True)}"
+    return Expr(text, binding, depth)

@@ -1,0 +1,127 @@
+"""What the emitted package says about its robot, apart from arithmetic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+
+from psdmc.model.dynamics_model import DynamicsModel
+
+
+@dataclass(frozen=True, slots=True)
+class JointInfo:
+    """A joint's name, kind and limits (rad or m, their rates, N m or N; infinite where unknown)."""
+
+    name: str
+    kind: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    speed: float = math.inf
+    acceleration: float = math.inf
+    effort: float = math.inf
+
+    @property
+    def unit(self) -> str:
+        return "rad" if self.kind == "revolute" else "m"
+
+    @property
+    def effort_unit(self) -> str:
+        return "N m" if self.kind == "revolute" else "N"
+
+
+@dataclass(frozen=True, slots=True)
+class BaseParameterInfo:
+    """One base parameter: its equation in standard parameters, its unit, its value (None while unknown)."""
+
+    equation: str
+    unit: str
+    value: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PackageInfo:
+    """One robot's metadata for header, manifest and README.
+
+    name        the robot's own name, untrusted text
+    joints      n, from base to tip
+    gravity     m/s^2 in the base frame
+    base, tip   link names
+    parameters  l base parameters, in the order of theta_b
+    model_hash  content hash of the MODEL
+    options     what the user chose, as printed in header and manifest
+    """
+
+    name: str
+    joints: tuple[JointInfo, ...]
+    gravity: tuple[float, float, float]
+    base: str
+    tip: str
+    parameters: tuple[BaseParameterInfo, ...]
+    model_hash: str
+    psdmc_version: str
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.joints:
+            raise ValueError("a package needs at least one joint")
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    @property
+    def l(self) -> int:
+        """Number of base parameters."""
+        return len(self.parameters)
+
+
+def package_info(
+    model: DynamicsModel, name: str | None = None, options: Mapping[str, str] | None = None
+) -> PackageInfo:
+    """Metadata of a MODEL; `name` replaces the robot's own."""
+    chain = model.chain
+    joints = tuple(
+        JointInfo(
+            joint.name,
+            joint.kind,
+            joint.limits.lower,
+            joint.limits.upper,
+            joint.limits.speed,
+            joint.limits.acceleration,
+            joint.limits.effort,
+        )
+        for joint in chain.joints
+    )
+    gx, gy, gz = (float(g) + 0.0 for g in chain.gravity.tolist())
+    return PackageInfo(
+        name=chain.name if name is None else name,
+        joints=joints,
+        gravity=(gx, gy, gz),
+        base=chain.base_name,
+        tip=chain.tip_name,
+        parameters=_parameters(model),
+        model_hash=str(getattr(model, "content_hash", "") or ""),
+        psdmc_version=psdmc_version(),
+        options=dict(options or {}),
+    )
+
+
+def _parameters(model: DynamicsModel) -> tuple[BaseParameterInfo, ...]:
+    values = [None] * model.l if model.theta_b is None else model.theta_b.tolist()
+    known = getattr(model, "base_parameters", None)
+    if known is None:
+        return tuple(BaseParameterInfo(f"theta_b[{i}]", "", value) for i, value in enumerate(values))
+    return tuple(
+        BaseParameterInfo(str(parameter.equation), str(parameter.unit), value)
+        for parameter, value in zip(known, values, strict=True)
+    )
+
+
+def psdmc_version() -> str:
+    try:
+        return version("psdmc")
+    except PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,145 @@
+"""Kernels as the templates see them: names, sizes and bodies, everything decided."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from psdmc.emit.body import Body, make_body
+from psdmc.emit.options import EmitOptions
+from psdmc.emit.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
+from psdmc.errors import InternalError
+from psdmc.program.cost import Cost, cost
+from psdmc.program.functions import FUNCTIONS, Function
+from psdmc.program.kernel import Kernel
+from psdmc.program.program import Program
+
+
+@dataclass(frozen=True, slots=True)
+class VectorView:
+    """A vector of a signature, `size` reals per state (a uniform one: the same for all states)."""
+
+    name: str
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class KernelView:
+    """One kernel: the file(s) that hold its body, its C functions and their signatures.
+
+    single_file  body file, included once per instantiation; the same as lanes_file where one order serves both
+    pivot_order  joints in the order in which their pivots are found, empty where there are none
+    """
+
+    name: str
+    meaning: str
+    theta: bool
+    inputs: tuple[VectorView, ...]
+    output: VectorView
+    prototypes: Mapping[str, Prototype]
+    single_file: str
+    lanes_file: str
+    single_body: Body
+    lanes_body: Body
+    pivot_order: tuple[int, ...]
+    cost: Cost
+    lowering: str
+
+    @property
+    def lanes(self) -> str:
+        """The static function that computes one state per lane."""
+        return f"{self.name}_lanes"
+
+    @property
+    def lanes_signature(self) -> str:
+        names = [f"const real *{vector.name}" for vector in self.inputs]
+        names += ["const real *theta_b"] if self.theta else []
+        names += [f"real *{self.output.name}"]
+        names += ["real *pivot"] if self.pivot_order else []
+        return ", ".join(names)
+
+    @property
+    def lanes_arguments(self) -> str:
+        names = [f"{vector.name}_block + lane" for vector in self.inputs]
+        names += ["theta_b"] if self.theta else []
+        names += [f"{self.output.name}_block + lane"]
+        names += ["pivot_block + lane"] if self.pivot_order else []
+        return ", ".join(names)
+
+    @property
+    def cost_text(self) -> str:
+        """Operations of one state, as the header states them."""
+        return f"{self.name}: {self.cost}, {self.lowering}"
+
+    @property
+    def blocks(self) -> tuple[VectorView, ...]:
+        """Buffers of a batch call: every vector lane by lane."""
+        pivots = (VectorView("pivot", self.inputs[0].size),) if self.pivot_order else ()
+        return (*self.inputs, self.output, *pivots)
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionView:
+    """A function with its kernels, baked first: one C file."""
+
+    name: str
+    meaning: str
+    kernels: tuple[KernelView, ...]
+
+    @property
+    def has_pivots(self) -> bool:
+        return any(kernel.pivot_order for kernel in self.kernels)
+
+
+def function_views(
+    kernels: Mapping[str, Kernel], n: int, l: int, robot: str, options: EmitOptions
+) -> tuple[FunctionView, ...]:
+    """The functions that `kernels` hold, in the order of FUNCTIONS, whatever the mapping's order."""
+    known = {name for f in FUNCTIONS for name in (f.name, f"{f.name}_theta")}
+    unknown = [name for name, kernel in kernels.items() if name not in known or name != kernel.name]
+    if unknown:
+        raise InternalError(f"kernel {unknown[0]!r} is filed under a name that is not its own")
+    views = []
+    for function in FUNCTIONS:
+        own = [kernels[name] for name in (function.name, f"{function.name}_theta") if name in kernels]
+        if own:
+            shown = tuple(kernel_view(kernel, n, l, robot, options) for kernel in own)
+            views.append(FunctionView(function.name, function.meaning, shown))
+    return tuple(views)
+
+
+def kernel_view(kernel: Kernel, n: int, l: int, robot: str, options: EmitOptions) -> KernelView:
+    function = kernel.function
+    shared = kernel.single == kernel.batch
+    single_body = _body(kernel, kernel.single, n, l, options)
+    return KernelView(
+        name=kernel.name,
+        meaning=function.meaning,
+        theta=kernel.theta,
+        inputs=tuple(VectorView(name, n) for name in function.inputs),
+        output=VectorView(function.output, function.size(n, l)),
+        prototypes=_prototypes(function, kernel.theta, robot, options.c_real),
+        single_file=f"{kernel.name}.inc",
+        lanes_file=f"{kernel.name}.inc" if shared else f"{kernel.name}_lanes.inc",
+        single_body=single_body,
+        lanes_body=single_body if shared else _body(kernel, kernel.batch, n, l, options),
+        pivot_order=tuple(slot.index for slot, _ in kernel.single.outputs if slot.vector == "pivot"),
+        cost=cost(kernel.single),
+        lowering=kernel.lowering,
+    )
+
+
+def _body(kernel: Kernel, program: Program, n: int, l: int, options: EmitOptions) -> Body:
+    """Large outputs are stored as they are found: keeping them all until the end would spill them first."""
+    function = kernel.function
+    inputs = (*function.inputs, *(("theta_b",) if kernel.theta else ()))
+    sizes = {function.output: function.size(n, l)}
+    suffix = "" if options.real == "float64" else "f"
+    return make_body(program, inputs, sizes, suffix, stores_early=function.columns != "1")
+
+
+def _prototypes(function: Function, theta: bool, robot: str, real: str) -> dict[str, Prototype]:
+    variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
+    names = ("single", "batch", "batch_soa")
+    made = [prototype(function, variant, robot, real) for variant in variants]
+    return dict(zip(names, made, strict=False))

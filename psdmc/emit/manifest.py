@@ -1,0 +1,86 @@
+"""manifest.json: what the package is and what its files were when psdmc wrote them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from psdmc.emit.describe import option_items
+from psdmc.emit.info import JointInfo, PackageInfo
+from psdmc.emit.kernel_view import FunctionView
+from psdmc.emit.options import EmitOptions
+
+SCHEMA = 1
+GENERATOR = "psdmc"
+
+
+def manifest(
+    robot: str,
+    info: PackageInfo,
+    options: EmitOptions,
+    functions: tuple[FunctionView, ...],
+    files: Mapping[str, str],
+) -> str:
+    """JSON text; `files` are all others of the package, which it lists with their SHA-256."""
+    content: dict[str, Any] = {
+        "schema": SCHEMA,
+        "generator": GENERATOR,
+        "psdmc_version": info.psdmc_version,
+        "model_hash": info.model_hash,
+        "robot": robot,
+        "name": info.name,
+        "base": info.base,
+        "tip": info.tip,
+        "gravity_m_s2": list(info.gravity),
+        "options": option_items(info, options),
+        "real": options.c_real,
+        "lanes": options.lanes,
+        "joints": [_joint(joint) for joint in info.joints],
+        "base_parameters": [
+            {"equation": p.equation, "unit": p.unit, "value": p.value} for p in info.parameters
+        ],
+        "functions": [_function(function) for function in functions],
+        "files": {path: digest(text) for path, text in files.items()},
+    }
+    return json.dumps(content, indent=2, ensure_ascii=True, allow_nan=False) + "\n"
+
+
+def digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8")).hexdigest()
+
+
+def _joint(joint: JointInfo) -> dict[str, Any]:
+    limits = {
+        "lower": joint.lower,
+        "upper": joint.upper,
+        "speed": joint.speed,
+        "acceleration": joint.acceleration,
+        "effort": joint.effort,
+    }
+    known = {key: value for key, value in limits.items() if math.isfinite(value)}
+    return {
+        "name": joint.name,
+        "kind": joint.kind,
+        "unit": joint.unit,
+        "effort_unit": joint.effort_unit,
+        "limits": known,
+    }
+
+
+def _function(function: FunctionView) -> dict[str, Any]:
+    return {
+        "name": function.name,
+        "meaning": function.meaning,
+        "kernels": [
+            {
+                "name": kernel.name,
+                "lowering": kernel.lowering,
+                "cost": str(kernel.cost),
+                "prototypes": [prototype.text for prototype in kernel.prototypes.values()],
+            }
+            for kernel in function.kernels
+        ],
+    }

@@ -1,0 +1,30 @@
+"""What a user may choose about the emitted C."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Real = Literal["float64", "float32"]
+Trig = Literal["inline", "libm"]
+
+
+@dataclass(frozen=True, slots=True)
+class EmitOptions:
+    """Choices of emission.
+
+    real  precision of the whole package
+    trig  'inline': psdmc's own branch-free vector sincos; 'libm': the C library's sin and cos
+    """
+
+    real: Real = "float64"
+    trig: Trig = "libm"
+
+    @property
+    def c_real(self) -> str:
+        return "double" if self.real == "float64" else "float"
+
+    @property
+    def lanes(self) -> int:
+        """States per block of the lane-by-lane layout: one 64-byte vector, on every machine."""
+        return 8 if self.real == "float64" else 16

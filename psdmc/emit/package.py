@@ -1,0 +1,154 @@
+"""The emitted package: every file's text, from metadata and kernels. Nothing is written here."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from psdmc.emit.describe import description
+from psdmc.emit.info import PackageInfo
+from psdmc.emit.kernel_view import FunctionView, function_views
+from psdmc.emit.manifest import manifest
+from psdmc.emit.names import identifier
+from psdmc.emit.options import EmitOptions
+from psdmc.emit.references import References, ReferenceView, reference_view
+from psdmc.emit.render import render
+from psdmc.emit.tables import Table, tables
+from psdmc.errors import InputError
+from psdmc.program.kernel import Kernel
+
+
+@dataclass(frozen=True, slots=True)
+class PackageView:
+    """One package as the templates see it.
+
+    robot  identifier that every symbol starts with
+    """
+
+    robot: str
+    info: PackageInfo
+    options: EmitOptions
+    functions: tuple[FunctionView, ...]
+    references: ReferenceView | None
+
+    @property
+    def n(self) -> int:
+        return self.info.n
+
+    @property
+    def l(self) -> int:
+        return self.info.l
+
+    @property
+    def real(self) -> str:
+        return self.options.c_real
+
+    @property
+    def lanes(self) -> int:
+        return self.options.lanes
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of constants and libm functions."""
+        return "" if self.real == "double" else "f"
+
+    @property
+    def description(self) -> tuple[str, ...]:
+        return description(self.info, self.options)
+
+    @property
+    def tables(self) -> tuple[Table, ...]:
+        return tables(self.info, self.robot, self.real)
+
+    @property
+    def table_declarations(self) -> tuple[str, ...]:
+        return tuple(f"extern {table.declaration}" for table in self.tables)
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """C files of the library, relative to the package."""
+        return ("src/tables.c", *(f"src/{function.name}.c" for function in self.functions))
+
+    @property
+    def version(self) -> str:
+        """psdmc's version as the three numbers that CMake and pkg-config compare."""
+        found = re.match(r"(\d+)\.(\d+)(?:\.(\d+))?", self.info.psdmc_version)
+        return ".".join(part or "0" for part in found.groups()) if found else "0.0.0"
+
+    @property
+    def kernel_names(self) -> tuple[str, ...]:
+        return tuple(kernel.name for function in self.functions for kernel in function.kernels)
+
+    @property
+    def cdef(self) -> str:
+        """What cffi needs to know: tables and functions, without macros."""
+        macros = {f"{self.robot}_DOF": str(self.n), f"{self.robot}_BASE_PARAMETERS": str(self.l)}
+        lines = list(self.table_declarations)
+        for name, value in macros.items():
+            lines = [line.replace(f"[{name}]", f"[{value}]") for line in lines]
+        for function in self.functions:
+            for kernel in function.kernels:
+                lines += [prototype.text for prototype in kernel.prototypes.values()]
+        return "".join(f"{line};\n" for line in lines)
+
+
+def package_view(
+    info: PackageInfo,
+    kernels: Mapping[str, Kernel],
+    options: EmitOptions,
+    references: References | None = None,
+) -> PackageView:
+    """Everything decided; InputError where there is nothing to emit."""
+    if not kernels:
+        raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
+    if info.l == 0:
+        raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
+    robot = identifier(info.name)
+    functions = function_views(kernels, info.n, info.l, robot, options)
+    shown = reference_view(references, info.n, options.c_real) if references is not None else None
+    return PackageView(robot, info, options, functions, shown)
+
+
+def package_files(package: PackageView) -> dict[str, str]:
+    """Path -> text for every file, manifest.json (which hashes the others) last."""
+    files = library_files(package)
+    files |= {path: render(template, package=package) for path, template in _build_files(package)}
+    if package.references is not None:
+        files["test/self_test.c"] = render("self_test.c.jinja", package=package)
+        files["test/reference.h"] = render("reference.h.jinja", package=package)
+    files["manifest.json"] = manifest(package.robot, package.info, package.options, package.functions, files)
+    return files
+
+
+def library_files(package: PackageView) -> dict[str, str]:
+    """The C library alone: header and sources."""
+    trig = {"libm": "sincos_libm.h.jinja", "inline": "sincos_inline.h.jinja"}[package.options.trig]
+    named = {
+        f"include/{package.robot}/{package.robot}.h": "header.h.jinja",
+        "src/tables.c": "tables.c.jinja",
+        "src/internal.h": "internal.h.jinja",
+        "src/sincos.h": trig,
+        "src/one_state.h": "one_state.h.jinja",
+        "src/lane_states.h": "lane_states.h.jinja",
+        "src/rows.h": "rows.h.jinja",
+        "src/pivots.h": "pivots.h.jinja",
+    }
+    files = {path: render(template, package=package) for path, template in named.items()}
+    for function in package.functions:
+        files[f"src/{function.name}.c"] = render("function.c.jinja", package=package, function=function)
+        for kernel in function.kernels:
+            bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
+            for file, body in bodies.items():
+                files[f"src/{file}"] = render("body.inc.jinja", body=body)
+    return files
+
+
+def _build_files(package: PackageView) -> tuple[tuple[str, str], ...]:
+    return (
+        ("CMakeLists.txt", "CMakeLists.txt.jinja"),
+        (f"cmake/{package.robot}Config.cmake.in", "Config.cmake.in.jinja"),
+        (f"{package.robot}.pc.in", "pc.in.jinja"),
+        ("Makefile", "Makefile.jinja"),
+        ("README.md", "README.md.jinja"),
+    )

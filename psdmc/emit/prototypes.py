@@ -1,0 +1,55 @@
+"""C signatures of the generated functions: the one source of header, definitions and cffi's cdef."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from psdmc.program.functions import Function
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One form of a function: for one state, for many, with parameters at run time."""
+
+    suffix: str
+    is_batch: bool
+    theta: bool
+
+
+SINGLE = Variant("", False, False)
+BATCH = Variant("_batch", True, False)
+BATCH_SOA = Variant("_batch_soa", True, False)
+THETA = Variant("_theta", False, True)
+THETA_BATCH = Variant("_theta_batch", True, True)
+
+BAKED = (SINGLE, BATCH, BATCH_SOA)
+AT_RUN_TIME = (THETA, THETA_BATCH)
+
+
+@dataclass(frozen=True, slots=True)
+class Prototype:
+    """A C function's type: `returns symbol(arguments)`."""
+
+    returns: str
+    symbol: str
+    arguments: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        return f"{self.returns} {self.symbol}({', '.join(self.arguments)})"
+
+
+def prototype(function: Function, variant: Variant, robot: str, real: str) -> Prototype:
+    """The signature of `robot`_`function``variant` in C."""
+    inputs = (*function.inputs, *(("theta_b",) if variant.theta else ()))
+    arguments = (*(f"const {real} *{name}" for name in inputs), f"{real} *{function.output}")
+    if variant.is_batch:
+        arguments = ("size_t count", *arguments)
+    return Prototype(_returns(function, variant), f"{robot}_{function.name}{variant.suffix}", arguments)
+
+
+def _returns(function: Function, variant: Variant) -> str:
+    """Forward dynamics can fail: which joint (one state), or which row (many)."""
+    if not function.pivots:
+        return "void"
+    return "size_t" if variant.is_batch else "int"

@@ -1,0 +1,40 @@
+"""One generated function's arithmetic, as lowering hands it to emission."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from psdmc.program.functions import Function
+from psdmc.program.program import Program
+
+
+@dataclass(frozen=True, slots=True)
+class Kernel:
+    """A function and the PROGRAMs that compute it.
+
+    function  which vectors it reads and writes
+    theta     whether it also reads theta_b, the base parameters, at run time
+    single    arithmetic in an order for one state
+    batch     arithmetic in an order for one state per SIMD lane; may be the same object
+    lowering  how it was made: 'expanded' or 'factored'
+    """
+
+    function: Function
+    theta: bool
+    single: Program
+    batch: Program
+    lowering: str
+
+    def __post_init__(self) -> None:
+        inputs = {*self.function.inputs, *(("theta_b",) if self.theta else ())}
+        outputs = {self.function.output, *(("pivot",) if self.function.pivots else ())}
+        for program in (self.single, self.batch):
+            foreign = [str(slot) for slot in program.inputs() if slot.vector not in inputs]
+            foreign += [str(slot) for slot, _ in program.outputs if slot.vector not in outputs]
+            if foreign:
+                raise ValueError(f"{self.name}: PROGRAM names {foreign[0]}, which is no vector of its function")
+
+    @property
+    def name(self) -> str:
+        """Function name, with '_theta' where parameters are given at run time."""
+        return self.function.name + ("_theta" if self.theta else "")
