@@ -1,0 +1,134 @@
+"""A compiled robot called from Python: functions that broadcast over leading axes, like ufuncs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cffi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from psdmc.emit.package import PackageView
+from psdmc.errors import InputError
+from psdmc.program.functions import BY_NAME, Function
+
+Array = NDArray[Any]
+
+
+class CompiledRobot:
+    """The functions of a compiled package on NumPy arrays (..., n).
+
+    Leading axes broadcast; results are float64 or float32 as the package was compiled. Calls release the GIL and
+    may run in several threads. `theta_b` (l,), where a function takes it, replaces the parameters compiled in.
+    """
+
+    def __init__(self, package: PackageView, library: Path) -> None:
+        self._ffi = cffi.FFI()
+        self._ffi.cdef(package.cdef)
+        self._library = self._ffi.dlopen(str(library))
+        self._robot = package.robot
+        self._n, self._l = package.n, package.l
+        self._dtype = np.dtype(package.options.real)
+        self._pointer = f"{package.real} *"
+        self._kernels = package.kernel_names
+        self.joint_names = tuple(joint.name for joint in package.info.joints)
+        self.library = library
+
+    def inverse_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None
+    ) -> Array:
+        """Torques (..., n): M(q) qdd + h(q, qd)."""
+        return self._call("inverse_dynamics", (q, qd, qdd), theta_b)
+
+    def forward_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, theta_b: ArrayLike | None = None
+    ) -> Array:
+        """Accelerations (..., n); NaN in the states whose mass matrix is not positive definite."""
+        return self._call("forward_dynamics", (q, qd, tau), theta_b)
+
+    def mass_matrix(self, q: ArrayLike, theta_b: ArrayLike | None = None) -> Array:
+        """M(q), (..., n, n)."""
+        return self._call("mass_matrix", (q,), theta_b)
+
+    def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None) -> Array:
+        """h(q, qd) = C(q, qd) qd + g(q), (..., n)."""
+        return self._call("nonlinear_effects", (q, qd), theta_b)
+
+    def coriolis_matrix(self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None) -> Array:
+        """C(q, qd), (..., n, n), with dM/dt - 2 C skew-symmetric."""
+        return self._call("coriolis_matrix", (q, qd), theta_b)
+
+    def gravity(self, q: ArrayLike, theta_b: ArrayLike | None = None) -> Array:
+        """g(q), (..., n)."""
+        return self._call("gravity", (q,), theta_b)
+
+    def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Y, (..., n, l), with tau = Y theta_b."""
+        return self._call("regressor", (q, qd, qdd))
+
+    def regressor_slotine_li(self, q: ArrayLike, qd: ArrayLike, qd_r: ArrayLike, qdd_r: ArrayLike) -> Array:
+        """Y, (..., n, l), with M(q) qdd_r + C(q, qd) qd_r + g(q) = Y theta_b."""
+        return self._call("regressor_slotine_li", (q, qd, qd_r, qdd_r))
+
+    def jacobian(self, q: ArrayLike) -> Array:
+        """J, (..., 6, n): linear, then angular velocity of the tip per unit joint rate, in the base frame."""
+        return self._call("jacobian", (q,))
+
+    def _call(self, name: str, inputs: Sequence[ArrayLike], theta_b: ArrayLike | None = None) -> Array:
+        function = BY_NAME[name]
+        kernel = name if theta_b is None else f"{name}_theta"
+        if kernel not in self._kernels:
+            raise InputError(
+                f"{self._robot}: {kernel} was not compiled", f"compiled are {', '.join(self._kernels)}"
+            )
+        shape, rows = self._rows(function, inputs)
+        if theta_b is not None:
+            rows.append(self._parameters(name, theta_b))
+        out = np.empty((*shape, *self._tail(function)), self._dtype)
+        call = getattr(self._library, f"{self._robot}_{kernel}_batch")
+        call(out.size // function.size(self._n, self._l), *map(self._address, (*rows, out)))
+        return out
+
+    def _rows(self, function: Function, inputs: Sequence[ArrayLike]) -> tuple[tuple[int, ...], list[Array]]:
+        """Inputs as contiguous rows of one common leading shape."""
+        arrays = [
+            self._states(function.name, vector, values)
+            for vector, values in zip(function.inputs, inputs, strict=True)
+        ]
+        try:
+            shape = np.broadcast_shapes(*(array.shape for array in arrays))
+        except ValueError:
+            shapes = ", ".join(
+                f"{vector} {array.shape}" for vector, array in zip(function.inputs, arrays, strict=True)
+            )
+            raise InputError(f"{function.name}: shapes do not broadcast: {shapes}") from None
+        rows = [
+            array if array.shape == shape else np.ascontiguousarray(np.broadcast_to(array, shape))
+            for array in arrays
+        ]
+        return shape[:-1], rows
+
+    def _states(self, name: str, vector: str, values: ArrayLike) -> Array:
+        array = np.ascontiguousarray(values, self._dtype)
+        if np.ndim(values) == 0 or array.shape[-1] != self._n:
+            raise InputError(
+                f"{name}: {vector} has shape {np.shape(values)}, expected (..., {self._n})",
+                f"the robot has {self._n} joints: {', '.join(self.joint_names)}",
+            )
+        return array
+
+    def _parameters(self, name: str, theta_b: ArrayLike) -> Array:
+        array = np.ascontiguousarray(theta_b, self._dtype)
+        if array.shape != (self._l,):
+            raise InputError(f"{name}: theta_b has shape {array.shape}, expected ({self._l},)")
+        return array
+
+    def _tail(self, function: Function) -> tuple[int, ...]:
+        """Trailing axes of a result."""
+        lengths = {"n": self._n, "l": self._l, "6": 6}
+        return tuple(lengths[axis] for axis in (function.rows, function.columns) if axis != "1")
+
+    def _address(self, array: Array) -> Any:
+        return self._ffi.from_buffer(self._pointer, array)

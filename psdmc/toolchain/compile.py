@@ -1,0 +1,47 @@
+"""Emitted sources -> a shared library, compiled once per content."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from psdmc.emit.package import PackageView, library_files
+from psdmc.toolchain.cache import cache_key, cached
+from psdmc.toolchain.compiler_command import FLAGS, Compiler, find_compiler, run
+
+LIBRARY = "library.so"
+
+
+def compile_library(package: PackageView) -> Path:
+    """The shared library of a package, from the cache or compiled now.
+
+    ToolchainError where there is no compiler, it fails, or the cache cannot be written.
+    """
+    files = library_files(package)
+    compiler = find_compiler()
+    parts = (*compiler.command, compiler.version, compiler.target, *FLAGS, package.info.psdmc_version)
+    folder = cached(cache_key(files, parts), lambda own: _build(package, files, compiler, own))
+    return folder / LIBRARY
+
+
+def _build(package: PackageView, files: dict[str, str], compiler: Compiler, folder: Path) -> None:
+    """Compile every source on its own, several at a time, and link."""
+    for path, text in files.items():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8", newline="\n")
+    commands = [_compile_command(compiler, source) for source in package.sources]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(lambda words: run(words, package.robot, str(folder)), commands))
+    objects = [_object(source) for source in package.sources]
+    link = [*compiler.command, "-shared", "-o", LIBRARY, *objects, "-lm"]
+    run(link, package.robot, str(folder))
+
+
+def _compile_command(compiler: Compiler, source: str) -> list[str]:
+    return [*compiler.command, "-std=c99", *FLAGS, "-Iinclude", "-c", source, "-o", _object(source)]
+
+
+def _object(source: str) -> str:
+    return source.removesuffix(".c") + ".o"

@@ -1,0 +1,82 @@
+"""The C compiler: which one, what it can do, and how it is run."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from psdmc.errors import ToolchainError
+
+CANDIDATES = ("cc", "gcc", "clang")
+FLAGS = ("-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fPIC")
+SECONDS = 600
+"""Longest that one run of the compiler may take."""
+
+
+@dataclass(frozen=True, slots=True)
+class Compiler:
+    """A C compiler.
+
+    command  the words that start it
+    version  what it says of itself, for cache keys
+    target   macros that it predefines under FLAGS: they name the CPU features that -march=native found
+    """
+
+    command: tuple[str, ...]
+    version: str
+    target: str
+
+
+def find_compiler() -> Compiler:
+    """The compiler that CC names, else the first of CANDIDATES; ToolchainError where there is none."""
+    return _described(_command(os.environ.get("CC", "")))
+
+
+def _command(wanted: str) -> tuple[str, ...]:
+    if wanted:
+        words = tuple(shlex.split(wanted))
+        if words and shutil.which(words[0]):
+            return words
+        raise ToolchainError(f"C compiler {wanted!r} (from CC) was not found", "set CC to a compiler, or unset it")
+    for name in CANDIDATES:
+        if shutil.which(name):
+            return (name,)
+    raise ToolchainError(
+        f"no C compiler found (looked for {', '.join(CANDIDATES)})",
+        "install one (Debian: apt install gcc) or set CC",
+    )
+
+
+@cache
+def _described(command: tuple[str, ...]) -> Compiler:
+    version = run([*command, "--version"], "C compiler")
+    macros = run([*command, *FLAGS, "-dM", "-E", "-x", "c", os.devnull], "C compiler")
+    return Compiler(command, version, "\n".join(sorted(macros.splitlines())))
+
+
+def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
+    """A program's standard output; ToolchainError with the first line of its complaint where it fails."""
+    try:
+        done = subprocess.run(
+            words, cwd=cwd, capture_output=True, text=True, errors="replace", timeout=SECONDS, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise ToolchainError(f"{what}: {words[0]} could not be run: {error}") from error
+    if done.returncode != 0:
+        raise ToolchainError(
+            f"{what}: {words[0]} failed with status {done.returncode}: {_complaint(done.stderr, done.stdout)}",
+            f"run it to see everything: {shlex.join(words)}",
+        )
+    return done.stdout
+
+
+def _complaint(*texts: str) -> str:
+    """The first line that says 'error', else the last line there is."""
+    lines = [line.strip() for text in texts for line in text.splitlines() if line.strip()]
+    errors = [line for line in lines if "error" in line.lower()]
+    return (errors or lines[-1:] or ["no message"])[0]
