@@ -1,0 +1,157 @@
+/* Greatest error, in units in the last place, of several builds of one sincos over many angles.
+
+   Compile with REAL, DIGITS (53 or 24) and VARIANTS, a list of X(name): each name is a function
+   void name(size_t count, const REAL *x, REAL *s, REAL *c), count a multiple of 16. Reference: long double
+   (x87, 64 digits, glibc's full argument reduction). Prints "range variant sin_ulp cos_ulp worst_angle" lines. */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { BLOCK = 16384 };
+
+typedef void sincos_block(size_t count, const REAL *x, REAL *s, REAL *c);
+
+#define X(name) sincos_block name;
+VARIANTS
+#undef X
+
+static const struct { const char *name; sincos_block *run; } variants[] = {
+#define X(name) {#name, name},
+    VARIANTS
+#undef X
+};
+enum { COUNT = sizeof variants / sizeof variants[0] };
+
+static uint64_t state = 0x9e3779b97f4a7c15u;
+
+/* Uniform in [0, 1): xorshift64*. */
+static double uniform(void)
+{
+    state ^= state >> 12;
+    state ^= state << 25;
+    state ^= state >> 27;
+    return (double)((state * 0x2545f4914f6cdd1du) >> 11) * 0x1p-53;
+}
+
+static double both_signs(double magnitude)
+{
+    return uniform() < 0.5 ? -magnitude : magnitude;
+}
+
+static REAL neighbour(long double value, int steps)
+{
+    REAL x = (REAL)value;
+    for (int i = 0; i < abs(steps); ++i)
+        x = (REAL)(DIGITS == 53 ? nextafter((double)x, steps < 0 ? -1e9 : 1e9)
+                                : nextafterf((float)x, steps < 0 ? -1e9f : 1e9f));
+    return x;
+}
+
+/* Distance to the exact value in units of the last place of the exact value. */
+static double ulps(REAL got, long double exact)
+{
+    int exponent;
+    if (exact == 0)
+        return got == 0 ? 0.0 : INFINITY;
+    frexpl(exact, &exponent);
+    const int lowest = DIGITS == 53 ? -1074 : -149;
+    const int place = exponent - DIGITS < lowest ? lowest : exponent - DIGITS;
+    const double error = (double)fabsl(ldexpl((long double)got - exact, -place));
+    return error == error ? error : INFINITY;
+}
+
+static REAL x[BLOCK], s[BLOCK], c[BLOCK];
+static long double exact_s[BLOCK], exact_c[BLOCK];
+static double worst_s[COUNT], worst_c[COUNT], worst_at[COUNT];
+
+static void compare_block(void)
+{
+    for (int i = 0; i < BLOCK; ++i) {
+        exact_s[i] = sinl((long double)x[i]);
+        exact_c[i] = cosl((long double)x[i]);
+    }
+    for (int v = 0; v < (int)COUNT; ++v) {
+        variants[v].run(BLOCK, x, s, c);
+        for (int i = 0; i < BLOCK; ++i) {
+            const double of_s = ulps(s[i], exact_s[i]), of_c = ulps(c[i], exact_c[i]);
+            if (of_s > worst_s[v] || of_c > worst_c[v])
+                worst_at[v] = (double)x[i];
+            worst_s[v] = fmax(worst_s[v], of_s);
+            worst_c[v] = fmax(worst_c[v], of_c);
+        }
+    }
+}
+
+static void report(const char *range)
+{
+    for (int v = 0; v < (int)COUNT; ++v) {
+        printf("%s %s %.4f %.4f %a\n", range, variants[v].name, worst_s[v], worst_c[v], worst_at[v]);
+        worst_s[v] = worst_c[v] = worst_at[v] = 0;
+    }
+}
+
+static void uniform_range(const char *name, double limit, long blocks)
+{
+    for (long b = 0; b < blocks; ++b) {
+        for (int i = 0; i < BLOCK; ++i)
+            x[i] = (REAL)both_signs(uniform() * limit);
+        compare_block();
+    }
+    report(name);
+}
+
+static void logarithmic_range(const char *name, double least, double limit, long blocks)
+{
+    for (long b = 0; b < blocks; ++b) {
+        for (int i = 0; i < BLOCK; ++i)
+            x[i] = (REAL)both_signs(0.999999 * exp(log(least) + uniform() * (log(limit) - log(least))));
+        compare_block();
+    }
+    report(name);
+}
+
+/* Every multiple of pi/4 within the limit: the nearest number and `around` on both sides. */
+static void near_multiples(const char *name, double limit, int around)
+{
+    const long double quarter_pi = 0.785398163397448309615660845819875721L;
+    int filled = 0;
+    for (long k = 0; k * quarter_pi < limit; ++k)
+        for (int steps = -around; steps <= around; ++steps) {
+            const REAL angle = neighbour(k * quarter_pi, steps);
+            if (angle > (REAL)limit)
+                continue;
+            x[filled++] = (k + steps) % 2 ? -angle : angle;
+            if (filled == BLOCK) {
+                compare_block();
+                filled = 0;
+            }
+        }
+    for (; filled < BLOCK; ++filled)
+        x[filled] = 0;
+    compare_block();
+    report(name);
+}
+
+/* accuracy LIMIT BLOCKS < hard angles, one per line */
+int main(int count, char **words)
+{
+    const double limit = count > 1 ? atof(words[1]) : 0;
+    const long blocks = count > 2 ? atol(words[2]) : 0;
+    if (limit <= 0 || blocks <= 0)
+        return 2;
+    uniform_range("uniform_pi", 3.2, blocks);
+    uniform_range("uniform_1e3", 1e3, blocks);
+    uniform_range("uniform_limit", limit, blocks);
+    logarithmic_range("logarithmic", DIGITS == 53 ? 1e-320 : 1e-42, limit, blocks / 2 + 1);
+    logarithmic_range("logarithmic_1", 1e-6, limit, blocks / 2 + 1);
+    near_multiples("near_multiples", limit, 4);
+    int filled = 0;
+    for (double angle; filled < BLOCK && scanf("%la", &angle) == 1; ++filled)
+        x[filled] = (REAL)angle;
+    for (; filled < BLOCK; ++filled)
+        x[filled] = 0;
+    compare_block();
+    report("hard");
+    return 0;
+}
