@@ -1,4 +1,4 @@
-"""The expanded lowering: functions straight from E, P and theta_b as nested Horner forms (PSDM-2021, section 4.1)."""
+"""The expanded lowering: nested Horner forms straight from E, P and theta_b (PSDM-2021, section 4.1)."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ Outputs = list[tuple[Slot, Symbol | Number]]
 def lower_expanded(model: DynamicsModel, function_name: str, theta: bool) -> Program:
     """The PROGRAM of one function in SUPPORTED; with `theta`, theta_b is an input instead of constants.
 
-    Operations and their order are a choice among a few row orders, by cost, the same on every machine. InputError
-    where the model has no E and P, or its base parameters are needed and unknown.
+    Operations and their order are a choice among a few row orders, by cost, the same on every machine.
+    InputError where the model has no E and P, or its base parameters are needed and unknown.
     """
     if function_name not in SUPPORTED or (theta and not BY_NAME[function_name].theta):
         raise ValueError(f"the expanded lowering does not make {function_name}{'_theta' * theta}")

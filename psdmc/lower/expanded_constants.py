@@ -1,4 +1,4 @@
-"""Equal constants made the same float: coefficients that differ by less than their uncertainty are one constant."""
+"""Equal constants made the same float: coefficients closer than their uncertainty are one constant."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ SMALLEST_UNCERTAINTY = 1e-15
 
 
 class Constants:
-    """A growing table of magnitudes. `merged` returns each value's entry, so that equal ones are equal bit for bit.
+    """A growing table of magnitudes. `merged` returns each value's entry: equal ones become equal bit for bit.
 
-    The most certain values are entered first and stand for the less certain ones near them: no value moves by more
-    than its own uncertainty and its entry's, and no doubtful value joins two certain ones.
+    The most certain values are entered first and stand for the less certain ones near them: no value moves by
+    more than its own uncertainty and its entry's, and no doubtful value joins two certain ones.
     """
 
     def __init__(self) -> None:
@@ -25,7 +25,7 @@ class Constants:
         self._uncertainty: Array = np.full(len(EXACT), SMALLEST_UNCERTAINTY)
 
     def merged(self, values: Array, uncertainty: Array) -> Array:
-        """Entries of the table, of the values' signs; `uncertainty` is relative. Shapes (k,), (k,) -> (k,)."""
+        """Entries of the table with the values' signs, (k,), for (k,) values and relative uncertainties."""
         out = np.abs(values)
         uncertainty = np.maximum(uncertainty, SMALLEST_UNCERTAINTY)
         decade = np.floor(np.log10(uncertainty)).astype(int)

@@ -1,10 +1,10 @@
-"""Polynomials as a diagram of nested Horner forms, equal parts shared, also where equal up to a constant factor.
+"""Polynomials as a diagram of nested Horner forms, parts that are equal up to a constant factor shared.
 
-PSDM-2021, section 4.1: take the rows in some order, group the terms that agree in all remaining rows, and write what a
-group's members differ in as a small polynomial in the row just taken, whose coefficients are sums over the groups
-further in. Built here from the innermost row outward, so that each group is known by the nodes it is made of: scaled
-until its leading coefficient is one, it is looked up among the nodes of its row, and only its factor travels on.
-(Decision diagrams with multiplicative edge values are the same thing.)
+PSDM-2021, section 4.1: take the rows in some order, group the terms that agree in all remaining rows, and
+write what a group's members differ in as a small polynomial in the row just taken, whose coefficients are
+sums over the groups further in. Built here from the innermost row outward, so that each group is known by the
+nodes it is made of: scaled until its leading coefficient is one, it is looked up among the nodes of its row,
+and only its factor travels on. (Decision diagrams with multiplicative edge values are the same thing.)
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ NOTHING, ONE = 0, 1
 """Node numbers: no child, and the constant one. Others count from 2, innermost row first."""
 
 LEADING_SHARE = 0.323
-"""A group is scaled by the highest power whose coefficient is at least this part of its largest: rounding is magnified by
-no more than its inverse, and ratios of one half still count as equal. (0.0123 loses two digits and gains nothing.)"""
+"""A group is scaled by the highest power whose coefficient is at least this part of its largest: rounding is
+magnified by no more than its inverse, and ratios of one half still count as equal. (0.0123 loses two digits
+and gains nothing.)"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +101,7 @@ def _sorted(terms: Terms, rows: Sequence[int]) -> tuple[Integers, Integers]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Groups:
-    """Groups of one row before they are looked up: child node, coefficient and its uncertainty per power, (g, 3)."""
+    """Groups of one row before they are looked up: child, coefficient, uncertainty by power, each (g, 3)."""
 
     child: Integers
     coefficient: Array
@@ -127,7 +128,7 @@ class _Groups:
     def as_level(self, row: int, first: int, constants: Constants) -> tuple[Level | None, Integers]:
         """New nodes, if any, and each group's node; groups that do not contain the row are nodes already."""
         node = self.child[:, 0].copy()
-        contains = self.child[:, 1:].any(axis=1)
+        contains: NDArray[np.bool_] = np.asarray(self.child[:, 1:].any(axis=1))
         if not contains.any():
             return None, node
         child = self.child[contains]

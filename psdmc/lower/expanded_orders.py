@@ -1,4 +1,4 @@
-"""In which order the expanded lowering takes the rows: candidates, compared by the operations that they lead to."""
+"""In which order the expanded lowering takes the rows: candidates, compared by operations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TRIGONOMETRY = ((0, 2, 1), (0, 1, 2))
 
 
 def cheapest(terms: Terms, n: int) -> Diagram:
-    """The diagram with fewest multiplications and additions over all candidate orders; the first of equals."""
+    """The diagram with fewest multiplications and additions over all candidates; the first of equals."""
     return min((nested_horner(terms, order) for order in candidates(terms, n)), key=_total)
 
 
@@ -25,9 +25,9 @@ def _total(diagram: Diagram) -> int:
 def candidates(terms: Terms, n: int) -> Iterator[Order]:
     """Orders of rows, outermost first.
 
-    Parameters (rows from 5 n on) stay innermost. Rates go outermost, where the torques of two joints meet in the
-    same polynomials of position, or joint by joint; joints go base first, so that what stands inside is about the
-    outer links only and recurs often, or tip first.
+    Parameters (rows from 5 n on) stay innermost. Rates go outermost, where the torques of two joints meet in
+    the same polynomials of position, or joint by joint; joints go base first, so that what stands inside is
+    about the outer links only and recurs often, or tip first.
     """
     parameters = tuple(range(5 * n, len(terms.exponents)))
     up, down = tuple(range(n)), tuple(reversed(range(n)))

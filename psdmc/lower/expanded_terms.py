@@ -1,4 +1,4 @@
-"""What the expanded lowering starts from: a function's outputs as sums of monomials, read off E, P and theta_b."""
+"""What the expanded lowering starts from: outputs as sums of monomials, read off E, P and theta_b."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 COEFFICIENT_NOISE = 1e-13
-"""Uncertainty of a coefficient, relative to the largest one of its joint (and parameter): rounding of the derivation,
-a tenth of the accuracy that every lowering must keep."""
+"""Uncertainty of a coefficient, relative to the largest one of its joint (and parameter): rounding of the
+derivation, a tenth of the accuracy that every lowering must keep."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terms:
-    """Polynomials as lists of monomials: value[output] = sum of coefficient * product over rows of row ** exponent.
+    """Polynomials as monomials: value[output] = sum of coefficient * product over rows of row ** exponent.
 
     t terms over r rows: the 5 n of E, then one per base parameter where these stay symbols.
 
@@ -136,12 +136,12 @@ def mass_matrix_terms(torque: Terms, n: int) -> Terms:
 
 def nonlinear_terms(torque: Terms, n: int) -> Terms:
     """h[i]: what is left of tau[i] at rest accelerations."""
-    return torque.where(~torque.exponents[4 * n : 5 * n].any(axis=0))
+    return torque.where(np.asarray(~torque.exponents[4 * n : 5 * n].any(axis=0)))
 
 
 def gravity_terms(torque: Terms, n: int) -> Terms:
     """g[i]: what is left of tau[i] at rest."""
-    return torque.where(~torque.exponents[3 * n : 5 * n].any(axis=0))
+    return torque.where(np.asarray(~torque.exponents[3 * n : 5 * n].any(axis=0)))
 
 
 def with_gravity(terms: Terms, chain: Chain) -> Terms:

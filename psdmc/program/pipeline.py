@@ -24,7 +24,7 @@ ROUND: tuple[Pass, ...] = (
     merge_duplicates,
     absorb_negations,
 )
-"""Repeated while it saves operations: a bracket taken out of one sum may equal another, or be a factor itself."""
+"""Repeated while it saves operations: a bracket taken out of one sum may equal another, or be a factor."""
 
 LAST: tuple[Pass, ...] = (merge_duplicates, drop_unused, schedule)
 

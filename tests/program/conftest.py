@@ -17,7 +17,7 @@ _SIZES = {"tau": 3}
 
 
 def random_program(seed: int, length: int = 60) -> Program:
-    """Loads, a few constants, then operations that prefer recent values; three outputs, often of shared parts."""
+    """Loads, a few constants, then operations that prefer recent values; three outputs of shared parts."""
     choose = random.Random(seed)
     body = [Instr(Op.LOAD, slot=Slot(vector, i)) for vector in ("q", "qd") for i in range(3)]
     body += [Instr(Op.CONST, value=value) for value in (0.0, 1.0, -1.0, 2.5, -0.3)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psdmc.program.program import Program
+from psdmc.program.program import Instr, Program
 
 
 def drop_unused(program: Program) -> Program:
@@ -20,7 +20,7 @@ def drop_unused(program: Program) -> Program:
             for a in program.body[i].args:
                 needed[a] = True
     new_index: dict[int, int] = {}
-    body = []
+    body: list[Instr] = []
     for i, instr in enumerate(program.body):
         if needed[i]:
             new_index[i] = len(body)

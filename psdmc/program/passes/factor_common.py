@@ -31,12 +31,13 @@ class _Sum:
 def factor_common(program: Program) -> Program:
     """Write a*b + a*c as a*(b + c), over chains of sums and of products of which nothing else uses a part.
 
-    The factor that most terms of a sum share goes first, then again among the others and within the bracket. A sum
-    in which no two terms share a factor stays as it is.
+    The factor that most terms of a sum share goes first, then again among the others and within the bracket.
+    A sum in which no two terms share a factor stays as it is.
 
     Needs:  every argument precedes its use.
     Keeps:  outputs up to rounding (it reorders floating point); output names and order.
-    Gives:  fewer multiplications, as many additions, at most a negation more a sum; every instruction is needed.
+    Gives:  fewer multiplications, as many additions, at most a negation more a sum; every instruction is
+            needed.
     """
     uses = program.uses()
     inside = _parts_of_larger_sums(program, uses)

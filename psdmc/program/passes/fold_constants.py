@@ -23,7 +23,8 @@ def fold_constants(program: Program) -> Program:
 
     Needs:  every argument precedes its use; finite inputs (0 * x is taken for 0).
     Keeps:  output values, bit for bit but for the sign of a zero; output names and order.
-    Gives:  no operation has only constants as arguments, but a division by zero; what is no longer needed stays.
+    Gives:  no operation has only constants as arguments, but a division by zero; what is no longer needed
+            stays.
     """
     body: list[Instr] = []
     new_index: list[int] = []

@@ -8,9 +8,9 @@ from psdmc.program.program import Program
 def schedule(program: Program) -> Program:
     """Compute each value shortly before its first use.
 
-    Outputs are taken one after the other, in their order; of an operation's arguments the one is computed first that
-    needs more values alive itself (Sethi and Ullman 1970, exact for trees). The order given is kept where this one
-    would hold more values alive over the whole PROGRAM.
+    Outputs are taken one after the other, in their order; of an operation's arguments the one is computed
+    first that needs more values alive itself (Sethi and Ullman 1970, exact for trees). The order given is
+    kept where this one would hold more values alive over the whole PROGRAM.
 
     Needs:  every argument precedes its use; every instruction is needed.
     Keeps:  output values, bit for bit; output names and order; the set of instructions.
