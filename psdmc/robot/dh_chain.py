@@ -51,7 +51,9 @@ def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tupl
     before = Placement.identity()
     for number, row in enumerate(robot.joints, start=1):
         twist = _exact(_about_x(row.alpha), f"alpha of joint '{row.name}'", snap, snaps)
-        offset = Placement(_exact(_about_z(row.theta), f"theta of joint '{row.name}'", snap, snaps), np.zeros(3))
+        offset = Placement(
+            _exact(_about_z(row.theta), f"theta of joint '{row.name}'", snap, snaps), np.zeros(3)
+        )
         if robot.convention == "standard":
             placement = before @ offset
             link = Placement(twist, np.array([row.a, 0.0, row.d]))

@@ -169,12 +169,16 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Chain:
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:
     """Each joint's drive inertia where it is a parameter (NaN: unknown), None where it is not."""
-    own = [float(x[DRIVE]) if drive else None for x, drive in zip(draft.parameters, draft.drives, strict=True)]
+    own = [
+        float(x[DRIVE]) if drive else None for x, drive in zip(draft.parameters, draft.drives, strict=True)
+    ]
     if isinstance(options.drive_inertia, bool):
         return [value if value is not None or not options.drive_inertia else 0.0 for value in own]
     if len(options.drive_inertia) != len(own):
         found, names = len(options.drive_inertia), ", ".join(joint.name for joint in draft.joints)
-        raise InputError(f"{source}: {found} drive inertias for {len(own)} joints", f"one for each of: {names}")
+        raise InputError(
+            f"{source}: {found} drive inertias for {len(own)} joints", f"one for each of: {names}"
+        )
     return list(options.drive_inertia)
 
 
@@ -201,7 +205,9 @@ def _gravity(gravity: Sequence[float] | None) -> tuple[float, float, float] | No
         return None
     values = [float(g) for g in gravity]
     if len(values) != 3 or not np.isfinite(values).all():
-        raise InputError(f"gravity {list(gravity)} is not three finite numbers", "for example --gravity 0 0 -9.81")
+        raise InputError(
+            f"gravity {list(gravity)} is not three finite numbers", "for example --gravity 0 0 -9.81"
+        )
     return (values[0], values[1], values[2])
 
 

@@ -31,18 +31,23 @@ def find_route(robot: UrdfRobot, base: str | None, tip: str | None, source: str)
     """
     for role, link in (("base", base), ("tip", tip)):
         if link is not None and link not in robot.inertials:
-            raise InputError(f"{source}: {role} link '{link}' does not exist", f"links: {listed(robot.inertials)}")
+            raise InputError(
+                f"{source}: {role} link '{link}' does not exist", f"links: {listed(robot.inertials)}"
+            )
     start = robot.root if base is None else base
     end, notes = (tip, ()) if tip is not None else default_tip(robot, start, source)
     path = joints_between(robot, start, end)
     if path is None:
         raise InputError(
-            f"{source}: tip link '{end}' is not below base link '{start}'", f"below it: {listed(_below(robot, start))}"
+            f"{source}: tip link '{end}' is not below base link '{start}'",
+            f"below it: {listed(_below(robot, start))}",
         )
     to_base = joints_between(robot, robot.root, start) or ()
     route = Route(start, end, to_base, path, notes)
     if not route.movable:
-        raise InputError(f"{source}: no movable joint between '{start}' and '{end}'", "choose other --base or --tip")
+        raise InputError(
+            f"{source}: no movable joint between '{start}' and '{end}'", "choose other --base or --tip"
+        )
     _refuse_unsupported(route, source)
     return Route(start, end, to_base, path, (*notes, *_locked_note(robot, route)))
 
@@ -68,9 +73,13 @@ def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[st
     """
     depth = _movable_depths(robot, base)
     most = max(depth.values())
-    ends = [j.child for j in robot.joints if j.is_movable and depth.get(j.child) == most and j.parent in depth]
+    ends = [
+        j.child for j in robot.joints if j.is_movable and depth.get(j.child) == most and j.parent in depth
+    ]
     if most == 0:
-        raise InputError(f"{source}: no movable joint below link '{base}'", f"joint types: {', '.join(MOVABLE)}")
+        raise InputError(
+            f"{source}: no movable joint below link '{base}'", f"joint types: {', '.join(MOVABLE)}"
+        )
     if len(ends) == 1:
         return _fixed_end(robot, ends[0]), ()
     parting = _parting_link(robot, base, ends)

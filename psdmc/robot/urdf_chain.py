@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
-import pinocchio
 
-from psdmc.errors import InputError
 from psdmc.robot.chain import Array, Joint, Placement
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, without_noise
+from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 from psdmc.robot.snap import ROUNDING, snap_axis, snap_placement, snap_rotation, snap_translation
 from psdmc.robot.tree import Route, find_route
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
-from psdmc.robot.xml_text import parse_xml
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""
@@ -44,20 +41,19 @@ def urdf_draft(
         gravity=base_rotation.T @ root_gravity + 0.0,
         tip=tip_frame,
         snaps=(*base_snaps, *snaps),
-        notes=(*route.notes, *(f"link '{link}' has no inertia: none assumed" for link in bare), *_faults(robot)),
+        notes=(
+            *route.notes,
+            *(f"link '{link}' has no inertia: none assumed" for link in bare),
+            *_faults(robot),
+        ),
     )
 
 
 def merged_parameters(text: str, source: str, movable: list[str]) -> list[Array]:
     """Ten standard parameters per movable joint, of all bodies that move with it, about its child link's frame."""
-    pruned = tostring(_serial_tree(text, source, movable), encoding="unicode")
-    try:
-        model = pinocchio.buildModelFromXML(pruned)
-    except ValueError as error:
-        raise InputError(f"{source}: Pinocchio cannot read it: {error}", "check it with check_urdf") from None
-    return [
-        without_noise(model.inertias[model.getJointId(name)].toDynamicParameters()) for name in movable
-    ]
+    model = pinocchio_model(text, source, movable)
+    bodies = [model.inertias[model.getJointId(JOINT_PREFIX + name)] for name in movable]
+    return [without_noise(body.toDynamicParameters()) for body in bodies]
 
 
 def link_rotation(axis: Array) -> Array:
@@ -139,34 +135,6 @@ def _merged(place: Placement, where: str, snap: float, snaps: list[Snap], reach:
 def _record(snaps: list[Snap], where: str, angle: float) -> None:
     if angle > ROUNDING:
         snaps.append(Snap(where, angle))
-
-
-def _serial_tree(text: str, source: str, movable: list[str]) -> Element:
-    """The robot with every other joint fixed and pictures left out, for Pinocchio to merge bodies along."""
-    root = parse_xml(text, source, "robot")
-    for element in list(root):
-        if element.tag not in ("link", "joint"):
-            root.remove(element)
-    for link in root.findall("link"):
-        for picture in [*link.findall("visual"), *link.findall("collision")]:
-            link.remove(picture)
-    for joint in root.findall("joint"):
-        for mimic in joint.findall("mimic"):
-            joint.remove(mimic)
-        if joint.get("name") not in movable:
-            joint.set("type", "fixed")
-        elif joint.get("type") == "continuous":
-            joint.set("type", "revolute")
-            _require_limit(joint)
-    return root
-
-
-def _require_limit(joint: Element) -> None:
-    """Pinocchio asks for a <limit> on revolute joints; continuous ones need not have any."""
-    limit = joint.find("limit")
-    limit = SubElement(joint, "limit") if limit is None else limit
-    for name in ("effort", "velocity"):
-        limit.set(name, limit.get(name, "0"))
 
 
 def _faults(robot: UrdfRobot) -> list[str]:

@@ -21,11 +21,15 @@ def parse_xml(text: str, source: str, root_tag: str) -> Element:
             f"{source}: XML entities are not allowed ({kind})", "remove the <!DOCTYPE> with its entities"
         ) from None
     except (ParseError, ValueError) as error:
-        raise InputError(f"{source}: not well-formed XML: {error}", "give a URDF or a DH .toml file") from None
+        raise InputError(
+            f"{source}: not well-formed XML: {error}", "give a URDF or a DH .toml file"
+        ) from None
     if root.tag != root_tag:
         raise InputError(f"{source}: the root element is <{root.tag}>, expected <{root_tag}>", "give a URDF")
     if any("xacro" in str(element.tag) for element in root.iter()):
-        raise InputError(f"{source}: this is a xacro file, not a URDF", "expand it first: xacro FILE > robot.urdf")
+        raise InputError(
+            f"{source}: this is a xacro file, not a URDF", "expand it first: xacro FILE > robot.urdf"
+        )
     return root
 
 

@@ -44,9 +44,7 @@ def link_span(names: Collection[str]) -> Array:
     """(11, k) columns that span the parameters of one link when `names` are zero; reduced column echelon form."""
     zero = canonical(names)
     generators = [] if "m" in zero else [_unit("m"), *_moments(zero), *_second_moments(zero)]
-    generators += [
-        _unit(f"I{name}") for name in INERTIA_NAMES if not {"m", f"I{name}@com"} & set(zero)
-    ]
+    generators += [_unit(f"I{name}") for name in INERTIA_NAMES if not {"m", f"I{name}@com"} & set(zero)]
     if "Im" not in zero:
         generators.append(_unit("Im"))
     struck = [PARAMETER_NAMES.index(name) for name in PARAMETER_NAMES if name in zero]
@@ -100,7 +98,8 @@ def parse_statements(
     if problems:
         links, names = ", ".join(link_names), ", ".join(ZERO_NAMES)
         raise InputError(
-            f"{source}: assume-zero " + "; ".join(problems), f"write LINK:NAME, links: {links}; names: {names}"
+            f"{source}: assume-zero " + "; ".join(problems),
+            f"write LINK:NAME, links: {links}; names: {names}",
         )
     return tuple(tuple(names) for names in found)
 
