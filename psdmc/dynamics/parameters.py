@@ -38,7 +38,7 @@ def inertia_matrix(x: Array) -> Array:
 
 
 def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
-    """(10,) standard parameters of a body; moment and inertia about the origin of the frame they are about."""
+    """(10,) standard parameters of a body; moment and inertia about the same frame."""
     return np.array([mass, *moment, *(inertia[entry] for entry in _INERTIA_ENTRIES)])
 
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from psdmc.model import evaluate
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, frozen_array
 
 Array = NDArray[np.float64]
@@ -76,3 +77,36 @@ class DynamicsModel:
     def p(self) -> int | None:
         """Number of functions; None where they were not expanded."""
         return None if self.E is None else int(self.E.shape[1])
+
+    @property
+    def representative(self) -> Array:
+        """(11n, l) standard parameters from base parameters: B @ representative = 1, and what it gives lies in the
+        chain's parameter_span: each base parameter sits on the span column whose lead is its pivot, others are zero."""
+        leads = np.argmax(self.chain.parameter_span != 0.0, axis=0)
+        column_of = {int(row): column for column, row in enumerate(leads)}
+        pivots = np.argmax(self.B != 0.0, axis=1)
+        return frozen_array(
+            self.chain.parameter_span[:, [column_of[int(pivot)] for pivot in pivots]],
+            (PARAMETERS_PER_LINK * self.n, self.l),
+            "representative",
+        )
+
+    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """tau (..., n), N m or N, straight from E, P and theta_b: slow and obvious, the reference."""
+        return evaluate.inverse_dynamics(self, q, qd, qdd)
+
+    def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Y (..., n, l) with tau = Y theta_b."""
+        return evaluate.regressor(self, q, qd, qdd)
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """M(q), (..., n, n)."""
+        return evaluate.mass_matrix(self, q)
+
+    def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """h(q, qd) = C(q, qd) qd + g(q), (..., n)."""
+        return evaluate.nonlinear_effects(self, q, qd)
+
+    def gravity(self, q: ArrayLike) -> Array:
+        """g(q), (..., n)."""
+        return evaluate.gravity(self, q)

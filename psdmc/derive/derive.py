@@ -1,0 +1,104 @@
+"""From a robot to its MODEL: the derivation from top to bottom."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.derive.certify import certificate
+from psdmc.derive.expand import COEFFICIENT_TOLERANCE, VALUE_NOISE, Progress, expand
+from psdmc.derive.reduce import PIVOT_TOLERANCE, Reduction
+from psdmc.derive.rounding import merged
+from psdmc.derive.sampled import sampled_reduction
+from psdmc.derive.units import Scaled, parameter_units, scaled
+from psdmc.errors import DerivationError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
+
+Array = NDArray[np.float64]
+
+EQUATION_NOISE = 3e-14
+"""Relative uncertainty of a coefficient of B: rounding, magnified by the back substitution."""
+
+
+def derive_model(
+    chain: Chain,
+    *,
+    expand: bool = True,
+    progress: Progress | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    memory: int | None = None,
+) -> DynamicsModel:
+    """The chain's dynamics as E, P and theta_b, certified.
+
+    expand      False leaves E and P out: base parameters alone, for chains of any length
+    progress    called with the name of each step as it begins
+    provenance  plain JSON values to keep with the model; the tolerances used are added
+    memory      bytes that the expansion may take; default: what the machine has free
+    Raises DerivationError where the expansion does not fit, or no parameter has any effect.
+    """
+    tell = progress or _silent
+    robot = scaled(chain)
+    expansion = _expanded(robot, tell, memory) if expand else None
+    if expansion is None:
+        tell("base parameters")
+    reduction = expansion.reduction if expansion else sampled_reduction(robot)
+    if not len(reduction.pivots):
+        raise DerivationError(
+            f"'{chain.name}': no inertial parameter has any effect on any joint",
+            "give masses and inertias, or assume fewer of them zero",
+        )
+    B = base_map(robot, reduction)
+    model = DynamicsModel(
+        E=expansion.E if expansion else None,
+        P=expansion.P if expansion else None,
+        theta_b=base_parameters(B, chain),
+        B=B,
+        chain=chain,
+        certificate=np.zeros(len(chain)),
+        provenance=dict(provenance or {}) | {"tolerances": tolerances()},
+    )
+    tell("certificate")
+    return replace(model, certificate=certificate(model))
+
+
+_expanded = expand
+
+
+def _silent(step: str) -> None:
+    """Nobody listens."""
+
+
+def tolerances() -> dict[str, float]:
+    """The numbers that decided."""
+    return {
+        "coefficient": COEFFICIENT_TOLERANCE,
+        "value_noise": VALUE_NOISE,
+        "pivot": PIVOT_TOLERANCE,
+        "equation_noise": EQUATION_NOISE,
+    }
+
+
+def base_map(robot: Scaled, reduction: Reduction) -> Array:
+    """B (l, 11 n) in SI: base parameters from standard parameters, which the span's leading rows are."""
+    units = parameter_units(robot.kinds, robot.unit)[robot.leads]
+    echelon = reduction.echelon * units[reduction.pivots][:, None] / units
+    B = np.zeros((len(reduction.pivots), PARAMETERS_PER_LINK * len(robot.kinds)))
+    B[:, robot.leads] = merged(echelon.reshape(-1), EQUATION_NOISE * np.abs(echelon.reshape(-1))).reshape(
+        echelon.shape
+    )
+    return B
+
+
+def base_parameters(B: Array, chain: Chain) -> Array | None:
+    """theta_b = B x; None where a parameter that counts is unknown."""
+    x = chain.parameters.reshape(-1)
+    unknown = np.isnan(x)
+    if B[:, unknown].any():
+        return None
+    theta: Array = B @ np.where(unknown, 0.0, x)
+    return theta

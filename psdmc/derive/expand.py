@@ -1,0 +1,117 @@
+"""From a chain to E, P and the base parameters' equations, in coefficient space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from psdmc.derive.functions import Functions
+from psdmc.derive.gravity import gravity_terms
+from psdmc.derive.inertia import mass_matrix_terms
+from psdmc.derive.memory import (
+    available_memory,
+    grid_bytes,
+    largest_function_count,
+    refuse_beyond,
+    velocity_bytes,
+)
+from psdmc.derive.reduce import Reduction, reduced, row_space
+from psdmc.derive.rounding import merged
+from psdmc.derive.terms import Terms, joined, selected, times_matrix
+from psdmc.derive.units import Scaled, function_units, parameter_units, torque_units
+from psdmc.derive.velocity import acceleration_terms, velocity_terms
+from psdmc.dynamics.scalar import Vector
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+COEFFICIENT_TOLERANCE = 1e-12
+"""Coefficients below this are zero, lengths in the robot's unit (units.py). Rounding leaves less than 1e-14 (measured
+on seven joints with oblique axes), and the smallest true coefficients seen are above 1e-9."""
+
+VALUE_NOISE = 1e-14
+"""Uncertainty of a coefficient of size one, from rounding; relative for larger ones. Measured: 3e-15."""
+
+
+class Expansion(NamedTuple):
+    """E (5n, p), P (n of (p, l)) in SI, and the base parameters among the span's columns."""
+
+    E: NDArray[np.uint8]
+    P: tuple[sparse.csr_array, ...]
+    reduction: Reduction
+
+
+def expand(scaled: Scaled, progress: Progress, memory: int | None = None) -> Expansion:
+    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: what is free)."""
+    kinds = scaled.kinds
+    functions = Functions(kinds)
+    available = available_memory() if memory is None else memory
+    refuse_beyond(grid_bytes(kinds), available, largest_function_count(kinds), len(kinds))
+    progress("mass matrix")
+    mass = _mass_matrix(scaled, functions)
+    progress("gravity")
+    gravity = _gravity(scaled, functions)
+    progress("base parameters")
+    reduction = reduced(row_space([*mass.values(), gravity], scaled.span.shape[1]))
+    mass = {pair: pivots_only(terms, reduction) for pair, terms in mass.items()}
+    gravity = pivots_only(gravity, reduction)
+    progress("velocity terms")
+    count, needed = velocity_bytes(mass, functions)
+    refuse_beyond(needed, available, min(count, largest_function_count(kinds)), len(kinds))
+    velocity = velocity_terms(mass, functions, COEFFICIENT_TOLERANCE)
+    progress("reduction matrices")
+    terms = joined([gravity, acceleration_terms(mass, functions), velocity])
+    units = parameter_units(kinds, scaled.unit)[scaled.leads[reduction.pivots]]
+    return Expansion(*assembled(terms, functions, units, scaled.unit), reduction)
+
+
+def _mass_matrix(scaled: Scaled, functions: Functions) -> dict[tuple[int, int], Terms]:
+    """In the span's columns; row 0 throughout."""
+    found = mass_matrix_terms(scaled.frames, scaled.link_frames, functions, COEFFICIENT_TOLERANCE)
+    return {
+        pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), scaled.span, COEFFICIENT_TOLERANCE)
+        for pair, terms in found.items()
+    }
+
+
+def _gravity(scaled: Scaled, functions: Functions) -> Terms:
+    up: Vector = scaled.up
+    terms = gravity_terms(scaled.frames, scaled.link_frames, up, functions, COEFFICIENT_TOLERANCE)
+    return times_matrix(terms, scaled.span, COEFFICIENT_TOLERANCE)
+
+
+def pivots_only(terms: Terms, reduction: Reduction) -> Terms:
+    """Terms of the base parameters alone, columns renumbered."""
+    columns = reduction.echelon.shape[1]
+    number = np.full(columns, -1, dtype=np.int64)
+    number[reduction.pivots] = np.arange(len(reduction.pivots))
+    new = number[terms.column]
+    return selected(terms._replace(column=new), new >= 0)
+
+
+def assembled(
+    terms: Terms, functions: Functions, units: Sequence[float] | Array, unit: float
+) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
+    """E and P in SI from torque terms (function: key, column: base parameter) in the robot's unit of length.
+
+    units   (l,) one unit of each base parameter in SI
+    """
+    keys, place = np.unique(terms.function, return_inverse=True)
+    exponents = functions.exponents(keys)
+    kinds = functions.kinds
+    shape = (len(keys), len(units))
+    to_si = torque_units(kinds, unit)[terms.row]
+    to_si /= function_units(exponents, kinds, unit)[place] * np.asarray(units)[terms.column]
+    noise = VALUE_NOISE * np.maximum(1.0, np.abs(terms.value)) * to_si
+    values = merged(terms.value * to_si, noise)
+    matrices = []
+    for joint in range(functions.n):
+        own = np.flatnonzero(terms.row == joint)
+        matrix = sparse.csr_array((values[own], (place[own], terms.column[own])), shape=shape)
+        matrix.sort_indices()
+        matrices.append(matrix)
+    return exponents, tuple(matrices)

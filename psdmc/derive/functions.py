@@ -1,0 +1,115 @@
+"""The functions y_j: how they are numbered, in which order they stand, and their exponents E.
+
+A product of joint functions is a code: one digit per joint to base 5, the first joint's digit the highest. A revolute
+joint's digits 0..4 stand for 1, s, c, s c, c^2, a prismatic joint's 0..2 for 1, q, q^2. A function is a code times a
+rate factor: |g|; qdd_j; qd_j^2; qd_j qd_k. Its key is the rate's number times 5^n plus the code; E's columns stand in
+the order of keys: gravity, acceleration, centrifugal, Coriolis; within each by joint (pair), then by code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.robot.chain import JointKind
+
+Integers = NDArray[np.int64]
+
+RADIX = 5
+_SINE_COSINE = np.array([(0, 0), (1, 0), (0, 1), (1, 1), (0, 2)], dtype=np.uint8)
+"""Exponents of sine and cosine by a revolute joint's digit."""
+
+
+class Sizes(NamedTuple):
+    """How many functions each kind of acceleration has."""
+
+    gravity: int
+    acceleration: int
+    centrifugal: int
+    coriolis: int
+
+
+@dataclass(frozen=True, slots=True)
+class Functions:
+    """The numbering for a chain of `kinds`."""
+
+    kinds: tuple[JointKind, ...]
+
+    @property
+    def n(self) -> int:
+        return len(self.kinds)
+
+    @property
+    def codes(self) -> int:
+        """Number of codes, 5^n."""
+        return RADIX**self.n
+
+    def weight(self, joint: int) -> int:
+        """What one step of a joint's digit adds to the code."""
+        return int(RADIX ** (self.n - 1 - joint))
+
+    def digit(self, codes: Integers, joint: int) -> Integers:
+        digits: Integers = (codes // self.weight(joint)) % RADIX
+        return digits
+
+    def tensor_codes(self, first: int, sizes: Sequence[int]) -> Integers:
+        """Codes of a coefficient tensor, flattened: joints first, first + 1, ... with that many digits each."""
+        codes = np.zeros(1, dtype=np.int64)
+        for joint, size in enumerate(sizes, start=first):
+            codes = (codes[:, None] + self.weight(joint) * np.arange(size)).reshape(-1)
+        return codes
+
+    def acceleration_rate(self, j: int) -> int:
+        return 1 + j
+
+    def velocity_rate(self, j: int, k: int) -> int:
+        """Number of qd_j qd_k, in either order."""
+        j, k = min(j, k), max(j, k)
+        if j == k:
+            return 1 + self.n + j
+        before = j * (2 * self.n - j - 1) // 2
+        return 1 + 2 * self.n + before + k - j - 1
+
+    def rate_exponents(self) -> NDArray[np.uint8]:
+        """(rates, 2n) exponents of qd and qdd for every rate number."""
+        n = self.n
+        table = np.zeros((1 + 2 * n + n * (n - 1) // 2, 2 * n), dtype=np.uint8)
+        for j in range(n):
+            table[self.acceleration_rate(j), n + j] = 1
+            for k in range(j, n):
+                table[self.velocity_rate(j, k), j] += 1
+                table[self.velocity_rate(j, k), k] += 1
+        return table
+
+    def exponents(self, keys: Integers) -> NDArray[np.uint8]:
+        """E: (5n, p) uint8 for p function keys; row blocks q, sin q, cos q, qd, qdd."""
+        n = self.n
+        table = np.zeros((5 * n, len(keys)), dtype=np.uint8)
+        rates, codes = np.divmod(keys, self.codes)
+        for j, kind in enumerate(self.kinds):
+            digits = self.digit(codes, j)
+            if kind == "prismatic":
+                table[j] = digits
+            else:
+                table[n + j], table[2 * n + j] = _SINE_COSINE[digits].T
+        table[3 * n :] = self.rate_exponents()[rates].T
+        return table
+
+
+def sizes_of(E: NDArray[np.uint8]) -> Sizes:
+    """Count functions by kind of acceleration."""
+    n = E.shape[0] // 5
+    speeds, accelerations = E[3 * n : 4 * n], E[4 * n :]
+    by_acceleration = accelerations.any(axis=0)
+    squared = (speeds == 2).any(axis=0)
+    moving = speeds.any(axis=0)
+    return Sizes(
+        int(np.count_nonzero(~moving & ~by_acceleration)),
+        int(np.count_nonzero(by_acceleration)),
+        int(np.count_nonzero(squared)),
+        int(np.count_nonzero(moving & ~squared)),
+    )

@@ -1,0 +1,91 @@
+"""What an expansion will need, known before it is made."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from psdmc.derive.functions import Functions
+from psdmc.derive.interpolate import LINEAR_SIZE, QUADRATIC_SIZE
+from psdmc.derive.terms import Terms
+from psdmc.derive.velocity import slope_count
+from psdmc.errors import DerivationError
+from psdmc.robot.chain import JointKind
+
+BYTES_PER_TERM = 110
+"""Peak of collecting, sorting and summing one velocity term (measured: 100)."""
+
+_GRID_COPIES = 5
+"""Grids of ten features held at once: twists, products, two steps of the interpolation, magnitudes."""
+
+
+def largest_function_count(kinds: Sequence[JointKind]) -> int:
+    """The p of a chain of these joints with axes in general position; no such chain has more.
+
+    M_0j has degree one in q_1 ... q_j and two in what follows; every rate product qd_j qd_k (k >= j) has at most that.
+    """
+    n = len(kinds)
+    linear = [LINEAR_SIZE[kind] for kind in kinds]
+    quadratic = [QUADRATIC_SIZE[kind] for kind in kinds]
+    total, gravity = 0, 1
+    for size in linear:
+        gravity *= size
+    for j in range(n):
+        product = 1
+        for size in linear[1 : j + 1] + quadratic[j + 1 :]:
+            product *= size
+        total += (1 + n - j) * product
+    return total + gravity - 1
+
+
+def grid_bytes(kinds: Sequence[JointKind]) -> int:
+    """Largest grid of mass-matrix features."""
+    size = 10 * 8 * _GRID_COPIES
+    for kind in kinds[1:]:
+        size *= QUADRATIC_SIZE[kind]
+    return size
+
+
+def velocity_bytes(mass_matrix: Mapping[tuple[int, int], Terms], functions: Functions) -> tuple[int, int]:
+    """(terms, bytes) of the velocity terms before equal ones are summed."""
+    count = 0
+    for (a, b), terms in mass_matrix.items():
+        slopes = sum(slope_count(terms, functions, d) for d in range(a + 1, functions.n))
+        count += slopes * (2 if a == b else 3)
+    return count, count * BYTES_PER_TERM
+
+
+def refuse_beyond(needed: int, available: int, functions: int, n: int) -> None:
+    """DerivationError naming p and the memory where more is needed than there is."""
+    if needed <= available:
+        return
+    raise DerivationError(
+        f"expanding this {n}-joint robot takes up to {functions:,} functions and about "
+        f"{needed / 2**30:.1f} GiB of memory, but {available / 2**30:.1f} GiB are available",
+        "derive with --no-expand: base parameters, regressor and generated code then come without E and P",
+    )
+
+
+def available_memory() -> int:
+    """Bytes that this process may still take: what the machine has free, or its control group's rest."""
+    return min(_machine_memory(), _group_memory())
+
+
+def _machine_memory() -> int:
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) * 1024
+    except (OSError, ValueError):
+        pass
+    return int(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+
+
+def _group_memory() -> int:
+    group = Path("/sys/fs/cgroup")
+    try:
+        limit = int((group / "memory.max").read_text(encoding="ascii"))
+        return limit - int((group / "memory.current").read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return 2**63 - 1

@@ -1,0 +1,45 @@
+"""Numbers that differ by rounding alone become one number, and the simplest one in reach.
+
+The same product of link lengths reaches P by many paths and arrives with different last bits; the expanded lowering
+shares sub-expressions only where coefficients are equal. This happens before certification, and nowhere else.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DIGITS = 12
+"""Decimal digits of a simple number: products of two lengths given to 0.1 mm have fewer."""
+
+
+def merged(values: Array, noise: Array) -> Array:
+    """The same numbers with those equal up to `noise` made equal in magnitude; none moves by more than its noise.
+
+    values, noise   (count,), noise the absolute uncertainty of each value
+    """
+    if not len(values):
+        return values
+    order = np.argsort(np.abs(values), kind="stable")
+    size, reach = np.abs(values)[order], noise[order]
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(size) > reach[1:]]))
+    counts = np.diff(np.append(starts, len(size)))
+    middle = np.add.reduceat(size, starts) / counts
+    least = np.minimum.reduceat(reach, starts)
+    shared = _simplest(middle, least)
+    candidate = np.repeat(shared, counts)
+    accepted = np.where(np.abs(candidate - size) <= reach, candidate, size)
+    result = np.empty_like(values)
+    result[order] = accepted
+    return np.copysign(result, values)
+
+
+def _simplest(sizes: Array, noise: Array) -> Array:
+    """Each number to DIGITS decimal digits where that moves it by no more than its noise."""
+    exponent = DIGITS - 1 - np.floor(np.log10(np.where(sizes > 0, sizes, 1.0)))
+    # An integer below 2^53 divided by a power of ten up to 10^22 is the double nearest to that decimal.
+    power = 10.0 ** np.clip(exponent, 0, 22)
+    decimal = np.round(sizes * power) / power
+    return np.where(np.abs(decimal - sizes) <= noise, decimal, sizes)

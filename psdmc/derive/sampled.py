@@ -1,0 +1,41 @@
+"""Base parameters without E and P: the echelon form of the regressor at sampled states, for chains of any length."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.derive.reduce import Reduction, reduced
+from psdmc.derive.units import Scaled
+from psdmc.dynamics.regressor import regressor
+from psdmc.robot.chain import PARAMETERS_PER_LINK
+
+Array = NDArray[np.float64]
+
+SEED = 20_210_156
+"""Of the sampled states: any seed gives the same pivots, this one gives the same bytes."""
+
+STATES_PER_JOINT = 24
+"""Sampled states for each joint; n rows each. Eleven would do for the rank, more condition it."""
+
+
+def sampled_reduction(scaled: Scaled) -> Reduction:
+    """The same base parameters as the expanded path finds, within the span's columns."""
+    n = len(scaled.kinds)
+    rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
+    return reduced(np.linalg.qr(rows @ scaled.span, mode="r"))
+
+
+def sampled_regressor(scaled: Scaled, count: int) -> Array:
+    """(count, n, 11 n) regressor at random states, in the robot's unit; gravity of strength one."""
+    n = len(scaled.kinds)
+    states = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, n, count))
+    wanted = frozenset(range(PARAMETERS_PER_LINK * n))
+    rows = regressor(
+        scaled.frames, scaled.link_frames, wanted, *(list(rows) for rows in states), base=scaled.up
+    )
+    values = np.zeros((count, n, PARAMETERS_PER_LINK * n))
+    for i, row in enumerate(rows):
+        for column, entry in row.items():
+            values[:, i, column] = entry
+    return values

@@ -1,0 +1,77 @@
+"""Sparse lists of terms: which function multiplies which parameter in which joint's torque, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Terms(NamedTuple):
+    """value * function * parameter, one entry each; all four of one length.
+
+    row       joint, or row of whatever is listed
+    function  code or key (functions.py)
+    column    parameter
+    value
+    """
+
+    row: Integers
+    function: Integers
+    column: Integers
+    value: Array
+
+
+def no_terms() -> Terms:
+    none = np.zeros(0, dtype=np.int64)
+    return Terms(none, none, none, np.zeros(0))
+
+
+def joined(parts: Sequence[Terms]) -> Terms:
+    """All terms one after the other."""
+    if not parts:
+        return no_terms()
+    return Terms(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def selected(terms: Terms, chosen: NDArray[np.bool_] | Integers) -> Terms:
+    return Terms(*(array[chosen] for array in terms))
+
+
+def summed(terms: Terms, tolerance: float) -> Terms:
+    """Sorted by row, function and column, each once; sums within the tolerance of zero left out."""
+    if not len(terms.value):
+        return terms
+    columns = int(terms.column.max()) + 1
+    functions = int(terms.function.max()) + 1
+    key = (terms.row * functions + terms.function) * columns + terms.column
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    starts = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
+    values = np.add.reduceat(terms.value[order], starts)
+    kept = np.abs(values) > tolerance
+    rest, column = np.divmod(key[starts[kept]], columns)
+    row, function = np.divmod(rest, functions)
+    return Terms(row, function, column, values[kept])
+
+
+def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
+    """The same functions on other parameters: columns replaced by their combinations in `matrix` (old, new)."""
+    right = sparse.csr_array(matrix)
+    counts = np.diff(right.indptr)[terms.column]
+    source = np.repeat(np.arange(len(counts)), counts)
+    within = np.arange(len(source)) - np.repeat(np.cumsum(counts) - counts, counts)
+    place = right.indptr[terms.column][source] + within
+    spread = Terms(
+        terms.row[source],
+        terms.function[source],
+        right.indices[place].astype(np.int64),
+        terms.value[source] * right.data[place],
+    )
+    return summed(spread, tolerance)

@@ -1,0 +1,107 @@
+"""A unit of length near the robot's size, so that one absolute tolerance means the same for every coefficient.
+
+The unit is a power of two: going to it and back changes no bit of any number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.dynamics.frames import Frame, frames_of
+from psdmc.dynamics.scalar import Vector
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, JointKind, Placement
+
+Array = NDArray[np.float64]
+
+_LENGTH_ORDER = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+"""Exponent of metre in the unit of each of a body's standard parameters."""
+
+
+def length_unit(chain: Chain) -> float:
+    """Metres: the power of two nearest to the longest step from joint to joint; one where all are zero."""
+    steps = [np.linalg.norm(joint.placement.translation) for joint in chain.joints[1:]]
+    steps += [np.linalg.norm(joint.link_frame.translation) for joint in chain.joints]
+    longest = float(max(steps))
+    return 2.0 ** round(math.log2(longest)) if longest > 0 else 1.0
+
+
+def in_unit(placement: Placement, unit: float) -> Placement:
+    return Placement(placement.rotation, placement.translation / unit)
+
+
+def frame_in_unit(frame: Frame, unit: float) -> Frame:
+    x, y, z = frame.translation
+    return replace(frame, translation=(x / unit, y / unit, z / unit))
+
+
+def parameter_units(kinds: Sequence[JointKind], unit: float) -> Array:
+    """(11 n,) what one unit of each standard parameter is in SI."""
+    drive = [2 if kind == "revolute" else 0 for kind in kinds]
+    orders = np.column_stack([np.tile(_LENGTH_ORDER, (len(kinds), 1)), drive])
+    units: Array = unit ** orders.reshape(len(kinds) * PARAMETERS_PER_LINK).astype(np.float64)
+    return units
+
+
+def torque_units(kinds: Sequence[JointKind], unit: float) -> Array:
+    """(n,) one unit of torque (force for sliding joints) in SI; the units of mass and time are SI's."""
+    return np.array([unit**2 if kind == "revolute" else unit for kind in kinds])
+
+
+def function_units(exponents: NDArray[np.uint8], kinds: Sequence[JointKind], unit: float) -> Array:
+    """(p,) one unit of each function of E in SI; functions without rates carry |g|."""
+    n = len(kinds)
+    slides = np.array([kind == "prismatic" for kind in kinds])
+    blocks = exponents.reshape(5, n, -1).astype(np.int64)
+    lengths = blocks[[0, 3, 4]][:, slides].sum(axis=(0, 1))
+    is_gravity = ~blocks[3:].any(axis=(0, 1))
+    units: Array = unit ** (lengths + is_gravity).astype(np.float64)
+    return units
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scaled:
+    """A chain as derivation sees it: lengths in `unit`, parameters within their span.
+
+    span    (11 n, k)  parameters from the span's coordinates, both in the robot's unit
+    leads   (k,)       the row of each span column's leading one
+    up      unit vector against gravity in the base frame; zero where there is no gravity
+    """
+
+    kinds: tuple[JointKind, ...]
+    frames: tuple[Frame, ...]
+    link_frames: tuple[Placement, ...]
+    unit: float
+    span: Array
+    leads: NDArray[np.int64]
+    up: Vector
+
+
+def scaled(chain: Chain) -> Scaled:
+    """The chain in a unit of length near its size."""
+    kinds = tuple(joint.kind for joint in chain.joints)
+    unit = length_unit(chain)
+    units = parameter_units(kinds, unit)
+    leads = leading_rows(chain.parameter_span)
+    span = chain.parameter_span / units[:, None] * units[leads]
+    strength = float(np.linalg.norm(chain.gravity))
+    x, y, z = (-float(g) / strength if strength else 0.0 for g in chain.gravity)
+    return Scaled(
+        kinds,
+        tuple(frame_in_unit(frame, unit) for frame in frames_of(chain)),
+        tuple(in_unit(joint.link_frame, unit) for joint in chain.joints),
+        unit,
+        span,
+        leads,
+        (x, y, z),
+    )
+
+
+def leading_rows(span: Array) -> NDArray[np.int64]:
+    """(k,) row of each column's leading one, in reduced column echelon form."""
+    leads: NDArray[np.int64] = np.argmax(span != 0, axis=0).astype(np.int64)
+    return leads
