@@ -67,16 +67,23 @@ class Search:
         self.chain, self.representative, self.theta_b, self.budget = chain, representative, theta_b, budget
         self._spaces: dict[tuple[Foot, ...], tuple[Reframed, CarrierSpace]] = {}
 
-    def best(self, name: str, target: Target) -> tuple[Arrangement, Program]:
-        """The cheapest arrangement found for one function, and its PROGRAM."""
+    def best(self, name: str, target: Target) -> Arrangement:
+        """The cheapest arrangement found for one function."""
         descent = _Descent(lambda a: trace_dynamics(name, a, self.theta_b), target, self.budget)
-        feet: tuple[Foot, ...] = ("previous",) * len(self.chain)
-        for candidate in _with_flips(feet):
-            descent.consider(self._starts(candidate))
+        for candidate in all_feet(self.chain):
+            descent.consider(self.starts(candidate))
         descent.consider(self._units(descent.arrangement))
         while descent.consider(self._exchanges(descent.arrangement)):
             pass
-        return descent.arrangement, descent.program
+        return descent.arrangement
+
+    def rearranged(self, name: str, found: Arrangement, target: Target) -> Program:
+        """The PROGRAM of a function in an arrangement found for another function or target: only the choices within
+        the recursion are made anew."""
+        programs = (
+            trace_dynamics(name, replace(found, choices=choices), self.theta_b) for choices in ALL_CHOICES
+        )
+        return min(programs, key=target.score)
 
     def space(self, feet: tuple[Foot, ...]) -> tuple[Reframed, CarrierSpace]:
         if feet not in self._spaces:
@@ -84,7 +91,7 @@ class Search:
             self._spaces[feet] = reframed, carrier_space(reframed, self.representative)
         return self._spaces[feet]
 
-    def _starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
+    def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
         reframed, space = self.space(feet)
         weights = [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
         carriers = space.lightest(weights)
@@ -133,8 +140,9 @@ class _Descent:
         return improved
 
 
-def _with_flips(feet: tuple[Foot, ...]) -> Iterator[tuple[Foot, ...]]:
-    """The feet given, then each joint's moved to the other common normal, one at a time, then all of them."""
+def all_feet(chain: Chain) -> Iterator[tuple[Foot, ...]]:
+    """Where frames may sit: all on the normal to the axis before, then one at a time on the next, then all of them."""
+    feet: tuple[Foot, ...] = ("previous",) * len(chain)
     yield feet
     other: Foot = "next"
     for i in range(len(feet) - 1):

@@ -7,13 +7,21 @@ from collections.abc import Sequence
 from psdmc.dynamics.scalar import Scalar
 
 
+class SingularMassMatrix(Exception):
+    """A pivot is zero for every q; `joint` counts from the base, 0 first."""
+
+    def __init__(self, joint: int) -> None:
+        super().__init__(f"pivot {joint} is zero for every q")
+        self.joint = joint
+
+
 def solve_symmetric(
     matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
     """x and the n pivots, all positive where M is positive definite.
 
     M = L^T D L with L unit lower triangular: elimination starts at the tip, whose entries the composite-rigid-body sweep
-    finishes first (Featherstone 2008, section 6.5).
+    finishes first (Featherstone 2008, section 6.5). Raises SingularMassMatrix where a pivot is a constant not above 0.
     """
     n = len(right)
     rows = [list(row) for row in matrix]
@@ -23,6 +31,8 @@ def solve_symmetric(
     scaled: list[Scalar] = [0.0] * n
     for k in reversed(range(n)):
         pivots[k] = rows[k][k]
+        if isinstance(pivots[k], float) and pivots[k] <= 0.0:
+            raise SingularMassMatrix(k)
         inverse = 1.0 / pivots[k]
         scaled[k] = load[k] * inverse
         for i in range(k):

@@ -1,0 +1,130 @@
+"""From a model to the kernels that emission prints: each function by its cheapest lowering."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+from psdmc.errors import InputError
+from psdmc.lower.expanded import SUPPORTED, lower_expanded
+from psdmc.lower.factored import Arrangement, trace_jacobian, trace_regressor
+from psdmc.lower.search import BATCH, SINGLE, Search, Target, all_feet
+from psdmc.lower.solve import SingularMassMatrix
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.functions import BY_NAME, FUNCTIONS, Function
+from psdmc.program.kernel import Kernel
+from psdmc.program.pipeline import optimize
+from psdmc.program.program import Program
+
+Lowering = Literal["auto", "expanded", "factored"]
+
+EXPANDED_LIMIT = 600
+"""`auto` tries the expanded lowering up to this many functions p; beyond, it has never been the cheaper."""
+
+ALL_FUNCTIONS = tuple(function.name for function in FUNCTIONS)
+
+REGRESSORS = ("regressor", "regressor_slotine_li")
+
+SHARED = {"nonlinear_effects": "inverse_dynamics", "gravity": "inverse_dynamics", "coriolis_matrix": "inverse_dynamics"}
+"""Functions that run another's recursion: its arrangement is taken over, only the choices in it are made anew."""
+
+
+def lower(
+    model: DynamicsModel,
+    lowering: Lowering = "auto",
+    functions: Sequence[str] | None = None,
+    progress: Callable[[str], None] = lambda message: None,
+) -> dict[str, Kernel]:
+    """Kernels by name, `_theta` variants included, in the order of FUNCTIONS.
+
+    functions  names of FUNCTIONS; None takes all that the model admits: without theta_b only those that need none, and
+               forward dynamics only where the mass matrix is regular for some q
+    Raises InputError for an unknown function or one that the model does not admit.
+    """
+    wanted = _wanted(model, functions)
+    lowered = _Lowered(model, lowering)
+    kernels: dict[str, Kernel] = {}
+    for name in wanted:
+        for theta in (False, True) if BY_NAME[name].theta else (False,):
+            if not theta and model.theta_b is None and BY_NAME[name].theta:
+                continue
+            progress(name + ("_theta" if theta else ""))
+            try:
+                kernel = lowered.kernel(BY_NAME[name], theta)
+            except SingularMassMatrix as singular:
+                if functions is not None:
+                    raise _refusal(model, singular) from singular
+                continue
+            kernels[kernel.name] = kernel
+    return kernels
+
+
+def _wanted(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
+    if functions is None:
+        return ALL_FUNCTIONS
+    unknown = [name for name in functions if name not in BY_NAME]
+    if unknown:
+        raise InputError(
+            f"function {unknown[0]!r} is not known", f"psdmc generates {', '.join(ALL_FUNCTIONS)}"
+        )
+    return tuple(name for name in ALL_FUNCTIONS if name in functions)
+
+
+def _refusal(model: DynamicsModel, singular: SingularMassMatrix) -> InputError:
+    joint = model.joint_names[singular.joint]
+    return InputError(
+        f"{model.chain.name}: forward_dynamics: joint {joint!r} moves no inertia, the mass matrix is singular for every q",
+        "give its link an inertia, add --drive-inertia, or leave forward_dynamics out of --functions",
+    )
+
+
+class _Lowered:
+    """One model's programs; searches are shared between the functions that run the same recursion."""
+
+    def __init__(self, model: DynamicsModel, lowering: Lowering) -> None:
+        self.model, self.lowering = model, lowering
+        self._searches: dict[bool, Search] = {}
+        self._arrangements: dict[tuple[str, bool], Arrangement] = {}
+
+    def kernel(self, function: Function, theta: bool) -> Kernel:
+        candidates: list[Kernel] = []
+        if self._may_expand(function):
+            program = optimize(lower_expanded(self.model, function.name, theta))
+            candidates.append(Kernel(function, theta, program, program, "expanded"))
+        if self.lowering != "expanded" or not candidates:
+            single = optimize(self._factored(function.name, theta, SINGLE))
+            batch = optimize(self._factored(function.name, theta, BATCH))
+            candidates.append(Kernel(function, theta, single, batch, "factored"))
+        return min(candidates, key=lambda kernel: SINGLE.score(kernel.single))
+
+    def _may_expand(self, function: Function) -> bool:
+        if self.lowering == "factored" or function.name not in SUPPORTED or self.model.p is None:
+            return False
+        return self.lowering == "expanded" or self.model.p <= EXPANDED_LIMIT
+
+    def _factored(self, name: str, theta: bool, target: Target) -> Program:
+        search = self._search(theta)
+        if name == "jacobian":
+            programs = [trace_jacobian(search.space(feet)[0]) for feet in all_feet(self.model.chain)]
+            return min(programs, key=target.score)
+        if name in REGRESSORS:
+            return min(
+                (
+                    trace_regressor(name, search.space(feet)[0], self.model.representative)
+                    for feet in all_feet(self.model.chain)
+                ),
+                key=target.score,
+            )
+        arrangement = self._arrangement(SHARED.get(name, name), theta)
+        return search.rearranged(name, arrangement, target)
+
+    def _arrangement(self, name: str, theta: bool) -> Arrangement:
+        if (name, theta) not in self._arrangements:
+            self._arrangements[name, theta] = self._search(theta).best(name, SINGLE)
+        return self._arrangements[name, theta]
+
+    def _search(self, theta: bool) -> Search:
+        if theta not in self._searches:
+            baked = None if theta else self.model.theta_b
+            self._searches[theta] = Search(self.model.chain, self.model.representative, baked)
+        return self._searches[theta]

@@ -1,0 +1,158 @@
+"""The factored lowering against Pinocchio, on chains of every kind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_chains import Oracle, random_chain, relative_error, states
+
+from psdmc.lower.carriers import carrier_space
+from psdmc.lower.factored import trace_dynamics, trace_jacobian, trace_regressor
+from psdmc.lower.reframe import reframe
+from psdmc.lower.search import ALL_CHOICES, BATCH, SINGLE, Search, all_feet
+from psdmc.lower.solve import SingularMassMatrix, solve_symmetric
+from psdmc.program.cost import cost
+from psdmc.program.interpret import interpret
+from psdmc.robot.chain import Chain
+
+
+def known(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+    """A model whose base parameters are simply all standard parameters: representative and theta_b."""
+    return chain.parameter_span, chain.parameter_span.T @ chain.parameters.ravel()
+
+
+def run(program, n: int, rows: int, vector: str, **inputs: np.ndarray) -> np.ndarray:
+    return interpret(program, inputs, {vector: rows, "pivot": n})[vector]
+
+
+@given(seed=st.integers(0, 10**6), kinds=st.text("RP", min_size=1, max_size=5), tidy=st.booleans())
+@settings(max_examples=25, deadline=None)
+def test_inverse_dynamics_of_any_chain_in_any_arrangement(seed, kinds, tidy):
+    chain = random_chain(seed, kinds, tidy=tidy, gravity=(1.0, -2.0, -9.0))
+    n, oracle = len(chain), Oracle(chain)
+    representative, theta_b = known(chain)
+    q, qd, qdd = states(n, 20)
+    expected = oracle.rnea(q, qd, qdd)
+    search = Search(chain, representative, theta_b)
+    for feet in all_feet(chain):
+        for arrangement in search.starts(feet):
+            program = trace_dynamics("inverse_dynamics", arrangement, theta_b)
+            found = run(program, n, n, "tau", q=q, qd=qd, qdd=qdd)
+            assert relative_error(found, expected) < 1e-11
+
+
+@pytest.mark.parametrize("kinds", ["RRRRRR", "RRPRRR", "RRRRRRR", "RPRRRPRRRR"])
+@pytest.mark.parametrize("tidy", [False, True])
+@pytest.mark.parametrize("baked", [False, True])
+def test_every_function_against_pinocchio(kinds, tidy, baked):
+    chain = random_chain(7, kinds, tidy=tidy)
+    n, oracle = len(chain), Oracle(chain)
+    representative, theta_b = known(chain)
+    search = Search(chain, representative, theta_b if baked else None, budget=90)
+    q, qd, qdd = states(n, 200)
+    given_theta = {} if baked else {"theta_b": theta_b}
+    arrangement = search.best("inverse_dynamics", SINGLE)
+
+    def program(name):
+        return search.rearranged(name, arrangement, SINGLE)
+
+    tau = run(program("inverse_dynamics"), n, n, "tau", q=q, qd=qd, qdd=qdd, **given_theta)
+    assert relative_error(tau, oracle.rnea(q, qd, qdd)) < 1e-12
+    h = run(program("nonlinear_effects"), n, n, "h", q=q, qd=qd, **given_theta)
+    assert relative_error(h, oracle.nonlinear_effects(q, qd), tau) < 1e-12
+    g = run(program("gravity"), n, n, "g", q=q, **given_theta)
+    assert relative_error(g, oracle.gravity(q), tau) < 1e-12
+    mass = run(program("mass_matrix"), n, n * n, "M", q=q, **given_theta)
+    assert relative_error(mass.reshape(-1, n, n), oracle.mass_matrix(q)) < 1e-12
+    coriolis = run(program("coriolis_matrix"), n, n * n, "C", q=q, qd=qd, **given_theta)
+    assert relative_error(coriolis.reshape(-1, n, n), oracle.coriolis_matrix(q, qd)) < 1e-12
+    well = np.linalg.cond(oracle.mass_matrix(q)) < 1e5
+    qdd_found = run(program("forward_dynamics"), n, n, "qdd", q=q, qd=qd, tau=tau, **given_theta)
+    assert np.any(well)
+    assert relative_error(qdd_found[well], oracle.aba(q, qd, tau)[well]) < 1e-9
+
+
+@pytest.mark.parametrize("kinds", ["RRRRRR", "RPRRP"])
+@pytest.mark.parametrize("tidy", [False, True])
+def test_regressors_and_jacobian(kinds, tidy):
+    chain = random_chain(3, kinds, tidy=tidy)
+    n, oracle = len(chain), Oracle(chain)
+    representative, theta_b = known(chain)
+    l = len(theta_b)
+    q, qd, qdd = states(n, 100)
+    qd_r = states(n, 100, seed=9)[1]
+    for feet in all_feet(chain):
+        reframed = reframe(chain, feet)
+        y = run(trace_regressor("regressor", reframed, representative), n, n * l, "Y", q=q, qd=qd, qdd=qdd)
+        torque = y.reshape(-1, n, l) @ theta_b
+        assert relative_error(torque, oracle.rnea(q, qd, qdd)) < 1e-12
+        program = trace_regressor("regressor_slotine_li", reframed, representative)
+        y = run(program, n, n * l, "Y", q=q, qd=qd, qd_r=qd_r, qdd_r=qdd)
+        expected = (
+            np.einsum("sij,sj->si", oracle.mass_matrix(q), qdd)
+            + np.einsum("sij,sj->si", oracle.coriolis_matrix(q, qd), qd_r)
+            + oracle.gravity(q)
+        )
+        assert relative_error(y.reshape(-1, n, l) @ theta_b, expected) < 1e-12
+        j = run(trace_jacobian(reframed), n, 6 * n, "J", q=q)
+        assert relative_error(j.reshape(-1, 6, n), oracle.jacobian(q)) < 1e-12
+
+
+def test_coriolis_matrix_leaves_the_rate_of_the_mass_matrix_skew():
+    chain = random_chain(5, "RRPR")
+    n = len(chain)
+    representative, theta_b = known(chain)
+    search = Search(chain, representative, theta_b, budget=30)
+    arrangement = search.best("inverse_dynamics", SINGLE)
+    q, qd, _ = states(n, 20)
+    mass = search.rearranged("mass_matrix", arrangement, SINGLE)
+    step = 1e-6
+    ahead = run(mass, n, n * n, "M", q=q + step * qd).reshape(-1, n, n)
+    behind = run(mass, n, n * n, "M", q=q - step * qd).reshape(-1, n, n)
+    program = search.rearranged("coriolis_matrix", arrangement, SINGLE)
+    coriolis = run(program, n, n * n, "C", q=q, qd=qd).reshape(-1, n, n)
+    skew = (ahead - behind) / (2 * step) - 2 * coriolis
+    assert np.max(np.abs(skew + skew.transpose(0, 2, 1))) < 1e-7
+
+
+def test_carriers_are_as_many_as_the_base_parameters_and_reproduce_any_model():
+    chain = random_chain(11, "RRRRRR", tidy=True)
+    representative, _ = known(chain)
+    space = carrier_space(reframe(chain, ["previous"] * 6), representative)
+    carriers = space.lightest([1.0] * space.count)
+    assert len(carriers) == space.columns.shape[0] == np.linalg.matrix_rank(space.columns)
+    transfer = space.transfer(carriers)
+    np.testing.assert_allclose(space.columns[:, list(carriers)] @ transfer, space.target, atol=1e-9)
+
+
+def test_search_never_ends_dearer_than_it_starts():
+    chain = random_chain(13, "RRRRRR", tidy=True)
+    representative, theta_b = known(chain)
+    search = Search(chain, representative, theta_b)
+    first = next(search.starts(next(iter(all_feet(chain)))))
+    start = SINGLE.score(trace_dynamics("inverse_dynamics", first, theta_b))
+    best = search.best("inverse_dynamics", SINGLE)
+    assert SINGLE.score(trace_dynamics("inverse_dynamics", best, theta_b)) < start
+
+
+def test_lanes_of_states_pay_for_every_angle_and_one_state_does_not():
+    chain = random_chain(17, "RRRR", tidy=True)
+    representative, theta_b = known(chain)
+    search = Search(chain, representative, theta_b, budget=60)
+    arrangement = search.best("inverse_dynamics", SINGLE)
+    one = cost(search.rearranged("inverse_dynamics", arrangement, SINGLE))
+    lanes = cost(search.rearranged("inverse_dynamics", arrangement, BATCH))
+    assert lanes.sincos <= 4 <= one.sincos or lanes.sincos <= one.sincos
+    assert one.total <= lanes.total
+
+
+def test_choices_are_all_tried():
+    assert len(set(ALL_CHOICES)) == 8
+
+
+def test_a_mass_matrix_without_inertia_is_named_singular():
+    with pytest.raises(SingularMassMatrix) as caught:
+        solve_symmetric([[1.0, 0.0], [0.0, 0.0]], [1.0, 1.0])
+    assert caught.value.joint == 1
