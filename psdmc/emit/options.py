@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Real = Literal["float64", "float32"]
+CReal = Literal["double", "float"]
 Trig = Literal["inline", "libm"]
 
 
@@ -18,10 +19,10 @@ class EmitOptions:
     """
 
     real: Real = "float64"
-    trig: Trig = "libm"
+    trig: Trig = "inline"
 
     @property
-    def c_real(self) -> str:
+    def c_real(self) -> CReal:
         return "double" if self.real == "float64" else "float"
 
     @property

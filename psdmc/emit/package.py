@@ -11,10 +11,19 @@ from psdmc.emit.info import PackageInfo
 from psdmc.emit.kernel_view import FunctionView, function_views
 from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
-from psdmc.emit.options import EmitOptions
+from psdmc.emit.options import CReal, EmitOptions
 from psdmc.emit.references import References, ReferenceView, reference_view
 from psdmc.emit.render import render
 from psdmc.emit.tables import Table, tables
+from psdmc.emit.trig import (
+    HAS_VECTORS,
+    ScalarTrig,
+    TrigPreamble,
+    VectorTrig,
+    scalar_trig,
+    trig_preamble,
+    vector_trig,
+)
 from psdmc.errors import InputError
 from psdmc.program.kernel import Kernel
 
@@ -41,7 +50,7 @@ class PackageView:
         return self.info.l
 
     @property
-    def real(self) -> str:
+    def real(self) -> CReal:
         return self.options.c_real
 
     @property
@@ -52,6 +61,25 @@ class PackageView:
     def suffix(self) -> str:
         """Suffix of constants and libm functions."""
         return "" if self.real == "double" else "f"
+
+    @property
+    def trig_preamble(self) -> TrigPreamble:
+        return trig_preamble(self.robot, self.real)
+
+    @property
+    def trig_vectors(self) -> tuple[VectorTrig, ...]:
+        """The inline sincos for each vector width that internal.h may choose."""
+        widths = (self.lanes, self.lanes // 2, self.lanes // 4)
+        return tuple(vector_trig(self.robot, self.real, w, vec="lanes", ivec="lane_bits") for w in widths)
+
+    @property
+    def has_vectors(self) -> str:
+        """Preprocessor condition: the compiler has GCC's vector extension, and rounds as the sincos needs."""
+        return HAS_VECTORS
+
+    @property
+    def trig_scalar(self) -> ScalarTrig:
+        return scalar_trig(self.robot, self.real)
 
     @property
     def description(self) -> tuple[str, ...]:
