@@ -19,7 +19,6 @@ How a generated C file gets it, `templates/trig/` being rendered with `trig=` on
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from typing import Literal
 
@@ -135,11 +134,12 @@ def polynomial(coefficients: tuple[float, ...], real: Real) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ReductionStep:
-    """C names of one subtraction `to = of - k part` whose rounding error goes to `lost`."""
+    """C names of one subtraction `to = of - turn`, turn = k part; what it rounds away goes to `lost`."""
 
     to: str
     of: str
     part: str
+    turn: str
     lost: str
 
 
@@ -169,9 +169,6 @@ class Constants:
     half: str
     one: str
     limit: str
-    limit_bits: str
-    magnitude_mask: str
-    sign_mask: str
     sign_place: int
     sign_shift: int
     libm_sin: str
@@ -201,6 +198,9 @@ class ScalarTrig:
     to_bits: str
     to_real: str
     keep: str
+    sign: str
+    limit: str
+    odd: str
     uses_libm: bool
     constants: Constants
 
@@ -220,6 +220,9 @@ class VectorTrig:
     to_bits: str
     to_real: str
     keep: str
+    sign: str
+    limit: str
+    odd: str
     uses_libm: bool
     constants: Constants
     lanes: int
@@ -246,8 +249,11 @@ def scalar_trig(prefix: str, real: Real, far: Far = "libm") -> ScalarTrig:
         to_bits=f"{prefix}_bits_of_{suffix}",
         to_real=f"{prefix}_{suffix}_of_bits",
         keep=f"{_macro(prefix)}_KEEP_SCALAR",
+        sign=f"{prefix}_bits_of_{suffix}({_plain(-0.0, real)})",
+        limit=f"{prefix}_bits_of_{suffix}({_plain(NUMBERS[real].limit, real)})",
+        odd="0 - (index & 1)",
         uses_libm=far == "libm",
-        constants=constants(real, signed=False),
+        constants=constants(real),
     )
 
 
@@ -279,22 +285,21 @@ def vector_trig(
         to_bits=f"({ivec})",
         to_real=f"({vec})",
         keep=f"{_macro(prefix)}_KEEP_{size}",
+        sign=f"({ivec})({vec}){_filled(-0.0, real, lanes)}",
+        limit=f"({ivec})({vec}){_filled(NUMBERS[real].limit, real, lanes)}",
+        odd=f"(index << {bits - 1}) >> {bits - 1}",
         uses_libm=far == "libm",
-        constants=constants(real, signed=True),
+        constants=constants(real),
         lanes=lanes,
         bytes=size,
         any_sign=_any_sign(real, lanes, vec, ivec),
     )
 
 
-def constants(real: Real, signed: bool) -> Constants:
-    """NUMBERS[real] as C text; its masks signed (vectors, whose shifts GCC defines) or unsigned (plain C)."""
+def constants(real: Real) -> Constants:
+    """NUMBERS[real] as C text."""
     numbers = NUMBERS[real]
     places = numbers.digits - 1
-    size = numbers.bits // 8
-    limit = int.from_bytes(struct.pack(">d" if size == 8 else ">f", numbers.limit), "big")
-    magnitude = 2 ** (numbers.bits - 1) - 1
-    tail = ("" if signed else "U") + ("LL" if size == 8 else "")
     steps = _reduction_steps(real)
     return Constants(
         two_over_pi=c_number(numbers.two_over_pi, real),
@@ -310,9 +315,6 @@ def constants(real: Real, signed: bool) -> Constants:
         half=_plain(0.5, real),
         one=_plain(1.0, real),
         limit=_plain(numbers.limit, real),
-        limit_bits=f"0x{limit:x}{tail}",
-        magnitude_mask=f"0x{magnitude:x}{tail}",
-        sign_mask=f"(-0x{magnitude:x}{tail} - 1)" if signed else f"0x{magnitude + 1:x}{tail}",
         sign_place=numbers.bits - 1,
         sign_shift=numbers.bits - 2,
         libm_sin="sin" if real == "double" else "sinf",
@@ -324,7 +326,7 @@ def _reduction_steps(real: Real) -> tuple[ReductionStep, ...]:
     """One for each exact part of pi/2 after the first."""
     parts = NUMBERS[real].half_pi[1:-1]
     return tuple(
-        ReductionStep(f"r{i}", f"r{i - 1}", c_number(part, real), f"lost{i}")
+        ReductionStep(f"r{i}", f"r{i - 1}", c_number(part, real), f"turn{i}", f"lost{i}")
         for i, part in enumerate(parts, start=2)
     )
 
@@ -348,6 +350,11 @@ def _suffix(real: Real) -> str:
 
 def _plain(value: float, real: Real) -> str:
     return repr(value) + ("f" if real == "float" else "")
+
+
+def _filled(value: float, real: Real, lanes: int) -> str:
+    """Initialiser of a vector with that value in every lane."""
+    return "{" + ", ".join([_plain(value, real)] * lanes) + "}"
 
 
 def _about(real: Real, far: Far) -> str:
