@@ -37,7 +37,7 @@ class DhLink:
 
 @dataclass(frozen=True, slots=True)
 class DhJoint:
-    """One row of the table: a, d in m, alpha, theta in rad; drive_inertia kg m^2 (kg), NaN unknown, None not there."""
+    """One row of the table: a, d in m, alpha, theta in rad; drive_inertia in kg m^2 (kg), NaN if unknown."""
 
     name: str
     kind: JointKind

@@ -1,14 +1,12 @@
 """From a DH table to a serial robot.
 
-Standard: each row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next, which is the link's frame;
-the joint frame sits after Rz(theta + q), and the rest is the link frame's constant placement in it.
-Modified (Craig): Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and joint frame and link frame are one.
-A prismatic joint adds q to d instead, which commutes with Rz(theta).
+Standard: each row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next, which is the
+link's frame; the joint frame sits after Rz(theta + q), and the rest is the link frame's constant placement in
+it. Modified (Craig): Rx(alpha) Tx(a) Tz(d) Rz(theta + q), and joint frame and link frame are one. A prismatic
+joint adds q to d instead, which commutes with Rz(theta).
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -16,12 +14,13 @@ from psdmc.robot.chain import Array, Joint, Placement
 from psdmc.robot.dh import DhJoint, DhLink, DhRobot, read_dh
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, standard_parameters
+from psdmc.robot.rotation import about
 from psdmc.robot.snap import ROUNDING, snap_rotation
 from psdmc.robot.zeros import COM_NAMES, canonical
 
 
 def dh_draft(text: str, source: str, gravity: Array | None, snap: float) -> Draft:
-    """The robot in the file; gravity overrides the file's; rotations within `snap` (rad) of exact ones replaced."""
+    """The robot in the file; gravity overrides the file's; rotations near exact ones snapped (rad)."""
     robot = read_dh(text, source)
     joints, snaps = _placed_joints(robot, snap)
     return Draft(
@@ -50,9 +49,9 @@ def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tupl
     joints: list[Joint] = []
     before = Placement.identity()
     for number, row in enumerate(robot.joints, start=1):
-        twist = _exact(_about_x(row.alpha), f"alpha of joint '{row.name}'", snap, snaps)
+        twist = _exact(about(0, row.alpha), f"alpha of joint '{row.name}'", snap, snaps)
         offset = Placement(
-            _exact(_about_z(row.theta), f"theta of joint '{row.name}'", snap, snaps), np.zeros(3)
+            _exact(about(2, row.theta), f"theta of joint '{row.name}'", snap, snaps), np.zeros(3)
         )
         if robot.convention == "standard":
             placement = before @ offset
@@ -70,16 +69,6 @@ def _exact(rotation: Array, where: str, snap: float, snaps: list[Snap]) -> Array
     if angle > ROUNDING:
         snaps.append(Snap(where, angle))
     return result
-
-
-def _about_x(angle: float) -> Array:
-    s, c = math.sin(angle), math.cos(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def _about_z(angle: float) -> Array:
-    s, c = math.sin(angle), math.cos(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _parameters(row: DhJoint) -> Array:
@@ -101,10 +90,12 @@ def settled(link: DhLink) -> tuple[float, Array, Array]:
 
 
 def _faults(robot: DhRobot) -> tuple[str, ...]:
+    """A note for each link whose inertia no body could have; assumed zeros are not judged."""
     notes = []
     for number, row in enumerate(robot.joints, start=1):
         mass, _, inertia = settled(row.link)
-        fault = physical_fault(mass, inertia)
+        judged = not any(name.startswith("I") for name in row.link.zero)
+        fault = physical_fault(mass, inertia) if judged else None
         if fault:
             notes.append(f"link '{link_name(number)}': {fault}: not physical")
     return tuple(notes)

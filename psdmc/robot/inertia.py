@@ -10,7 +10,7 @@ INERTIA_NAMES = ("xx", "xy", "yy", "xz", "yz", "zz")
 """Order of the six inertia components within the standard parameters."""
 
 PRODUCT_NOISE = 1e-15
-"""Relative to a link's largest first moment or inertia: smaller entries are rounding of moving it between frames."""
+"""Relative to a link's largest first moment or inertia: smaller entries are rounding of changing frames."""
 
 PHYSICAL_TOLERANCE = 1e-6
 """Relative: files round inertias, so a triangle inequality may fail by this much without a word."""
@@ -23,7 +23,7 @@ def standard_parameters(mass: float, com: Array, inertia_com: Array) -> Array:
     NaN where a number needed is NaN; zero times unknown is zero.
     """
     moment = [_times(mass, r) for r in com]
-    x, y, z = com
+    _, y, z = com
     xx, yy, zz = (_times(h, r) for h, r in zip(moment, com, strict=True))
     xy, xz, yz = _times(moment[0], y), _times(moment[0], z), _times(moment[1], z)
     shift = np.array([yy + zz, -xy, xx + zz, -xz, -yz, xx + yy])
@@ -31,7 +31,7 @@ def standard_parameters(mass: float, com: Array, inertia_com: Array) -> Array:
 
 
 def about_com(parameters: Array) -> tuple[float, Array, Array]:
-    """Mass, centre of mass (3,) and inertia about it (6,): undoes standard_parameters where the mass is not zero."""
+    """Mass, centre of mass (3,) and inertia about it (6,): undoes standard_parameters (mass not zero)."""
     mass = float(parameters[0])
     com = parameters[1:4] / mass if mass else np.zeros(3)
     shift = standard_parameters(mass, com, np.zeros(6))[4:]
@@ -54,10 +54,10 @@ def inertia_matrix(six: Array) -> Array:
 
 
 def physical_fault(mass: float, inertia_com: Array) -> str | None:
-    """What forbids a body with this mass (kg) and inertia about its centre of mass (6,), or None; unknowns pass.
+    """What forbids a body with this mass (kg) and inertia (6,) about its centre, or None; unknowns pass.
 
-    A body exists where the mass is positive (or all is zero) and the principal moments obey the triangle inequality:
-    equivalent to a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018).
+    A body exists where the mass is positive (or all is zero) and the principal moments obey the triangle
+    inequality: equivalent to a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018).
     """
     if np.isnan(mass) or np.isnan(inertia_com).any():
         return None

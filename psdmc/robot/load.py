@@ -13,24 +13,25 @@ from psdmc.errors import InputError
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
+from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
 
 SourceFormat = Literal["urdf", "dh"]
 
 DEFAULT_SNAP = 1e-5
-"""rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no calibration is known to this angle."""
+"""rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
 
 DRIVE = PARAMETERS_PER_LINK - 1
 
 
 @dataclass(frozen=True, slots=True)
 class LoadOptions:
-    """What, besides the file, decides the chain; plain values, so that a saved model can be read again with them.
+    """What, besides the file, decides the chain; plain values, so that a saved model can be read again.
 
     base, tip      link names of a URDF; None: the root, the end of the longest chain
     gravity        m/s^2 in the URDF's root or the DH base frame; None: the file's own, or (0, 0, -9.81)
-    drive_inertia  True: drive inertias are parameters; numbers: with these values, joint by joint, kg m^2 (kg)
+    drive_inertia  True: drive inertias are parameters; numbers: with these values, one a joint, kg m^2 (kg)
     assume_zero    texts such as "link5:mx" or "link5:Ixz@com"
     snap           rad; 0 keeps the file's rotations but for floating-point noise
     """
@@ -194,7 +195,8 @@ def _zero_notes(draft: Draft, said: Sequence[Sequence[str]], values: Sequence[Ar
         names = list(dict.fromkeys((*own, *more)))
         if not names:
             continue
-        changed = np.nanmax(np.abs(before[:DRIVE] - after[:DRIVE]), initial=0.0) > 0.0
+        size = np.nanmax(np.abs(before[:DRIVE]), initial=0.0)
+        changed = np.nanmax(np.abs(before[:DRIVE] - after[:DRIVE]), initial=0.0) > PRODUCT_NOISE * size
         ending = "; the file's values there are dropped" if changed else ""
         notes.append(f"link '{joint.link_name}': assumed zero: {', '.join(names)}{ending}")
     return notes

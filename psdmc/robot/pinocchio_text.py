@@ -10,7 +10,6 @@ import pinocchio
 from psdmc.errors import InputError
 from psdmc.robot.xml_text import parse_xml
 
-
 JOINT_PREFIX = "joint:"
 """Put before every joint's name: Pinocchio cannot lock a joint that shares its name with a link."""
 
@@ -32,7 +31,7 @@ def pinocchio_model(text: str, source: str, movable: Collection[str] | None = No
             joint.set("type", "fixed")
         elif joint.get("type") == "continuous":
             joint.set("type", "revolute")
-            _require_limit(joint)
+        _complete_limit(joint)
         joint.set("name", JOINT_PREFIX + joint.get("name", ""))
     try:
         return pinocchio.buildModelFromXML(tostring(root, encoding="unicode"))
@@ -40,8 +39,8 @@ def pinocchio_model(text: str, source: str, movable: Collection[str] | None = No
         raise InputError(f"{source}: Pinocchio cannot read it: {error}", "check_urdf may say more") from None
 
 
-def _require_limit(joint: Element) -> None:
-    """Pinocchio asks for a <limit> on revolute joints; continuous ones need not have any."""
+def _complete_limit(joint: Element) -> None:
+    """Pinocchio refuses a joint without effort and velocity limits, which no dynamics needs."""
     limit = joint.find("limit")
     limit = SubElement(joint, "limit") if limit is None else limit
     for name in ("effort", "velocity"):

@@ -1,16 +1,18 @@
 """Pinocchio's own reading of a robot's source, to check everything else against.
 
-It shares the file's text with the chain and as little code as it can: a URDF is read, merged and locked by Pinocchio, a
-DH table becomes one Pinocchio joint per row. Only where the snapped robot is asked for do the joints' placements come
-from the chain, because the file has none such; the bodies are still Pinocchio's.
+It shares the file's text with the chain and as little code as it can: a URDF is read, merged and locked by
+Pinocchio, a DH table becomes one Pinocchio joint per row. Only where the snapped robot is asked for do the
+joints' placements come from the chain, because the file has none such; the bodies are still Pinocchio's.
 
-The models have one coordinate per joint (a continuous joint is an angle), the chain's joints in the chain's order, the
-chain's base as their universe, and a frame for the tip: use them with any Pinocchio function and plain q, qd, qdd (n,).
+The models have one coordinate per joint (a continuous joint is an angle), the chain's joints in the chain's
+order, the chain's base as their universe, and a frame for the tip: use them with any Pinocchio function and
+plain q, qd, qdd (n,).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,8 +35,8 @@ def reference_model(
     snapped      joints placed as the chain's are; False: as the file says, roundings included
     parameters   (n, 11) standard parameters about the link frames instead of the source's own
 
-    Bodies with parameters assumed zero get the chain's values, which the source does not know. ValueError where
-    parameters are needed and unknown.
+    Bodies with parameters assumed zero get the chain's values, which the source does not know. ValueError
+    where parameters are needed and unknown.
     """
     chain = loaded.chain
     model = _urdf_model(loaded) if loaded.source_format == "urdf" else _dh_model(loaded)
@@ -94,13 +96,13 @@ class Reference:
 
         return self._each(of_tip, q)
 
-    def _each(self, function: object, *states: Array) -> Array:
+    def _each(self, function: Callable[..., Array], *states: Array) -> Array:
         """Pinocchio's function at every state of broadcast arrays."""
         data = self.model.createData()
         rows = np.broadcast_arrays(*(np.asarray(state, dtype=float) for state in states))
         lead = rows[0].shape[:-1]
         flat = [row.reshape(-1, row.shape[-1]) for row in rows]
-        results = [np.array(function(self.model, data, *row)) for row in zip(*flat, strict=True)]  # type: ignore[operator]
+        results = [np.array(function(self.model, data, *row)) for row in zip(*flat, strict=True)]
         return np.array(results).reshape(*lead, *results[0].shape)
 
 
@@ -111,7 +113,7 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
 
 
 def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
-    """The file as Pinocchio reads it, all joints but the chain's locked at neutral, seen from the base link."""
+    """The file as Pinocchio reads it, all but the chain's joints locked at neutral, seen from the base."""
     chain = loaded.chain
     whole = pinocchio_model(loaded.source_text, loaded.source_name)
     wanted = [JOINT_PREFIX + name for name in chain.joint_names]
@@ -189,8 +191,11 @@ def _set_bodies(model: pinocchio.Model, chain: Chain, parameters: Array, which: 
 def _assumed(chain: Chain) -> list[int]:
     """Joints whose bodies have zeros that the span, not the source, knows of; and those with unknowns."""
     span = chain.parameter_span.reshape(len(chain), PARAMETERS_PER_LINK, -1)[:, :DRIVE]
-    known = ~np.isnan(chain.parameters).any(axis=1)
-    return [k for k in range(len(chain)) if not known[k] or np.linalg.matrix_rank(span[k]) < DRIVE]
+    return [
+        k
+        for k, values in enumerate(chain.parameters)
+        if np.isnan(values).any() or np.linalg.matrix_rank(span[k]) < DRIVE
+    ]
 
 
 def _placed_as(chain: Chain, model: pinocchio.Model) -> pinocchio.Model:

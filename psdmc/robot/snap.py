@@ -1,9 +1,10 @@
 """Rotations with exact zeros and ones where a file rounds them away.
 
-Files write pi/2 as 1.5708, and even sin(pi) is 1.2e-16: either turns an exact zero of the dynamics into a tiny number
-that no later stage can tell from a small one. A rotation matrix has six zeros (axes map to axes), four (it turns about
-an axis and maps it to one), one, or none: two zeros in different rows and columns force a third in one of their rows,
-because the rows are orthogonal. So those three patterns are all there is to try, sparsest first.
+Files write pi/2 as 1.5708, and even sin(pi) is 1.2e-16: either turns an exact zero of the dynamics into a
+tiny number that no later stage can tell from a small one. A rotation matrix has six zeros (axes map to axes),
+four (it turns about an axis and maps it to one), one, or none: two zeros in different rows and columns force
+a third in one of their rows, because the rows are orthogonal. So those three patterns are all there is to
+try, sparsest first.
 """
 
 from __future__ import annotations
@@ -13,20 +14,20 @@ from itertools import permutations
 
 import numpy as np
 
-from psdmc.robot.chain import Array, Placement
+from psdmc.robot.chain import Array
 
 ROUNDING = 1e-14
-"""rad: below this an angle is floating-point noise of composing rotations, cleaned always and never reported."""
+"""rad: a smaller angle is floating-point noise of composing rotations, always cleaned, never reported."""
 
 LENGTH_ROUNDING = 1e-13
-"""A coordinate below this fraction of the chain's length is noise of composing placements, and becomes zero."""
+"""A coordinate below this fraction of the chain's length is noise of composing placements: zero."""
 
 
 def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:
     """The sparsest rotation within `tolerance` (rad) of a (3, 3) rotation, and how far away it is (rad).
 
-    Its zeros and ones are exact, its other entries orthonormal to machine precision. Where none is near, the rotation
-    itself and 0. Floating-point noise (ROUNDING) is cleaned whatever the tolerance.
+    Its zeros and ones are exact, its other entries orthonormal to machine precision. Where none is near, the
+    rotation itself and 0. Floating-point noise (ROUNDING) is cleaned whatever the tolerance.
     """
     reach = max(tolerance, ROUNDING)
     for candidates in (_six_zeros(rotation), _four_zeros(rotation), _one_zero(rotation)):
@@ -39,7 +40,7 @@ def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:
 
 
 def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
-    """A unit vector (3,) with exact zeros where one lies within `tolerance` (rad), and how far away it is (rad)."""
+    """A near unit vector (3,) with exact zeros, within `tolerance` (rad), and how far away it is (rad)."""
     unit = axis / np.linalg.norm(axis)
     kept = np.where(np.abs(unit) > max(tolerance, ROUNDING) / math.sqrt(2.0), unit, 0.0)
     snapped = np.sign(kept) if np.count_nonzero(kept) == 1 else kept / np.linalg.norm(kept)
@@ -49,12 +50,6 @@ def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
 def snap_translation(translation: Array, chain_length: float) -> Array:
     """A translation (3,) in m without the noise of composing placements (LENGTH_ROUNDING)."""
     return np.where(np.abs(translation) > LENGTH_ROUNDING * chain_length, translation, 0.0) + 0.0
-
-
-def snap_placement(placement: Placement, tolerance: float) -> tuple[Placement, float]:
-    """A placement with its rotation snapped, and by how much (rad)."""
-    rotation, angle = snap_rotation(placement.rotation, tolerance)
-    return Placement(rotation, placement.translation), angle
 
 
 def angle_between(a: Array, b: Array) -> float:
@@ -76,7 +71,8 @@ def _six_zeros(rotation: Array) -> list[Array]:
 def _four_zeros(rotation: Array) -> list[Array]:
     """The nearest rotation that maps axis `column` to plus or minus axis `row`, for each such pair.
 
-    The 2 x 2 block left over, [[c, -s d], [s, c d]] with d = +-1 its determinant, is the one nearest in Frobenius norm.
+    The 2 x 2 block left over, [[c, -s d], [s, c d]] with d = +-1 its determinant, is the one nearest in
+    Frobenius norm.
     """
     candidates = []
     for row in range(3):
@@ -95,8 +91,8 @@ def _four_zeros(rotation: Array) -> list[Array]:
 def _one_zero(rotation: Array) -> list[Array]:
     """A rotation near to first order with a zero at (row, column), for each such place.
 
-    Its row is (0, u, v), its column (0, c, s) with unit lengths; the other rows lie in the plane of the column's axis
-    and (0, -v, u), which fixes the rest: products of one sine or cosine each.
+    Its row is (0, u, v), its column (0, c, s) with unit lengths; the other rows lie in the plane of the
+    column's axis and (0, -v, u), which fixes the rest: products of one sine or cosine each.
     """
     candidates = []
     for row in range(3):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from psdmc.errors import InputError
@@ -27,7 +27,8 @@ class Route:
 def find_route(robot: UrdfRobot, base: str | None, tip: str | None, source: str) -> Route:
     """The chain from base (default: the root) to tip (default: see default_tip).
 
-    InputError where a link is unknown, the tip is not below the base, no joint moves, or joints cannot be modelled.
+    InputError where a link is unknown, the tip is not below the base, no joint moves, or joints cannot be
+    modelled.
     """
     for role, link in (("base", base), ("tip", tip)):
         if link is not None and link not in robot.inertials:
@@ -68,8 +69,8 @@ def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, .
 def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[str, ...]]:
     """The end of the path with most movable joints, and a note where there was a choice.
 
-    Several such paths (the fingers of a gripper): the link where they part, if the way there moves more joints than
-    each goes on with; else nobody can tell which arm is meant, and InputError lists the ends.
+    Several such paths (the fingers of a gripper): the link where they part, if the way there moves more
+    joints than each goes on with; else nobody can tell which arm is meant, and InputError lists the ends.
     """
     depth = _movable_depths(robot, base)
     most = max(depth.values())
@@ -89,7 +90,7 @@ def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[st
     return parting, (note,)
 
 
-def listed(names: Sequence[str] | dict[str, object], most: int = 12) -> str:
+def listed(names: Iterable[str], most: int = 12) -> str:
     """Names in quotes for a message, cut off where there are many."""
     quoted = [f"'{name}'" for name in names]
     return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
@@ -112,7 +113,7 @@ def _below(robot: UrdfRobot, base: str) -> list[str]:
 
 
 def _fixed_end(robot: UrdfRobot, link: str) -> str:
-    """The far end of the longest way over fixed joints (tool flanges); the file's first where several are as long."""
+    """The far end of the longest way over fixed joints (tool flanges); of equals, the file's first."""
     distance = {link: 0}
     queue = [link]
     while queue:
@@ -152,4 +153,5 @@ def _locked_note(robot: UrdfRobot, route: Route) -> tuple[str, ...]:
     locked = [joint.name for joint in robot.joints if joint.is_movable and joint.name not in on_chain]
     if not locked:
         return ()
-    return (f"locked at zero, their bodies' inertia counted: {listed(locked, len(locked))}",)
+    names = listed(locked, len(locked))
+    return (f"locked at zero, their bodies counted where they move with the chain: {names}",)

@@ -21,7 +21,7 @@ MOVABLE = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True, slots=True)
 class UrdfInertial:
-    """mass kg; six components (INERTIA_NAMES) kg m^2 about the centre of mass, along the inertial frame's axes."""
+    """mass kg; inertia kg m^2 (INERTIA_NAMES) about the centre of mass, along the inertial frame's axes."""
 
     mass: float
     inertia: tuple[float, ...]
@@ -29,7 +29,7 @@ class UrdfInertial:
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """One <joint>. xyz (m) and rpy (rad) place the child link in the parent at q = 0; axis is in the child's frame."""
+    """One <joint>. xyz (m) and rpy (rad) place the child link in the parent at q = 0; axis in the child."""
 
     name: str
     type: str
@@ -48,7 +48,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class UrdfRobot:
-    """A tree of links. `inertials` has every link in the file's order, with None where it has no <inertial>."""
+    """A tree of links. `inertials` has every link in the file's order, None where it has no <inertial>."""
 
     name: str
     root: str
@@ -137,10 +137,8 @@ def _link_of(joint: Element, tag: str) -> str:
 
 
 def _limits(joint: Element, kind: str) -> Limits:
-    """Position limits only where the file writes one: URDF's default of 0..0 would be a joint that cannot move."""
+    """Position limits only where the file writes one: URDF's default, 0 to 0, would be a joint stuck."""
     element = joint.find("limit")
-    if element is None and kind in ("revolute", "prismatic"):
-        raise ValueError("<limit effort=... velocity=...> is missing")
     if element is None:
         return Limits()
     speed = number(element, "velocity", math.inf)
@@ -149,6 +147,8 @@ def _limits(joint: Element, kind: str) -> Limits:
     lower, upper = number(element, "lower", 0.0), number(element, "upper", 0.0)
     if kind == "continuous" or not written:
         return Limits(speed=speed, effort=effort)
+    if lower > upper:
+        raise ValueError(f"<limit> lower {lower:g} is above upper {upper:g}")
     return Limits(lower=lower, upper=upper, speed=speed, effort=effort)
 
 

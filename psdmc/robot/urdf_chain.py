@@ -10,7 +10,8 @@ from psdmc.robot.chain import Array, Joint, Placement
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, without_noise
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
-from psdmc.robot.snap import ROUNDING, snap_axis, snap_placement, snap_rotation, snap_translation
+from psdmc.robot.rotation import roll_pitch_yaw
+from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, snap_translation
 from psdmc.robot.tree import Route, find_route
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
 
@@ -21,7 +22,7 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 def urdf_draft(
     text: str, source: str, base: str | None, tip: str | None, gravity: Array | None, snap: float
 ) -> Draft:
-    """The chain from base to tip; gravity in the root frame; rotations within `snap` (rad) of exact ones replaced."""
+    """The chain from base to tip; gravity in the root frame; rotations near exact ones snapped (rad)."""
     robot = read_urdf(text, source)
     route = find_route(robot, base, tip, source)
     joints, tip_frame, snaps = _placed_joints(route, snap)
@@ -50,17 +51,17 @@ def urdf_draft(
 
 
 def merged_parameters(text: str, source: str, movable: list[str]) -> list[Array]:
-    """Ten standard parameters per movable joint, of all bodies that move with it, about its child link's frame."""
+    """Ten standard parameters per movable joint, of all that moves with it, about its child link's frame."""
     model = pinocchio_model(text, source, movable)
     bodies = [model.inertias[model.getJointId(JOINT_PREFIX + name)] for name in movable]
     return [without_noise(body.toDynamicParameters()) for body in bodies]
 
 
 def link_rotation(axis: Array) -> Array:
-    """(3, 3) from a link's frame into a joint frame whose z is the unit axis given in the link; deterministic.
+    """(3, 3) from a link's frame into a joint frame whose z is the unit axis given in the link.
 
-    x is the coordinate axis that the joint's axis is most square to, made square: coordinate axes thus give exact
-    signed permutations, and parallel axes parallel frames.
+    x is the coordinate axis that the joint's axis is most square to, made square: coordinate axes thus give
+    exact signed permutations, and parallel axes parallel frames.
     """
     k = int(np.argmin(np.abs(axis)))
     x = np.eye(3)[k] - axis[k] * axis
@@ -68,31 +69,18 @@ def link_rotation(axis: Array) -> Array:
     return np.array([x, np.cross(axis, x), axis]) + 0.0
 
 
-def origin(joint: UrdfJoint) -> Placement:
-    """Where the child link's frame sits in the parent's at q = 0: Rz(yaw) Ry(pitch) Rx(roll)."""
-    (sr, sp, sy), (cr, cp, cy) = [[f(angle) for angle in joint.rpy] for f in (math.sin, math.cos)]
-    rotation = np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-    return Placement(rotation, np.array(joint.xyz))
-
-
 def _placed_joints(route: Route, snap: float) -> tuple[tuple[Joint, ...], Placement, list[Snap]]:
     """Joint frames one in the other, the tip in the last, and what was snapped on the way.
 
-    Each origin is snapped as it is read, so that products of exact rotations stay exact; then once more what several
-    merged ones came to.
+    Each turn is snapped as it is read, so that products of exact rotations stay exact; then once more what
+    several merged ones came to.
     """
     snaps: list[Snap] = []
     reach = sum(math.hypot(*joint.xyz) for joint in route.path)
     joints: list[Joint] = []
     so_far = Placement.identity()
     for joint in route.path:
-        so_far = so_far @ _snapped(origin(joint), f"joint '{joint.name}'", snap, snaps)
+        so_far = so_far @ _origin(joint, snap, snaps)
         if not joint.is_movable:
             continue
         axis, angle = snap_axis(np.array(joint.axis), snap)
@@ -115,21 +103,23 @@ def _base_rotation(route: Route, snap: float) -> tuple[Array, list[Snap]]:
     snaps: list[Snap] = []
     base = Placement.identity()
     for joint in route.to_base:
-        base = base @ _snapped(origin(joint), f"joint '{joint.name}'", snap, snaps)
+        base = base @ _origin(joint, snap, snaps)
     rotation, angle = snap_rotation(base.rotation, snap)
     _record(snaps, f"base '{route.base}', merged", angle)
     return rotation, snaps
 
 
-def _snapped(place: Placement, where: str, snap: float, snaps: list[Snap]) -> Placement:
-    result, angle = snap_placement(place, snap)
-    _record(snaps, where, angle)
-    return result
+def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap]) -> Placement:
+    """Where the child link's frame sits in the parent's at q = 0."""
+    rotation = roll_pitch_yaw(joint.rpy, snap)
+    _record(snaps, f"joint '{joint.name}'", angle_between(rotation, roll_pitch_yaw(joint.rpy)))
+    return Placement(rotation, np.array(joint.xyz))
 
 
 def _merged(place: Placement, where: str, snap: float, snaps: list[Snap], reach: float) -> Placement:
-    result = _snapped(place, where, snap, snaps)
-    return Placement(result.rotation, snap_translation(result.translation, reach))
+    rotation, angle = snap_rotation(place.rotation, snap)
+    _record(snaps, where, angle)
+    return Placement(rotation, snap_translation(place.translation, reach))
 
 
 def _record(snaps: list[Snap], where: str, angle: float) -> None:

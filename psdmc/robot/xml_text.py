@@ -12,7 +12,7 @@ from psdmc.errors import InputError
 
 
 def parse_xml(text: str, source: str, root_tag: str) -> Element:
-    """The root element; InputError where it is no XML, not rooted in `root_tag`, or defines or fetches entities."""
+    """The root element; InputError where it is no XML, has another root, or defines or fetches entities."""
     try:
         root: Element = defusedxml.ElementTree.fromstring(text)
     except DefusedXmlException as error:

@@ -1,13 +1,14 @@
 """Parameters assumed zero: what stays of a link's values, and which parameter vectors remain possible.
 
-A zero about the link frame ("Ixz") strikes a coordinate. A zero about the centre of mass ("rx", "Ixz@com") does not: the
-frame's Ixz is Ixz@com - m rx rz, and survives while rx and rz do. What counts is the span of all parameter vectors that
-obey the statement. They are polynomials in m, r and the inertia about the centre of mass,
+A zero about the link frame ("Ixz") strikes a coordinate. A zero about the centre of mass ("rx", "Ixz@com")
+does not: the frame's Ixz is Ixz@com - m rx rz, and survives while rx and rz do. What counts is the span of
+all parameter vectors that obey the statement. They are polynomials in m, r and the inertia about the centre
+of mass,
 
     (m, m r, I_com + sum over i, j of m r_i r_j V_ij),
 
-and distinct monomials are linearly independent functions, so that span is the span of the coefficient vectors of the
-monomials that the zeros leave: exact, without sampling.
+and distinct monomials are linearly independent functions, so that span is the span of the coefficient vectors
+of the monomials that the zeros leave: exact, without sampling.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ BODY = PARAMETERS_PER_LINK - 1
 
 
 def canonical(names: Collection[str]) -> tuple[str, ...]:
-    """The same statement in full, in a fixed order: no mass is no body, no first moment puts the centre there."""
+    """The same statement in full, in a fixed order: no mass is no body, no first moment centres the body."""
     said = set(names)
     if "m" in said:
         said |= set(PARAMETER_NAMES[:BODY]) | set(COM_NAMES)
@@ -41,7 +42,7 @@ def canonical(names: Collection[str]) -> tuple[str, ...]:
 
 
 def link_span(names: Collection[str]) -> Array:
-    """(11, k) columns that span the parameters of one link when `names` are zero; reduced column echelon form."""
+    """(11, k) columns that span one link's parameters when `names` are zero, in reduced echelon form."""
     zero = canonical(names)
     generators = [] if "m" in zero else [_unit("m"), *_moments(zero), *_second_moments(zero)]
     generators += [_unit(f"I{name}") for name in INERTIA_NAMES if not {"m", f"I{name}@com"} & set(zero)]
@@ -53,7 +54,7 @@ def link_span(names: Collection[str]) -> Array:
 
 
 def link_values(parameters: Array, names: Collection[str]) -> Array:
-    """(11,) standard parameters with the statements applied, about the centre of mass first; NaN stays NaN."""
+    """(11,) standard parameters with the statements applied, those about the centre of mass first."""
     zero = canonical(names)
     values = np.array(parameters, dtype=float)
     if any(name in COM_NAMES for name in zero) and not np.isnan(values[:BODY]).any():
@@ -80,7 +81,7 @@ def block_diagonal(blocks: Sequence[Array]) -> Array:
 def parse_statements(
     statements: Iterable[str], link_names: Sequence[str], joint_names: Sequence[str], source: str
 ) -> tuple[tuple[str, ...], ...]:
-    """Zero names per link from texts such as "link5:rx" or "link5:Ixz@com"; a joint's name stands for its link.
+    """Zero names per link from texts such as "link5:rx" or "link5:Ixz@com"; joints' names do too.
 
     InputError names every text that does not fit, and what would.
     """

@@ -1,0 +1,29 @@
+"""Rotations from angles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from psdmc.robot.chain import Array
+from psdmc.robot.snap import snap_rotation
+
+
+def about(axis: int, angle: float) -> Array:
+    """(3, 3) rotation by `angle` (rad) about coordinate axis 0, 1 or 2."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    rotation = np.eye(3)
+    rotation[i, i] = rotation[j, j] = math.cos(angle)
+    rotation[j, i] = math.sin(angle)
+    rotation[i, j] = -rotation[j, i]
+    return rotation
+
+
+def roll_pitch_yaw(angles: tuple[float, float, float], snap: float = 0.0) -> Array:
+    """(3, 3) Rz(yaw) Ry(pitch) Rx(roll), each turn snapped for itself: each is a number that a file rounded.
+
+    angles, snap   rad
+    """
+    roll, pitch, yaw = (snap_rotation(about(axis, angle), snap)[0] for axis, angle in enumerate(angles))
+    return yaw @ pitch @ roll
