@@ -1,6 +1,7 @@
 """The straight-line body of one PROGRAM: what the body template prints, line by line.
 
-Sines and cosines are taken in groups, as early as their angles are known, so that one state's angles share vectors.
+Sines and cosines are taken in groups, as early as their angles are known, so that one state's angles share
+vectors.
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ class Angle:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Steps, then the sines and cosines of the angles that they made known; stores come with the last steps."""
+    """Steps, then the sines and cosines of the angles that they made known; stores come with the last
+    steps."""
 
     steps: tuple[Step | Store, ...]
     angles: tuple[Angle, ...]
@@ -121,8 +123,8 @@ class _Writer:
         for number, group in enumerate(_angle_groups(self.program)):
             steps = self._steps(_cone(self.program, group))
             sections.append(Section(steps, tuple(self._angle(a) for a in group), number))
-        steps = [*self._steps(range(len(self.program))), *self._late_stores(), *self._zeros(sizes)]
-        return (*sections, Section(tuple(steps), (), len(sections)))
+        rest = [*self._steps(range(len(self.program))), *self._late_stores(), *self._zeros(sizes)]
+        return (*sections, Section(tuple(rest), (), len(sections)))
 
     def _steps(self, wanted: range | list[int]) -> tuple[Step | Store, ...]:
         lines: list[Step | Store] = []

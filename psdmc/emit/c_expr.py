@@ -1,7 +1,8 @@
 """PROGRAM -> C expressions: single-use values are written into their use, the rest get names.
 
-The texts hold for one state and for one state per lane alike: a value is `V` (a real, or a vector of them) or uniform
-(the same for all states: constants and what is made of parameters alone), and C lets a scalar stand beside a vector.
+The texts hold for one state and for one state per lane alike: a value is `V` (a real, or a vector of them)
+or uniform (the same for all states: constants and what is made of parameters alone), and C lets a scalar
+stand beside a vector.
 """
 
 from __future__ import annotations

@@ -9,7 +9,8 @@ from psdmc.emit.options import EmitOptions
 
 
 def description(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
-    """Joints, limits, gravity, parameters, model and options, one line each; untrusted names still unescaped."""
+    """Joints, limits, gravity, parameters, model and options, one line each; untrusted names still
+    unescaped."""
     gx, gy, gz = info.gravity
     lines = [
         f"Robot: {info.name}, from {info.base} to {info.tip}",
@@ -22,18 +23,15 @@ def description(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
         *(f"  {i}  {joint_line(joint)}" for i, joint in enumerate(info.joints)),
         "",
         "theta_b, base parameters in standard parameters about the file's link frames:",
-        *(
-            f"  {i}  {parameter.equation}  [{parameter.unit}]"
-            for i, parameter in enumerate(info.parameters)
-        ),
+        *(f"  {i}  {parameter.equation}  [{parameter.unit}]" for i, parameter in enumerate(info.parameters)),
         "",
         "Arrays: n reals per vector; matrices row-major. Inputs are all read before an output is written, so",
         "that an output may be one of the inputs (in a batch: where their rows are equally long).",
         "  _batch      one state per row",
         "  _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too",
         "  _theta      with the base parameters theta_b given at run time",
-        "forward_dynamics returns 0, or 1 + the joint whose pivot is not positive, or (batch) 1 + the first row",
-        "that has one; the accelerations of such a state are NaN.",
+        "forward_dynamics returns 0, or 1 + the joint whose pivot is not positive, or (batch) 1 + the first",
+        "row that has one; the accelerations of such a state are NaN.",
     ]
     return tuple(lines)
 

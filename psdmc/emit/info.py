@@ -73,7 +73,7 @@ class PackageInfo:
         return len(self.joints)
 
     @property
-    def l(self) -> int:
+    def l(self) -> int:  # noqa: E743
         """Number of base parameters."""
         return len(self.parameters)
 

@@ -27,8 +27,8 @@ class VectorView:
 class KernelView:
     """One kernel: the file(s) that hold its body, its C functions and their signatures.
 
-    single_file  body file, included once per instantiation; the same as lanes_file where one order serves both
-    pivot_order  joints in the order in which their pivots are found, empty where there are none
+    single_file  body file, included once per instantiation; the same as lanes_file where one order serves
+    both pivot_order  joints in the order in which their pivots are found, empty where there are none
     """
 
     name: str

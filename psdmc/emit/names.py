@@ -1,7 +1,7 @@
 """Untrusted text on its way into C: names become identifiers, the rest is escaped.
 
-A robot file may name its robot `a; system("x")`. Nothing of such a name may leave the identifier, the string or the
-comment that it is put into.
+A robot file may name its robot `a; system("x")`. Nothing of such a name may leave the identifier, the string
+or the comment that it is put into.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from collections.abc import Iterable
 LONGEST = 63
 """Characters of an identifier: what C99 lets a compiler limit internal names to."""
 
-_C = """auto break case char const continue default do double else enum extern float for goto if inline int long
-register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"""
-_CPP = """alignas alignof and and_eq asm bitand bitor bool catch char8_t char16_t char32_t class co_await co_return
-co_yield compl concept consteval constexpr constinit const_cast decltype delete dynamic_cast explicit export false
-friend mutable namespace new noexcept not not_eq nullptr operator or or_eq private protected public
-reinterpret_cast requires static_assert static_cast template this thread_local throw true try typeid typename using
-virtual wchar_t xor xor_eq"""
+_C = """auto break case char const continue default do double else enum extern float for goto if inline
+int long register restrict return short signed sizeof static struct switch typedef union unsigned void
+volatile while"""
+_CPP = """alignas alignof and and_eq asm bitand bitor bool catch char8_t char16_t char32_t class co_await
+co_return co_yield compl concept consteval constexpr constinit const_cast decltype delete dynamic_cast
+explicit export false friend mutable namespace new noexcept not not_eq nullptr operator or or_eq private
+protected public reinterpret_cast requires static_assert static_cast template this thread_local throw true
+try typeid typename using virtual wchar_t xor xor_eq"""
 _OTHER = "main linux unix errno NULL NAN INFINITY"
 RESERVED = frozenset(f"{_C} {_CPP} {_OTHER}".split())
 
@@ -27,8 +28,8 @@ RESERVED = frozenset(f"{_C} {_CPP} {_OTHER}".split())
 def identifier(name: str) -> str:
     """A C and C++ identifier for `name`: ASCII letters, digits and single underscores, never a keyword.
 
-    Names that are identifiers already stay as they are; one that loses all its characters, or is too long, ends with
-    a digest of the original, so that different names stay apart.
+    Names that are identifiers already stay as they are; one that loses all its characters, or is too long,
+    ends with a digest of the original, so that different names stay apart.
     """
     cleaned = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
     if not cleaned:

@@ -14,6 +14,7 @@ from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
 from psdmc.emit.references import References, ReferenceView, reference_view
 from psdmc.emit.render import render
+from psdmc.emit.self_test import SelfCheck, self_checks
 from psdmc.emit.tables import Table, tables
 from psdmc.emit.trig import (
     HAS_VECTORS,
@@ -46,7 +47,7 @@ class PackageView:
         return self.info.n
 
     @property
-    def l(self) -> int:
+    def l(self) -> int:  # noqa: E743
         return self.info.l
 
     @property
@@ -107,6 +108,17 @@ class PackageView:
     @property
     def kernel_names(self) -> tuple[str, ...]:
         return tuple(kernel.name for function in self.functions for kernel in function.kernels)
+
+    @property
+    def has_forward(self) -> bool:
+        return any(function.has_pivots for function in self.functions)
+
+    @property
+    def self_checks(self) -> tuple[SelfCheck, ...]:
+        """The self-test's calls; kernels that need theta_b are left out while it is unknown."""
+        is_known = all(parameter.value is not None for parameter in self.info.parameters)
+        kernels = (kernel for function in self.functions for kernel in function.kernels)
+        return self_checks((k for k in kernels if is_known or not k.theta), self.robot, self.options)
 
     @property
     def cdef(self) -> str:

@@ -1,4 +1,5 @@
-"""Reference states for the package's self-test, worked out elsewhere (from the MODEL, not from the generated code)."""
+"""Reference states for the package's self-test, worked out elsewhere (from the MODEL, not from the generated
+code)."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class Kernel:
             foreign = [str(slot) for slot in program.inputs() if slot.vector not in inputs]
             foreign += [str(slot) for slot, _ in program.outputs if slot.vector not in outputs]
             if foreign:
-                raise ValueError(f"{self.name}: PROGRAM names {foreign[0]}, which is no vector of its function")
+                raise ValueError(f"{self.name}: {foreign[0]} in its PROGRAM is no vector of the function")
 
     @property
     def name(self) -> str:

@@ -1,8 +1,8 @@
 """Compiled libraries by content: what was compiled once is found again, whoever compiled it.
 
-The key holds everything that decides the binary: sources, flags, compiler, CPU features, psdmc's version and the
-platform. Two processes may race: each builds in a folder of its own and renames it into place, and the loser takes the
-winner's.
+The key holds everything that decides the binary: sources, flags, compiler, CPU features, psdmc's version and
+the platform. Two processes may race: each builds in a folder of its own and renames it into place, and the
+loser takes the winner's.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
 
 
 def cached(key: str, build: Callable[[Path], None]) -> Path:
-    """The folder that `build` filled for this key, now or earlier; ToolchainError where no folder can be made."""
+    """The folder that `build` filled for this key, now or earlier; ToolchainError where no folder can be
+    made."""
     final = cache_directory() / key
     if final.is_dir():
         return final

@@ -20,8 +20,9 @@ Array = NDArray[Any]
 class CompiledRobot:
     """The functions of a compiled package on NumPy arrays (..., n).
 
-    Leading axes broadcast; results are float64 or float32 as the package was compiled. Calls release the GIL and
-    may run in several threads. `theta_b` (l,), where a function takes it, replaces the parameters compiled in.
+    Leading axes broadcast; results are float64 or float32 as the package was compiled. Calls release the GIL
+    and may run in several threads. `theta_b` (l,), where a function takes it, replaces the parameters
+    compiled in.
     """
 
     def __init__(self, package: PackageView, library: Path) -> None:

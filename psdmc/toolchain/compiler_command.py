@@ -42,7 +42,9 @@ def _command(wanted: str) -> tuple[str, ...]:
         words = tuple(shlex.split(wanted))
         if words and shutil.which(words[0]):
             return words
-        raise ToolchainError(f"C compiler {wanted!r} (from CC) was not found", "set CC to a compiler, or unset it")
+        raise ToolchainError(
+            f"C compiler {wanted!r} (from CC) was not found", "set CC to a compiler, or unset it"
+        )
     for name in CANDIDATES:
         if shutil.which(name):
             return (name,)
@@ -68,8 +70,9 @@ def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
     except (OSError, subprocess.TimeoutExpired) as error:
         raise ToolchainError(f"{what}: {words[0]} could not be run: {error}") from error
     if done.returncode != 0:
+        complaint = _complaint(done.stderr, done.stdout)
         raise ToolchainError(
-            f"{what}: {words[0]} failed with status {done.returncode}: {_complaint(done.stderr, done.stdout)}",
+            f"{what}: {words[0]} failed with status {done.returncode}: {complaint}",
             f"run it to see everything: {shlex.join(words)}",
         )
     return done.stdout
