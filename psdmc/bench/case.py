@@ -1,0 +1,78 @@
+"""One robot as the benchmark sees it: its chain with every number known, and its name in tables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psdmc.dynamics.parameters import joint_frame_map, standard_parameters
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
+
+DRIVE = PARAMETERS_PER_LINK - 1
+FLOOR_MOUNT = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """A robot to measure: `chain` has no unknown inertia; `note` says where its numbers come from."""
+
+    name: str
+    chain: Chain
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if np.isnan(self.chain.parameters).any():
+            raise ValueError(f"{self.name}: the benchmark needs every inertial parameter")
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.chain)
+
+
+def generic_case(name: str, chain: Chain, seed: int) -> Case:
+    """The chain's geometry standing on the floor with generic physical inertias and no drive inertia.
+
+    Nobody's special zeros then make one contestant look better; the same seed gives the same robot.
+    """
+    rng = np.random.default_rng(seed)
+    n = len(chain)
+    parameters = np.array([[*physical_body(rng), 0.0] for _ in range(n)])
+    free = [j for j in range(PARAMETERS_PER_LINK * n) if j % PARAMETERS_PER_LINK != DRIVE]
+    generic = replace(
+        chain,
+        parameters=parameters,
+        parameter_span=np.eye(PARAMETERS_PER_LINK * n)[:, free],
+        gravity=np.array(FLOOR_MOUNT),
+    )
+    return Case(name, generic, f"generic physical inertias, floor mount, no drive inertia, seed {seed}")
+
+
+def physical_body(rng: np.random.Generator) -> Array:
+    """(10,) standard parameters of eight point masses at random places: a body that could exist, no entry zero."""
+    masses = rng.uniform(0.1, 0.6, size=8)
+    places = rng.normal(scale=0.08, size=(8, 3)) + rng.normal(scale=0.05, size=3)
+    second = np.einsum("k,ki,kj->ij", masses, places, places)
+    return standard_parameters(masses.sum(), masses @ places, np.trace(second) * np.eye(3) - second)
+
+
+def robot_as_numbers(chain: Chain) -> str:
+    """The chain as plain text for rivals: exact placements, bodies about the joint frames, no parser in between.
+
+    n and gravity; then per joint its kind, rotation (9, row-major), translation (3), body (10 standard parameters about
+    the joint frame) and drive inertia.
+    """
+    lines = [f"{len(chain)} {_numbers(chain.gravity)}"]
+    for joint, row in zip(chain.joints, chain.parameters, strict=True):
+        body = joint_frame_map(joint.link_frame) @ row[:DRIVE]
+        placement = joint.placement
+        lines.append(
+            f"{joint.kind} {_numbers(placement.rotation)} {_numbers(placement.translation)} "
+            f"{_numbers(body)} {float(row[DRIVE])!r}"
+        )
+    return "\n".join(lines)
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(repr(value) for value in np.ravel(values).tolist())

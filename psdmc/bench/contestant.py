@@ -1,0 +1,146 @@
+"""What is measured: one function of one library for one robot, behind the loops of rivals/loops.hpp."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from psdmc.bench.states import States
+from psdmc.robot.chain import Array
+
+Layout = Literal["state", "rows", "lanes"]
+"""One state a call; many states as rows; many states lane by lane."""
+
+RING_BYTES = 1 << 18
+"""Outputs go round in this much: within any L2 cache, so that the code is measured and not memory."""
+
+BLOCK = 64
+"""Calls per timed block, as in loops.hpp."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unavailable:
+    """A rival that could not be built or run here, and why: shown, never silently dropped."""
+
+    rival: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contestant:
+    """One function of one library.
+
+    rival       who: 'psdmc factored', 'Pinocchio' ...
+    variant     which of its ways, '' where there is one
+    function    name in psdmc/program/functions.py
+    layout      how states are handed over; `lanes` states per block where lane by lane
+    library     shared library that exports `symbol`_throughput and so on
+    robot       text for its `setup`, None where the library knows its robot
+    outputs     numbers per state that it puts out
+    weights     where functions differ in what they put out (regressors): output rows times these are torques
+    operations  (multiplications, additions), None where unknown
+    """
+
+    rival: str
+    function: str
+    library: Path
+    symbol: str
+    outputs: int
+    variant: str = ""
+    layout: Layout = "state"
+    lanes: int = 1
+    robot: str | None = None
+    weights: Array | None = None
+    operations: tuple[int, int] | None = None
+
+    @property
+    def label(self) -> str:
+        return f"{self.rival} {self.variant}".strip()
+
+
+class Work(ctypes.Structure):
+    """bench::Work of loops.hpp."""
+
+    _fields_ = [
+        ("count", ctypes.c_size_t),
+        ("n", ctypes.c_size_t),
+        ("outputs", ctypes.c_size_t),
+        ("ring", ctypes.c_size_t),
+        ("q", ctypes.c_void_p),
+        ("qd", ctypes.c_void_p),
+        ("x", ctypes.c_void_p),
+        ("output", ctypes.c_void_p),
+    ]
+
+
+class Runner:
+    """A contestant's library, loaded, with its states laid out: ready to be timed again and again."""
+
+    def __init__(self, contestant: Contestant, states: States) -> None:
+        self.contestant = contestant
+        self._library = ctypes.CDLL(str(contestant.library))
+        self._inputs = states.inputs(contestant.function, contestant.lanes)
+        ring = max(64, 1 << int(np.log2(RING_BYTES / (8 * contestant.outputs))))
+        self._ring = min(ring, states.count)
+        self._output = np.zeros(self._ring * contestant.outputs)
+        self._states = states
+        self.setup()
+
+    def setup(self) -> None:
+        """Give the library its robot; libraries of rivals hold one at a time."""
+        if self.contestant.robot is not None:
+            self._library.setup(self.contestant.robot.encode())
+
+    def throughput(self) -> float:
+        """ns per state."""
+        return self._ns(self._timer("throughput")(ctypes.byref(self._work(self._output, self._ring))))
+
+    def latency(self) -> float:
+        """ns per state where each waits for the one before."""
+        return self._ns(self._timer("latency")(ctypes.byref(self._work(self._output, self._ring))))
+
+    def blocks(self) -> Array:
+        """ns per call in each block of 64, clock included."""
+        seconds = np.zeros(self._states.count // BLOCK)
+        work = self._work(self._output, self._ring)
+        self._timer("blocks")(ctypes.byref(work), ctypes.c_void_p(seconds.ctypes.data))
+        return seconds * (1e9 / BLOCK)
+
+    def outputs(self) -> Array:
+        """(count, outputs) what the function puts out at every state, as rows."""
+        count, size = self._states.count, self.contestant.outputs
+        output = np.full(count * size, np.nan)
+        self._copy_matrices(True)
+        self._timer("throughput")(ctypes.byref(self._work(output, count)))
+        self._copy_matrices(False)
+        lanes = self.contestant.lanes
+        if self.contestant.layout == "lanes":
+            return output.reshape(count // lanes, size, lanes).transpose(0, 2, 1).reshape(count, size)
+        return output.reshape(count, size)
+
+    def _timer(self, kind: str) -> ctypes._CFuncPtr:
+        function = getattr(self._library, f"{self.contestant.symbol}_{kind}")
+        function.restype = ctypes.c_double
+        return function  # type: ignore[no-any-return]
+
+    def _work(self, output: Array, ring: int) -> Work:
+        q, qd, x = (vector.ctypes.data for vector in self._inputs)
+        states = self._states
+        return Work(states.count, states.n, self.contestant.outputs, ring, q, qd, x, output.ctypes.data)
+
+    def _ns(self, seconds: float) -> float:
+        return 1e9 * seconds / self._states.count
+
+    def _copy_matrices(self, yes: bool) -> None:
+        if hasattr(self._library, "copy_matrices"):
+            self._library.copy_matrices(int(yes))
+
+
+def source(name: str) -> str:
+    """A C++ file that belongs to the benchmark."""
+    return files("psdmc.bench.rivals").joinpath(name).read_text()

@@ -1,0 +1,88 @@
+// Pinocchio's C++ algorithms, called as its users call them: one model, one data, Eigen vectors.
+//
+// Vectors are copied to the output; matrices stay in `data`, where Pinocchio's users read them, unless the harness
+// asks for them to check them: the rival is not charged for copies.
+#include "loops.hpp"
+
+#include <pinocchio/algorithm/aba.hpp>
+#include <pinocchio/algorithm/crba.hpp>
+#include <pinocchio/algorithm/regressor.hpp>
+#include <pinocchio/algorithm/rnea.hpp>
+#include <memory>
+#include <sstream>
+
+#include "pinocchio_model.hpp"
+
+namespace {
+
+using pinocchio::Convention;
+
+std::unique_ptr<pinocchio::Model> model;
+std::unique_ptr<pinocchio::Data> data;
+bool copies_matrices = false;
+
+/// A caller's vector as Pinocchio's own instantiations take it: not copied.
+using Vector = Eigen::Ref<const Eigen::VectorXd>;
+
+Vector vector(const double *values) { return Eigen::Map<const Eigen::VectorXd>(values, model->nv); }
+
+void give(const Eigen::VectorXd &from, double *to) { Eigen::Map<Eigen::VectorXd>(to, from.size()) = from; }
+
+template <class Matrix>
+void give_matrix(const Matrix &from, double *to) {
+  if (!copies_matrices) return;
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::Map<RowMajor>(to, from.rows(), from.cols()) = from;
+}
+
+void rnea(const double *q, const double *qd, const double *qdd, double *tau) {
+  give(pinocchio::rnea(*model, *data, vector(q), vector(qd), vector(qdd)), tau);
+}
+
+template <Convention convention>
+void aba(const double *q, const double *qd, const double *tau, double *qdd) {
+  give(pinocchio::aba(*model, *data, vector(q), vector(qd), vector(tau), convention), qdd);
+}
+
+template <Convention convention>
+void crba(const double *q, const double *, const double *, double *M) {
+  pinocchio::crba(*model, *data, vector(q), convention);
+  if (copies_matrices) data->M.triangularView<Eigen::StrictlyLower>() = data->M.transpose();
+  give_matrix(data->M, M);
+}
+
+void nonlinear_effects(const double *q, const double *qd, const double *, double *h) {
+  give(pinocchio::nonLinearEffects(*model, *data, vector(q), vector(qd)), h);
+}
+
+void gravity(const double *q, const double *, const double *, double *g) {
+  give(pinocchio::computeGeneralizedGravity(*model, *data, vector(q)), g);
+}
+
+void regressor(const double *q, const double *qd, const double *qdd, double *Y) {
+  // Its shipped instantiation, unlike the others', takes vectors that own their memory.
+  static Eigen::VectorXd q_, qd_, qdd_;
+  q_ = vector(q), qd_ = vector(qd), qdd_ = vector(qdd);
+  give_matrix(pinocchio::computeJointTorqueRegressor(*model, *data, q_, qd_, qdd_), Y);
+}
+
+}  // namespace
+
+PSDMC_EXPORT int setup(const char *robot) {
+  std::istringstream text(robot);
+  model = std::make_unique<pinocchio::Model>();
+  read_model(text, *model);
+  data = std::make_unique<pinocchio::Data>(*model);
+  return int(model->nv);
+}
+
+PSDMC_EXPORT void copy_matrices(int yes) { copies_matrices = yes != 0; }
+
+PSDMC_CONTESTANT(inverse_dynamics, rnea)
+PSDMC_CONTESTANT(forward_dynamics_local, aba<Convention::LOCAL>)
+PSDMC_CONTESTANT(forward_dynamics_world, aba<Convention::WORLD>)
+PSDMC_CONTESTANT(mass_matrix_local, crba<Convention::LOCAL>)
+PSDMC_CONTESTANT(mass_matrix_world, crba<Convention::WORLD>)
+PSDMC_CONTESTANT(nonlinear_effects, nonlinear_effects)
+PSDMC_CONTESTANT(gravity, gravity)
+PSDMC_CONTESTANT(regressor, regressor)

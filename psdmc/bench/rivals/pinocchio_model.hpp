@@ -1,0 +1,34 @@
+// The robot as numbers, read into Pinocchio's own model: no parser, and exactly psdmc's snapped placements.
+#pragma once
+
+#include <istream>
+#include <string>
+
+#include <pinocchio/multibody.hpp>
+
+/// Fills an empty model from the text of psdmc/bench/rivals/numbers.py: n, gravity, then per joint its kind, placement, body and drive inertia.
+inline void read_model(std::istream &text, pinocchio::Model &model) {
+  std::size_t n = 0;
+  Eigen::Vector3d gravity;
+  text >> n >> gravity.x() >> gravity.y() >> gravity.z();
+  Eigen::VectorXd drive(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::string kind;
+    Eigen::Matrix3d rotation;
+    Eigen::Vector3d translation;
+    Eigen::Matrix<double, 10, 1> body;
+    text >> kind;
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column) text >> rotation(row, column);
+    for (int row = 0; row < 3; ++row) text >> translation(row);
+    for (int row = 0; row < 10; ++row) text >> body(row);
+    text >> drive(i);
+    const pinocchio::SE3 placement(rotation, translation);
+    const std::string name = "joint" + std::to_string(i);
+    const auto joint = kind == "revolute" ? model.addJoint(i, pinocchio::JointModelRZ(), placement, name)
+                                          : model.addJoint(i, pinocchio::JointModelPZ(), placement, name);
+    model.inertias[joint] = pinocchio::Inertia::FromDynamicParameters(body);
+  }
+  model.armature = drive;
+  model.gravity.linear(gravity);
+}
