@@ -49,13 +49,15 @@ def certificate(model: DynamicsModel) -> Array:
     worst = int(np.argmax(errors))
     if not errors[worst] <= WORST_ALLOWED:
         raise InternalError(
-            f"joint '{chain.joint_names[worst]}': the derived model is off Newton-Euler by {errors[worst]:.2g}"
+            f"joint '{chain.joint_names[worst]}': the derived model is off Newton-Euler by "
+            f"{errors[worst]:.2g} of its largest torque"
         )
     return errors
 
 
 def relative_errors(values: Array, reference: Array) -> Array:
-    """(n,) largest difference per column relative to the column's largest magnitude; absolute where that is zero."""
+    """(n,) largest difference per column relative to the column's largest magnitude; absolute where that is
+    zero."""
     largest = np.abs(reference).max(axis=0)
     errors: Array = np.abs(values - reference).max(axis=0) / np.where(largest > 0, largest, 1.0)
     return errors

@@ -43,15 +43,14 @@ def derive_model(
     """
     tell = progress or _silent
     robot = scaled(chain)
-    expansion = _expanded(robot, tell, memory) if expand else None
-    if expansion is None:
-        tell("base parameters")
-    reduction = expansion.reduction if expansion else sampled_reduction(robot)
+    tell("base parameters")
+    reduction = sampled_reduction(robot)
     if not len(reduction.pivots):
         raise DerivationError(
             f"'{chain.name}': no inertial parameter has any effect on any joint",
             "give masses and inertias, or assume fewer of them zero",
         )
+    expansion = _expanded(robot, reduction, tell, memory) if expand else None
     B = base_map(robot, reduction)
     model = DynamicsModel(
         E=expansion.E if expansion else None,

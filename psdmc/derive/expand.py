@@ -19,9 +19,9 @@ from psdmc.derive.memory import (
     refuse_beyond,
     velocity_bytes,
 )
-from psdmc.derive.reduce import Reduction, reduced, row_space
+from psdmc.derive.reduce import Reduction
 from psdmc.derive.rounding import merged
-from psdmc.derive.terms import Terms, joined, selected, times_matrix
+from psdmc.derive.terms import Terms, joined, times_matrix
 from psdmc.derive.units import Scaled, function_units, parameter_units, torque_units
 from psdmc.derive.velocity import acceleration_terms, velocity_terms
 from psdmc.dynamics.scalar import Vector
@@ -30,35 +30,32 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 COEFFICIENT_TOLERANCE = 1e-12
-"""Coefficients below this are zero, lengths in the robot's unit (units.py). Rounding leaves less than 1e-14 (measured
-on seven joints with oblique axes), and the smallest true coefficients seen are above 1e-9."""
+"""Coefficients below this are zero, lengths in the robot's unit (units.py). Rounding leaves less than 1e-14
+(measured on seven joints with oblique axes), and the smallest true coefficients seen are above 1e-9."""
 
 VALUE_NOISE = 1e-14
 """Uncertainty of a coefficient of size one, from rounding; relative for larger ones. Measured: 3e-15."""
 
 
 class Expansion(NamedTuple):
-    """E (5n, p), P (n of (p, l)) in SI, and the base parameters among the span's columns."""
+    """E (5n, p) and P (n of (p, l)) in SI."""
 
     E: NDArray[np.uint8]
     P: tuple[sparse.csr_array, ...]
-    reduction: Reduction
 
 
-def expand(scaled: Scaled, progress: Progress, memory: int | None = None) -> Expansion:
-    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: what is free)."""
+def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int | None = None) -> Expansion:
+    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: what is
+    free)."""
     kinds = scaled.kinds
     functions = Functions(kinds)
     available = available_memory() if memory is None else memory
     refuse_beyond(grid_bytes(kinds), available, largest_function_count(kinds), len(kinds))
     progress("mass matrix")
-    mass = _mass_matrix(scaled, functions)
+    chosen = scaled.span[:, reduction.pivots]
+    mass = _mass_matrix(scaled, chosen, functions)
     progress("gravity")
-    gravity = _gravity(scaled, functions)
-    progress("base parameters")
-    reduction = reduced(row_space([*mass.values(), gravity], scaled.span.shape[1]))
-    mass = {pair: pivots_only(terms, reduction) for pair, terms in mass.items()}
-    gravity = pivots_only(gravity, reduction)
+    gravity = _gravity(scaled, chosen, functions)
     progress("velocity terms")
     count, needed = velocity_bytes(mass, functions)
     refuse_beyond(needed, available, min(count, largest_function_count(kinds)), len(kinds))
@@ -66,31 +63,22 @@ def expand(scaled: Scaled, progress: Progress, memory: int | None = None) -> Exp
     progress("reduction matrices")
     terms = joined([gravity, acceleration_terms(mass, functions), velocity])
     units = parameter_units(kinds, scaled.unit)[scaled.leads[reduction.pivots]]
-    return Expansion(*assembled(terms, functions, units, scaled.unit), reduction)
+    return Expansion(*assembled(terms, functions, units, scaled.unit))
 
 
-def _mass_matrix(scaled: Scaled, functions: Functions) -> dict[tuple[int, int], Terms]:
-    """In the span's columns; row 0 throughout."""
+def _mass_matrix(scaled: Scaled, chosen: Array, functions: Functions) -> dict[tuple[int, int], Terms]:
+    """In the chosen columns of the span; row 0 throughout."""
     found = mass_matrix_terms(scaled.frames, scaled.link_frames, functions, COEFFICIENT_TOLERANCE)
     return {
-        pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), scaled.span, COEFFICIENT_TOLERANCE)
+        pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, COEFFICIENT_TOLERANCE)
         for pair, terms in found.items()
     }
 
 
-def _gravity(scaled: Scaled, functions: Functions) -> Terms:
+def _gravity(scaled: Scaled, chosen: Array, functions: Functions) -> Terms:
     up: Vector = scaled.up
     terms = gravity_terms(scaled.frames, scaled.link_frames, up, functions, COEFFICIENT_TOLERANCE)
-    return times_matrix(terms, scaled.span, COEFFICIENT_TOLERANCE)
-
-
-def pivots_only(terms: Terms, reduction: Reduction) -> Terms:
-    """Terms of the base parameters alone, columns renumbered."""
-    columns = reduction.echelon.shape[1]
-    number = np.full(columns, -1, dtype=np.int64)
-    number[reduction.pivots] = np.arange(len(reduction.pivots))
-    new = number[terms.column]
-    return selected(terms._replace(column=new), new >= 0)
+    return times_matrix(terms, chosen, COEFFICIENT_TOLERANCE)
 
 
 def assembled(

@@ -1,9 +1,10 @@
 """The functions y_j: how they are numbered, in which order they stand, and their exponents E.
 
-A product of joint functions is a code: one digit per joint to base 5, the first joint's digit the highest. A revolute
-joint's digits 0..4 stand for 1, s, c, s c, c^2, a prismatic joint's 0..2 for 1, q, q^2. A function is a code times a
-rate factor: |g|; qdd_j; qd_j^2; qd_j qd_k. Its key is the rate's number times 5^n plus the code; E's columns stand in
-the order of keys: gravity, acceleration, centrifugal, Coriolis; within each by joint (pair), then by code.
+A product of joint functions is a code: one digit per joint to base 5, the first joint's digit the highest. A
+revolute joint's digits 0..4 stand for 1, s, c, s c, c^2, a prismatic joint's 0..2 for 1, q, q^2. A function
+is a code times a rate factor: |g|; qdd_j; qd_j^2; qd_j qd_k. Its key is the rate's number times 5^n plus the
+code; E's columns stand in the order of keys: gravity, acceleration, centrifugal, Coriolis; within each by
+joint (pair), then by code.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Functions:
     @property
     def codes(self) -> int:
         """Number of codes, 5^n."""
-        return RADIX**self.n
+        return int(RADIX**self.n)
 
     def weight(self, joint: int) -> int:
         """What one step of a joint's digit adds to the code."""
@@ -57,7 +58,8 @@ class Functions:
         return digits
 
     def tensor_codes(self, first: int, sizes: Sequence[int]) -> Integers:
-        """Codes of a coefficient tensor, flattened: joints first, first + 1, ... with that many digits each."""
+        """Codes of a coefficient tensor, flattened: joints first, first + 1, ... with that many digits
+        each."""
         codes = np.zeros(1, dtype=np.int64)
         for joint, size in enumerate(sizes, start=first):
             codes = (codes[:, None] + self.weight(joint) * np.arange(size)).reshape(-1)

@@ -1,9 +1,9 @@
 """Coefficients of the mass matrix, for each standard parameter apart.
 
-The part of M_ij (i <= j) that one parameter of link k >= j makes is a bilinear form in the twists that joints i and j
-give to that link's frame. Joint i's twist is a polynomial of degree one in each of q_{i+1} ... q_k, so the product
-has degree one in q_{i+1} ... q_j, where joint j's twist is constant, and degree two in q_{j+1} ... q_k: only the latter
-need a grid.
+The part of M_ij (i <= j) that one parameter of link k >= j makes is a bilinear form in the twists that joints
+i and j give to that link's frame. Joint i's twist is a polynomial of degree one in each of q_{i+1} ... q_k,
+so the product has degree one in q_{i+1} ... q_j, where joint j's twist is constant, and degree two in q_{j+1}
+... q_k: only the latter need a grid.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ Array = NDArray[np.float64]
 
 
 class FormalAngle:
-    """A revolute joint's q at three formal points (s, c) = (0, 0), (1, 0), (0, 1), from which the coefficients of
-    1, s and c follow by exact differences. It enters the dynamics as their abstract scalar."""
+    """A revolute joint's q at three formal points (s, c) = (0, 0), (1, 0), (0, 1), from which the
+    coefficients of 1, s and c follow by exact differences. It enters the dynamics as their abstract
+    scalar."""
 
     def sincos(self) -> tuple[Array, Array]:
         return np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -48,7 +49,8 @@ def moving(frame: Frame) -> Moving:
 
 
 def coefficients(at_points: Scalar, count: int, kind: JointKind) -> Array:
-    """Coefficients of degree one from values at the formal points, the new joint's axis last: (count * 3 or 2,)."""
+    """Coefficients of degree one from values at the formal points, the new joint's axis last: (count * 3 or
+    2,)."""
     values = np.broadcast_to(np.asarray(at_points, dtype=np.float64), (count, LINEAR_SIZE[kind]))
     return np.concatenate([values[:, :1], values[:, 1:] - values[:, :1]], axis=1).reshape(-1)
 

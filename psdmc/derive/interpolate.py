@@ -1,8 +1,10 @@
-"""Products of polynomials in the joint variables: evaluate on a tensor grid, multiply, interpolate axis by axis.
+"""Products of polynomials in the joint variables: evaluate on a tensor grid, multiply, interpolate axis by
+axis.
 
-A joint's polynomials of degree one have the basis {1, s, c} (revolute, s = sin q, c = cos q) or {1, q} (prismatic);
-their products have {1, s, c, s c, c^2} (s^2 = 1 - c^2) or {1, q, q^2}. The search space is the tensor product over
-the joints, so what PSDM-2021 solves as one dense system is a Kronecker product: one small inverse along each axis.
+A joint's polynomials of degree one have the basis {1, s, c} (revolute, s = sin q, c = cos q) or {1, q}
+(prismatic); their products have {1, s, c, s c, c^2} (s^2 = 1 - c^2) or {1, q, q^2}. The search space is the
+tensor product over the joints, so what PSDM-2021 solves as one dense system is a Kronecker product: one small
+inverse along each axis.
 """
 
 from __future__ import annotations
@@ -22,10 +24,11 @@ QUADRATIC_SIZE: dict[JointKind, int] = {"revolute": 5, "prismatic": 3}
 
 
 def nodes(kind: JointKind) -> Array:
-    """Where products are sampled: equally spaced on the circle, which conditions the inverse best; or -1, 0, 1."""
+    """Where products are sampled: equally spaced on the circle, which conditions the inverse best; or -1, 0,
+    1."""
     if kind == "prismatic":
         return np.array([-1.0, 0.0, 1.0])
-    return 2.0 * np.pi * np.arange(5) / 5.0
+    return np.array([2.0 * np.pi * k / 5.0 for k in range(5)])
 
 
 def quadratic_basis(kind: JointKind, q: Array) -> Array:
@@ -45,7 +48,8 @@ def evaluation(kind: JointKind) -> Array:
 @cache
 def interpolation(kind: JointKind) -> Array:
     """(5, 5) or (3, 3): values at the nodes to coefficients of degree two."""
-    return np.linalg.inv(quadratic_basis(kind, nodes(kind)))
+    inverse: Array = np.asarray(np.linalg.inv(quadratic_basis(kind, nodes(kind))), dtype=np.float64)
+    return inverse
 
 
 def along_axes(matrices: Sequence[Array], values: Array) -> Array:
@@ -54,7 +58,8 @@ def along_axes(matrices: Sequence[Array], values: Array) -> Array:
     values   (d_1 ... d_m, batch) as any shape with that many entries in that order
     returns  (batch, e_1 ... e_m) flattened to (batch, e_1 * ... * e_m), matrices[a] being (e_a, d_a)
 
-    Each step takes the first axis off and puts its result last, so that every step is one plain matrix product.
+    Each step takes the first axis off and puts its result last, so that every step is one plain matrix
+    product.
     """
     for matrix in matrices:
         values = values.reshape(matrix.shape[1], -1).T @ matrix.T

@@ -23,7 +23,8 @@ _GRID_COPIES = 5
 def largest_function_count(kinds: Sequence[JointKind]) -> int:
     """The p of a chain of these joints with axes in general position; no such chain has more.
 
-    M_0j has degree one in q_1 ... q_j and two in what follows; every rate product qd_j qd_k (k >= j) has at most that.
+    M_0j has degree one in q_1 ... q_j and two in what follows; every rate product qd_j qd_k (k >= j) has at
+    most that.
     """
     n = len(kinds)
     linear = [LINEAR_SIZE[kind] for kind in kinds]

@@ -1,7 +1,8 @@
 """Numbers that differ by rounding alone become one number, and the simplest one in reach.
 
-The same product of link lengths reaches P by many paths and arrives with different last bits; the expanded lowering
-shares sub-expressions only where coefficients are equal. This happens before certification, and nowhere else.
+The same product of link lengths reaches P by many paths and arrives with different last bits; the expanded
+lowering shares sub-expressions only where coefficients are equal. This happens before certification, and
+nowhere else.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ DIGITS = 12
 
 
 def merged(values: Array, noise: Array) -> Array:
-    """The same numbers with those equal up to `noise` made equal in magnitude; none moves by more than its noise.
+    """The same numbers with those equal up to `noise` made equal in magnitude; none moves by more than its
+    noise.
 
     values, noise   (count,), noise the absolute uncertainty of each value
     """

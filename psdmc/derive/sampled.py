@@ -1,11 +1,12 @@
-"""Base parameters without E and P: the echelon form of the regressor at sampled states, for chains of any length."""
+"""Base parameters without E and P: the echelon form of the regressor at sampled states, for chains of any
+length."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.derive.reduce import Reduction, reduced
+from psdmc.derive.reduce import Reduction, reduced, triangular
 from psdmc.derive.units import Scaled
 from psdmc.dynamics.regressor import regressor
 from psdmc.robot.chain import PARAMETERS_PER_LINK
@@ -23,7 +24,7 @@ def sampled_reduction(scaled: Scaled) -> Reduction:
     """The same base parameters as the expanded path finds, within the span's columns."""
     n = len(scaled.kinds)
     rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
-    return reduced(np.linalg.qr(rows @ scaled.span, mode="r"))
+    return reduced(triangular(rows @ scaled.span))
 
 
 def sampled_regressor(scaled: Scaled, count: int) -> Array:
@@ -31,9 +32,8 @@ def sampled_regressor(scaled: Scaled, count: int) -> Array:
     n = len(scaled.kinds)
     states = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, n, count))
     wanted = frozenset(range(PARAMETERS_PER_LINK * n))
-    rows = regressor(
-        scaled.frames, scaled.link_frames, wanted, *(list(rows) for rows in states), base=scaled.up
-    )
+    q, qd, qdd = (list(vector) for vector in states)
+    rows = regressor(scaled.frames, scaled.link_frames, wanted, q, qd, qdd, scaled.up)
     values = np.zeros((count, n, PARAMETERS_PER_LINK * n))
     for i, row in enumerate(rows):
         for column, entry in row.items():

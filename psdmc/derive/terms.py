@@ -1,4 +1,5 @@
-"""Sparse lists of terms: which function multiplies which parameter in which joint's torque, and by how much."""
+"""Sparse lists of terms: which function multiplies which parameter in which joint's torque, and by how
+much."""
 
 from __future__ import annotations
 
@@ -37,11 +38,17 @@ def joined(parts: Sequence[Terms]) -> Terms:
     """All terms one after the other."""
     if not parts:
         return no_terms()
-    return Terms(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    return Terms(
+        np.concatenate([part.row for part in parts]),
+        np.concatenate([part.function for part in parts]),
+        np.concatenate([part.column for part in parts]),
+        np.concatenate([part.value for part in parts]),
+    )
 
 
 def selected(terms: Terms, chosen: NDArray[np.bool_] | Integers) -> Terms:
-    return Terms(*(array[chosen] for array in terms))
+    row, function, column, value = terms
+    return Terms(row[chosen], function[chosen], column[chosen], value[chosen])
 
 
 def summed(terms: Terms, tolerance: float) -> Terms:
@@ -62,7 +69,8 @@ def summed(terms: Terms, tolerance: float) -> Terms:
 
 
 def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
-    """The same functions on other parameters: columns replaced by their combinations in `matrix` (old, new)."""
+    """The same functions on other parameters: columns replaced by their combinations in `matrix` (old,
+    new)."""
     right = sparse.csr_array(matrix)
     counts = np.diff(right.indptr)[terms.column]
     source = np.repeat(np.arange(len(counts)), counts)

@@ -1,4 +1,5 @@
-"""A unit of length near the robot's size, so that one absolute tolerance means the same for every coefficient.
+"""A unit of length near the robot's size, so that one absolute tolerance means the same for every
+coefficient.
 
 The unit is a power of two: going to it and back changes no bit of any number.
 """

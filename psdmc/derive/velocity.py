@@ -1,6 +1,7 @@
 """Centrifugal and Coriolis terms from the mass matrix, in coefficient space.
 
-tau_i = sum over j, k of (dM_ij/dq_k - 1/2 dM_jk/dq_i) qd_j qd_k: Christoffel's formula before it is made symmetric.
+tau_i = sum over j, k of (dM_ij/dq_k - 1/2 dM_jk/dq_i) qd_j qd_k: Christoffel's formula before it is made
+symmetric.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ _DERIVATIVES: dict[JointKind, tuple[tuple[tuple[int, float], ...], ...]] = {
     "revolute": ((), ((2, 1.0),), ((1, -1.0),), ((4, 2.0), (0, -1.0)), ((3, -2.0),)),
     "prismatic": ((), ((0, 1.0),), ((1, 2.0),)),
 }
-"""By digit: the digits and factors of its derivative. 1' = 0, s' = c, c' = -s, (s c)' = 2 c^2 - 1, (c^2)' = -2 s c."""
+"""By digit: the digits and factors of its derivative. 1' = 0, s' = c, c' = -s, (s c)' = 2 c^2 - 1, (c^2)' =
+-2 s c."""
 
 
 def derivative(terms: Terms, functions: Functions, joint: int) -> Terms:

@@ -22,14 +22,17 @@ class DynamicsModel:
 
     n joints, p functions, l base parameters.
 
-    E            (5n, p) uint8   exponents; row blocks q, sin q, cos q, qd, qdd; None where derived with --no-expand
+    E            (5n, p) uint8   exponents; row blocks q, sin q, cos q, qd, qdd; None where derived with
+    --no-expand
     P            n x (p, l)      sparse reduction matrices (csr), one per joint; None with E
     theta_b      (l,) float      base parameters, SI, units per entry; None while unknown
     B            (l, 11n) float  theta_b = B @ x for standard parameters x within the chain's parameter_span
     chain        the robot: joints, link frames, gravity, limits, standard parameters
-    certificate  (n,)            largest torque error against Newton-Euler on fresh samples, per joint, relative to that
+    certificate  (n,)            largest torque error against Newton-Euler on fresh samples, per joint,
+    relative to that
                                  joint's largest torque there
-    provenance   plain JSON values: source text, its hash and format, options, snapping and its effect, tolerances
+    provenance   plain JSON values: source text, its hash and format, options, snapping and its effect,
+    tolerances
     """
 
     E: NDArray[np.uint8] | None
@@ -69,7 +72,7 @@ class DynamicsModel:
         return len(self.chain)
 
     @property
-    def l(self) -> int:
+    def l(self) -> int:  # noqa: E743  the paper's letter
         """Number of base parameters."""
         return int(self.B.shape[0])
 
@@ -79,14 +82,23 @@ class DynamicsModel:
         return None if self.E is None else int(self.E.shape[1])
 
     @property
+    def pivots(self) -> tuple[int, ...]:
+        """For each base parameter the first standard parameter (index into x) that enters it alone, and as
+        itself."""
+        is_alone = (self.B != 0.0).sum(axis=0) == 1
+        return tuple(int(np.flatnonzero(is_alone & (row == 1.0))[0]) for row in self.B)
+
+    @property
     def representative(self) -> Array:
-        """(11n, l) standard parameters from base parameters: B @ representative = 1, and what it gives lies in the
-        chain's parameter_span: each base parameter sits on the span column whose lead is its pivot, others are zero."""
+        """(11n, l) standard parameters from base parameters, within the chain's parameter_span.
+
+        Each base parameter sits on its pivot, the first column of B that belongs to it alone; the span's
+        other coordinates are zero. B @ representative = 1.
+        """
         leads = np.argmax(self.chain.parameter_span != 0.0, axis=0)
         column_of = {int(row): column for column, row in enumerate(leads)}
-        pivots = np.argmax(self.B != 0.0, axis=1)
         return frozen_array(
-            self.chain.parameter_span[:, [column_of[int(pivot)] for pivot in pivots]],
+            self.chain.parameter_span[:, [column_of[pivot] for pivot in self.pivots]],
             (PARAMETERS_PER_LINK * self.n, self.l),
             "representative",
         )

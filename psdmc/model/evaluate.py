@@ -1,4 +1,5 @@
-"""The MODEL evaluated in NumPy straight from its definition: slow, obvious, and the reference for everything faster."""
+"""The MODEL evaluated in NumPy straight from its definition: slow, obvious, and the reference for everything
+faster."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ CHUNK_BYTES = 64 * 2**20
 
 
 def states(model: DynamicsModel, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
-    """The broadcast leading shape, and each vector as (states, n) float64; InputError where a shape does not fit."""
+    """The broadcast leading shape, and each vector as (states, n) float64; InputError where a shape does not
+    fit."""
     arrays = {name: np.asarray(value, dtype=np.float64) for name, value in vectors.items()}
     for name, array in arrays.items():
         if array.ndim == 0 or array.shape[-1] != model.n:
@@ -43,7 +45,8 @@ def states(model: DynamicsModel, **vectors: ArrayLike) -> tuple[tuple[int, ...],
 
 
 def function_values(model: DynamicsModel, q: Array, qd: Array, qdd: Array) -> Array:
-    """(p, states) values of y from (states, n) arrays: products of the rows of E, gravity functions times |g|."""
+    """(p, states) values of y from (states, n) arrays: products of the rows of E, gravity functions times
+    |g|."""
     exponents = expanded(model)[0]
     rows = np.concatenate([q.T, np.sin(q).T, np.cos(q).T, qd.T, qdd.T])
     strength = np.where(exponents[3 * model.n :].any(axis=0), 1.0, np.linalg.norm(model.chain.gravity))
@@ -73,7 +76,8 @@ def known(model: DynamicsModel) -> Array:
 
 
 def inverse_dynamics(model: DynamicsModel, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-    """tau (..., n), N m or N, from states (..., n). Without E and P by Newton-Euler on the same base parameters."""
+    """tau (..., n), N m or N, from states (..., n). Without E and P by Newton-Euler on the same base
+    parameters."""
     return torques_for(model, known(model), q, qd, qdd)
 
 
