@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -12,6 +11,7 @@ from typing import Any, Literal
 from psdmc.errors import InputError
 from psdmc.robot.chain import JointKind, Limits
 from psdmc.robot.inertia import INERTIA_NAMES
+from psdmc.robot.names import naming_faults
 from psdmc.robot.zeros import ZERO_NAMES
 
 Convention = Literal["standard", "modified"]
@@ -123,9 +123,7 @@ def _robot(value: object, problems: list[str]) -> DhRobot | None:
         problems.append("no [[joint]] in it")
         return None
     joints = tuple(_joint(row, number, problems) for number, row in enumerate(rows, start=1))
-    for name, count in Counter(joint.name for joint in joints).items():
-        if count > 1:
-            problems.append(f"{count} joints are called '{name}'")
+    problems += naming_faults([joint.name for joint in joints], "joint")
     return DhRobot(
         name=table.read("name", _text, "robot"),
         convention=table.read("convention", _one_of("standard", "modified"), "standard"),

@@ -175,6 +175,8 @@ def body_of(parameters: Array) -> pinocchio.Inertia:
 
     Pinocchio divides by the mass: without any, the smallest one stands in, and first moments cannot be had.
     """
+    if not parameters[:DRIVE].any():
+        return pinocchio.Inertia.Zero()
     if parameters[0] == 0.0 and parameters[1:4].any():
         raise ValueError("Pinocchio has no body with a first moment but no mass")
     mass = parameters[0] or float(np.finfo(float).tiny)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
@@ -11,6 +10,7 @@ from xml.etree.ElementTree import Element
 from psdmc.errors import InputError
 from psdmc.robot.chain import Limits
 from psdmc.robot.inertia import INERTIA_NAMES
+from psdmc.robot.names import naming_faults
 from psdmc.robot.xml_text import number, numbers, parse_xml, required_number
 
 Triple = tuple[float, float, float]
@@ -66,6 +66,9 @@ def read_urdf(text: str, source: str) -> UrdfRobot:
     """The file's content; InputError names everything that is wrong with its links and joints at once."""
     root = parse_xml(text, source, "robot")
     problems: list[str] = []
+    for tag in ("link", "joint"):
+        problems += naming_faults([element.get("name", "") for element in root.findall(tag)], tag)
+    _refuse(problems, source, "names tell links and joints apart: correct them")
     inertials: dict[str, UrdfInertial | None] = {}
     joints: list[UrdfJoint] = []
     for element in root.findall("link"):
@@ -78,8 +81,6 @@ def read_urdf(text: str, source: str) -> UrdfRobot:
             joints.append(_joint(element))
         except ValueError as error:
             problems.append(f"joint '{element.get('name', '')}': {error}")
-    for tag in ("link", "joint"):
-        problems += _naming_faults([element.get("name", "") for element in root.findall(tag)], tag)
     _refuse(problems, source, "correct the file")
     if not inertials:
         raise InputError(f"{source}: no <link> in it", "give a URDF with links and joints")
@@ -150,12 +151,6 @@ def _limits(joint: Element, kind: str) -> Limits:
     if lower > upper:
         raise ValueError(f"<limit> lower {lower:g} is above upper {upper:g}")
     return Limits(lower=lower, upper=upper, speed=speed, effort=effort)
-
-
-def _naming_faults(names: Sequence[str], what: str) -> list[str]:
-    counts = Counter(names)
-    nameless = [f"a <{what}> has no name"] if counts[""] else []
-    return nameless + [f"{count} {what}s are called '{name}'" for name, count in counts.items() if count > 1]
 
 
 def _tree_faults(links: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]) -> list[str]:

@@ -1,0 +1,90 @@
+"""URDFs written on the spot, bundled and foreign robot files, and torques to compare."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from psdmc.dynamics.frames import base_acceleration, frames_of
+from psdmc.dynamics.newton_euler import inverse_dynamics
+from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
+from psdmc.robot.chain import Array, Chain
+from psdmc.robot.load import LoadedRobot, load_robot_text
+from psdmc.robot.reference import reference
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "robots"
+
+INERTIAL = (
+    '<inertial><origin xyz="0.1 -0.05 0.2" rpy="0.3 -0.2 0.5"/><mass value="1.5"/>'
+    '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="-0.002" iyz="0.0015"/></inertial>'
+)
+LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="40"/>'
+
+
+def link(name: str, inertial: str = INERTIAL) -> str:
+    return f'<link name="{name}">{inertial}</link>'
+
+
+def joint(
+    name: str,
+    parent: str,
+    child: str,
+    *,
+    kind: str = "revolute",
+    xyz: str = "0.1 0.2 0.3",
+    rpy: str = "0 0 0",
+    axis: str = "0 0 1",
+    extra: str = LIMIT,
+) -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{extra}</joint>'
+    )
+
+
+def urdf(*parts: str, name: str = "arm") -> str:
+    return f'<robot name="{name}">{"".join(parts)}</robot>'
+
+
+def load_urdf(*parts: str, **options: object) -> LoadedRobot:
+    return load_robot_text(urdf(*parts), "urdf", source_name="arm.urdf", **options)  # type: ignore[arg-type]
+
+
+def dh(*rows: str, convention: str = "standard") -> str:
+    """A DH file with one [[joint]] per text of keys."""
+    head = f'name = "arm"\nconvention = "{convention}"\n'
+    return head + "".join(f"[[joint]]\n{row}\n" for row in rows)
+
+
+def load_dh(*rows: str, convention: str = "standard", **options: object) -> LoadedRobot:
+    text = dh(*rows, convention=convention)
+    return load_robot_text(text, "dh", source_name="arm.toml", **options)  # type: ignore[arg-type]
+
+
+def robot_data(name: str) -> Path:
+    """Path of a URDF in the example-robot-data wheel."""
+    try:
+        wheel = importlib.metadata.distribution("example-robot-data")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("example-robot-data is not installed")
+    found = [file for file in wheel.files or () if file.name == name]
+    return Path(str(wheel.locate_file(found[0])))
+
+
+def torques(chain: Chain, q: Array, qd: Array, qdd: Array) -> Array:
+    """psdmc's Newton-Euler on the chain as it stands; states (k, n)."""
+    x = chain.parameters
+    bodies, drives, base = bodies_of(chain, x), drive_inertia_of(x), base_acceleration(chain)
+    return np.array(inverse_dynamics(frames_of(chain), bodies, drives, q.T, qd.T, qdd.T, base)).T
+
+
+def largest_difference(loaded: LoadedRobot, *, snapped: bool, seed: int = 1) -> float:
+    """Between psdmc's and Pinocchio's torques on 50 random states, per joint relative to its largest."""
+    q, qd, qdd = np.random.default_rng(seed).normal(size=(3, 50, len(loaded.chain)))
+    expected = reference(loaded, snapped=snapped).inverse_dynamics(q, qd, qdd)
+    error = np.max(np.abs(torques(loaded.chain, q, qd, qdd) - expected), axis=0)
+    size = np.max(np.abs(expected), axis=0)
+    return float(np.max(error / np.where(size > 0.0, size, 1.0)))
