@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
 
 from psdmc.dynamics.scalar import Scalar
-from psdmc.lower.expanded_diagram import NOTHING, ONE, Diagram, Level
-from psdmc.lower.expanded_orders import cheapest
+from psdmc.lower.expanded_diagram import Diagram, nested_horner, operations, with_constants
+from psdmc.lower.expanded_orders import Joints, base_first, candidates, tip_first
 from psdmc.lower.expanded_terms import (
     Terms,
+    baked_torque_terms,
     gravity_terms,
     joined,
+    known_parameters,
     mass_matrix_terms,
     nonlinear_terms,
     regressor_terms,
     torque_terms,
     with_gravity,
 )
+from psdmc.lower.expanded_values import polynomial_values, row_symbols
 from psdmc.lower.solve import solve_symmetric
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.cost import cost
 from psdmc.program.functions import BY_NAME
 from psdmc.program.pipeline import optimize
 from psdmc.program.program import Program, Slot
@@ -37,26 +43,53 @@ SUPPORTED = (
 Outputs = list[tuple[Slot, Symbol | Number]]
 
 
+TRACED = 3
+"""Diagrams, of those that should be cheapest, that are traced and optimized to find the one that is."""
+
+
 def lower_expanded(model: DynamicsModel, function_name: str, theta: bool) -> Program:
     """The PROGRAM of one function in SUPPORTED; with `theta`, theta_b is an input instead of constants.
 
-    Operations and their order are a choice among a few row orders, by cost, the same on every machine.
-    InputError where the model has no E and P, or its base parameters are needed and unknown.
+    Row order, and whether parameters enter before or after equal parts are found, are chosen by cost, the same on
+    every machine. InputError where the model has no E and P, or its base parameters are needed and unknown.
     """
     if function_name not in SUPPORTED or (theta and not BY_NAME[function_name].theta):
         raise ValueError(f"the expanded lowering does not make {function_name}{'_theta' * theta}")
-    terms = _terms(model, function_name, theta)
-    diagram = cheapest(terms, model.n)
-    tracer = Tracer()
-    values = polynomial_values(diagram, row_symbols(tracer, model, theta))
-    return optimize(tracer.finish(_outputs(tracer, model, function_name, values)))
+    diagrams = sorted(_diagrams(model, function_name, theta), key=lambda d: sum(operations(d)))
+    programs = (_traced(model, function_name, theta, diagram) for diagram in diagrams[:TRACED])
+    return min(programs, key=lambda program: cost(program).total)
 
 
-def _terms(model: DynamicsModel, function_name: str, theta: bool) -> Terms:
+def _diagrams(model: DynamicsModel, function_name: str, theta: bool) -> Iterator[Diagram]:
+    """Candidates. Baked parameters enter either as rows that become constants afterwards - equal parts are then found
+    whatever the parameters' values, and constants sit furthest in - or in the coefficients from the start."""
     n = model.n
     if function_name == "regressor":
-        return with_gravity(regressor_terms(model), model.chain)
-    torque = with_gravity(torque_terms(model, theta), model.chain)
+        yield from _in_all_orders(with_gravity(regressor_terms(model), model.chain), tip_first(n))
+        return
+    symbolic = _part(function_name, with_gravity(torque_terms(model), model.chain), n)
+    if theta:
+        yield from _in_all_orders(symbolic, base_first(n))
+        return
+    values = dict(enumerate(known_parameters(model).tolist(), start=5 * n))
+    present = _without_zero_rows(symbolic, values)
+    yield from (with_constants(diagram, values) for diagram in _in_all_orders(present, base_first(n)))
+    baked = _part(function_name, with_gravity(baked_torque_terms(model), model.chain), n)
+    yield from _in_all_orders(baked, base_first(n))
+
+
+def _in_all_orders(terms: Terms, joints: Joints) -> Iterator[Diagram]:
+    return (nested_horner(terms, order) for order in candidates(joints, len(terms.exponents)))
+
+
+def _without_zero_rows(terms: Terms, values: Mapping[int, float]) -> Terms:
+    """The terms whose parameter is not zero."""
+    zero = [row for row, value in values.items() if value == 0.0]
+    return terms.where(np.asarray(~terms.exponents[zero].any(axis=0)))
+
+
+def _part(function_name: str, torque: Terms, n: int) -> Terms:
+    """The terms of a function's polynomials, out of those of all torques."""
     match function_name:
         case "mass_matrix":
             return mass_matrix_terms(torque, n)
@@ -67,6 +100,12 @@ def _terms(model: DynamicsModel, function_name: str, theta: bool) -> Terms:
         case "forward_dynamics":
             return joined(mass_matrix_terms(torque, n), nonlinear_terms(torque, n), n * n)
     return torque
+
+
+def _traced(model: DynamicsModel, function_name: str, theta: bool, diagram: Diagram) -> Program:
+    tracer = Tracer()
+    values = polynomial_values(diagram, row_symbols(tracer, model, theta))
+    return optimize(tracer.finish(_outputs(tracer, model, function_name, values)))
 
 
 def _outputs(tracer: Tracer, model: DynamicsModel, function_name: str, values: dict[int, Scalar]) -> Outputs:
@@ -89,46 +128,3 @@ def _symmetric(values: dict[int, Scalar], n: int) -> list[list[Scalar]]:
     return [[values.get(min(i, j) * n + max(i, j), 0.0) for j in range(n)] for i in range(n)]
 
 
-def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scalar]:
-    """A value per row of the terms' exponents: q, sin q, cos q, qd, qdd, then theta_b if that is an input."""
-    n = model.n
-    q = tracer.symbols("q", n)
-    sincos = [
-        angle.sincos() if revolute else (0.0, 0.0)
-        for angle, revolute in zip(q, model.chain.is_revolute, strict=True)
-    ]
-    rates = [*tracer.symbols("qd", n), *tracer.symbols("qdd", n)]
-    parameters = tracer.symbols("theta_b", model.l) if theta else []
-    return [*q, *(s for s, _ in sincos), *(c for _, c in sincos), *rates, *parameters]
-
-
-def polynomial_values(diagram: Diagram, rows: Sequence[Scalar]) -> dict[int, Scalar]:
-    """The diagram's polynomials by output number, computed on the rows' values."""
-    nodes: list[Scalar] = [0.0] * (ONE + 1)
-    nodes[ONE] = 1.0
-    for level in diagram.levels:
-        _append_nodes(nodes, level, rows[level.row])
-    return {
-        output: nodes[root] * factor
-        for output, root, factor in zip(
-            diagram.output.tolist(), diagram.root.tolist(), diagram.factor.tolist(), strict=True
-        )
-    }
-
-
-def _append_nodes(nodes: list[Scalar], level: Level, row: Scalar) -> None:
-    for child, ratio in zip(level.child.tolist(), level.ratio.tolist(), strict=True):
-        parts = [None if c == NOTHING else nodes[c] * r for c, r in zip(child, ratio, strict=True)]
-        nodes.append(_horner(parts, row))
-
-
-def _horner(parts: Sequence[Scalar | None], row: Scalar) -> Scalar:
-    """parts[0] + row * (parts[1] + row * parts[2]), where None is nothing."""
-    constant, linear, square = parts
-    if square is None:
-        value = linear * row
-    elif linear is None:
-        value = square * (row * row)
-    else:
-        value = (linear + row * square) * row
-    return value if constant is None else constant + value

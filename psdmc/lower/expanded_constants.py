@@ -14,7 +14,7 @@ SMALLEST_UNCERTAINTY = 1e-15
 
 
 class Constants:
-    """A growing table of magnitudes. `merged` returns each value's entry: equal ones become equal bit for bit.
+    """A growing table of magnitudes. `merged` returns each value's entry: equal values, equal bits.
 
     The most certain values are entered first and stand for the less certain ones near them: no value moves by
     more than its own uncertainty and its entry's, and no doubtful value joins two certain ones.

@@ -9,7 +9,7 @@ and only its factor travels on. (Decision diagrams with multiplicative edge valu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,6 +147,34 @@ class _Groups:
         relative[np.arange(len(value)), self.lead[contains]] = 0.0
         ratio[present] = constants.merged(ratio[present], relative[present])
         return ratio
+
+
+def with_constants(diagram: Diagram, values: Mapping[int, float]) -> Diagram:
+    """The diagram with numbers for some of its innermost rows, whose nodes become factors of the nodes around.
+
+    ValueError where a row that gets a number has one outside it that does not.
+    """
+    inner = [level for level in diagram.levels if level.row in values]
+    outer = diagram.levels[len(inner) :]
+    if any(level.row in values for level in outer):
+        raise ValueError("only the innermost rows can become constants")
+    number = np.array([0.0, 1.0])
+    for level in inner:
+        powers = values[level.row] ** np.arange(3)
+        number = np.concatenate([number, (number[level.child] * level.ratio) @ powers])
+    levels: list[Level] = []
+    for level in outer:
+        child, ratio = _numbers_as_factors(level.child, level.ratio, number)
+        levels.append(Level(level.row, level.first, child, ratio))
+    root, factor = _numbers_as_factors(diagram.root, diagram.factor, number)
+    return Diagram(tuple(levels), diagram.output, root, factor)
+
+
+def _numbers_as_factors(node: Integers, ratio: Array, number: Array) -> tuple[Integers, Array]:
+    """References to nodes that are numbers become references to ONE, or to NOTHING where the number is zero."""
+    is_number = node < len(number)
+    value = np.where(is_number, number[np.where(is_number, node, ONE)], 1.0) * ratio
+    return np.where(is_number, np.where(value == 0.0, NOTHING, ONE), node), value
 
 
 def operations(diagram: Diagram) -> tuple[int, int]:

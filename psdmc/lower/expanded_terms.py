@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,29 +56,26 @@ class Terms:
         )
 
 
-def torque_terms(model: DynamicsModel, theta: bool) -> Terms:
-    """tau[0..n-1]; with `theta` over rows of E and theta_b, else with its values baked in.
+def torque_terms(model: DynamicsModel) -> Terms:
+    """tau[0..n-1] over rows of E and theta_b; InputError where the model was not expanded."""
+    terms, parameter = _stacked(*_expanded(model))
+    one_hot = (np.arange(model.l)[:, None] == parameter).astype(np.uint8)
+    exponents = np.concatenate([terms.exponents, one_hot])
+    return Terms(terms.output, exponents, terms.coefficient, terms.uncertainty)
 
-    InputError where the model was not expanded, or its parameters are to be baked and unknown.
-    """
+
+def baked_torque_terms(model: DynamicsModel) -> Terms:
+    """tau[0..n-1] over rows of E, theta_b in the coefficients; InputError where it is unknown."""
     E, P = _expanded(model)
-    if theta:
-        return _with_parameter_rows(E, P)
-    weights = [sparse.coo_array((matrix @ _known(model)).reshape(-1, 1)) for matrix in P]
-    return _stacked(E, weights)
+    theta_b = known_parameters(model)
+    return _stacked(E, [sparse.coo_array((matrix @ theta_b).reshape(-1, 1)) for matrix in P])[0]
 
 
 def regressor_terms(model: DynamicsModel) -> Terms:
-    """Y[i, k] as output i * l + k."""
-    E, P = _expanded(model)
-    with_rows = _with_parameter_rows(E, P)
-    parameter = np.argmax(with_rows.exponents[E.shape[0] :], axis=0)
-    return Terms(
-        with_rows.output * model.l + parameter,
-        with_rows.exponents[: E.shape[0]],
-        with_rows.coefficient,
-        with_rows.uncertainty,
-    )
+    """Y[i, k] as output i * l + k, over rows of E."""
+    terms, parameter = _stacked(*_expanded(model))
+    output = terms.output * model.l + parameter
+    return Terms(output, terms.exponents, terms.coefficient, terms.uncertainty)
 
 
 def _expanded(model: DynamicsModel) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
@@ -89,7 +87,8 @@ def _expanded(model: DynamicsModel) -> tuple[NDArray[np.uint8], tuple[sparse.csr
     return model.E, model.P
 
 
-def _known(model: DynamicsModel) -> Array:
+def known_parameters(model: DynamicsModel) -> Array:
+    """theta_b, (l,); InputError where it is unknown."""
     if model.theta_b is None:
         raise InputError(
             f"{model.chain.name}: base parameters are unknown and cannot become constants",
@@ -98,29 +97,27 @@ def _known(model: DynamicsModel) -> Array:
     return model.theta_b
 
 
-def _stacked(E: NDArray[np.uint8], weights: list[sparse.coo_array]) -> Terms:
-    """One term per entry of each joint's (p, columns) weights; the uncertainty goes by columns."""
+def _stacked(E: NDArray[np.uint8], weights: Sequence[sparse.sparray]) -> tuple[Terms, Integers]:
+    """One term per entry of each joint's (p, columns) weights, and its column; the uncertainty goes by columns."""
     functions, outputs, columns, values, uncertainties = [], [], [], [], []
     for joint, weight in enumerate(weights):
-        entries = sparse.coo_array(sparse.csr_array(weight))
+        entries = sparse.coo_array(weight)
         value, column = entries.data, entries.col
         largest = np.zeros(weight.shape[1])
         np.maximum.at(largest, column, np.abs(value))
         keep = np.abs(value) > COEFFICIENT_NOISE * largest[column]
         functions.append(entries.row[keep])
-        columns.append(column[keep])
+        columns.append(column[keep].astype(np.int64))
         values.append(value[keep])
         uncertainties.append(COEFFICIENT_NOISE * largest[column[keep]])
         outputs.append(np.full(int(keep.sum()), joint, dtype=np.int64))
-    rows = E[:, np.concatenate(functions)]
-    if weights[0].shape[1] > 1:
-        one_hot = np.arange(weights[0].shape[1])[:, None] == np.concatenate(columns)
-        rows = np.concatenate([rows, one_hot.astype(np.uint8)])
-    return Terms(np.concatenate(outputs), rows, np.concatenate(values), np.concatenate(uncertainties))
-
-
-def _with_parameter_rows(E: NDArray[np.uint8], P: tuple[sparse.csr_array, ...]) -> Terms:
-    return _stacked(E, [sparse.coo_array(matrix) for matrix in P])
+    terms = Terms(
+        np.concatenate(outputs),
+        E[:, np.concatenate(functions)],
+        np.concatenate(values),
+        np.concatenate(uncertainties),
+    )
+    return terms, np.concatenate(columns)
 
 
 def mass_matrix_terms(torque: Terms, n: int) -> Terms:

@@ -38,7 +38,7 @@ class Slot(NamedTuple):
     """One entry of a named vector: an input to load or an output to store."""
 
     vector: str
-    index: int
+    index: int  # type: ignore[assignment]  # a tuple's method, which nothing here calls
 
     def __str__(self) -> str:
         return f"{self.vector}[{self.index}]"
@@ -53,12 +53,12 @@ class Instr(NamedTuple):
     value: float | None = None
 
     def renumbered(self, new_index: list[int] | dict[int, int]) -> Instr:
-        return self._replace(args=tuple(new_index[a] for a in self.args)) if self.args else self
+        return Instr(self.op, tuple([new_index[a] for a in self.args])) if self.args else self
 
     def canonical(self) -> Instr:
         """The same instruction with commutative arguments in ascending order."""
         if self.op in COMMUTATIVE and self.args[0] > self.args[1]:
-            return self._replace(args=(self.args[1], self.args[0]))
+            return Instr(self.op, self.args[::-1])
         return self
 
 

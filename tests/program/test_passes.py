@@ -212,6 +212,16 @@ def test_a_product_that_something_else_needs_is_no_part_of_the_sum():
     assert factor_common(before) == drop_unused(before)
 
 
+def test_a_factor_that_stands_alone_in_the_sum_is_not_taken_out():
+    before = parse(LOADS + "x = mul a b\ny = mul a c\ns = add x a\nt = add s y\nu = add t d\nout tau[0] = u")
+
+    after = factor_common(before)
+
+    # a (b + c) + a + d
+    assert (cost(after).mul, cost(after).add) == (1, 3)
+    assert lines(after)[4:6] == ["t4 = add t1 t2", "t5 = mul t0 t4"]
+
+
 def test_a_sum_of_negative_terms_only_keeps_its_sign(outputs: Outputs):
     before = parse(LOADS + "x = mul a b\ny = mul a c\nz = sub d x\nw = sub z y\nout tau[0] = w")
 

@@ -18,6 +18,10 @@ class _Term:
     sign: int
     factors: tuple[int | _Sum, ...]
 
+    def is_product_with(self, factor: int) -> bool:
+        """Whether something is left without the factor; a * b + a gains nothing as a * (b + 1)."""
+        return len(self.factors) > 1 and factor in self.factors
+
     def without(self, factor: int) -> _Term:
         position = self.factors.index(factor)
         return _Term(self.sign, self.factors[:position] + self.factors[position + 1 :])
@@ -96,8 +100,8 @@ def _grouped(terms: tuple[_Term, ...]) -> tuple[_Term, ...]:
     remaining = list(enumerate(terms))
     done: list[tuple[int, _Term]] = []
     while (factor := _most_frequent([term for _, term in remaining])) is not None:
-        sharing = [(at, term) for at, term in remaining if factor in term.factors]
-        remaining = [(at, term) for at, term in remaining if factor not in term.factors]
+        sharing = [(at, term) for at, term in remaining if term.is_product_with(factor)]
+        remaining = [(at, term) for at, term in remaining if not term.is_product_with(factor)]
         sign = sharing[0][1].sign
         inner = _grouped(tuple(_Term(t.sign * sign, t.without(factor).factors) for _, t in sharing))
         bracket = inner[0].factors if len(inner) == 1 and inner[0].sign == 1 else (_Sum(inner),)

@@ -1,0 +1,55 @@
+"""A diagram's polynomials computed on values of its rows: symbols, which record the PROGRAM, or numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.scalar import Scalar
+from psdmc.lower.expanded_diagram import NOTHING, ONE, Diagram, Level
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.trace import Tracer
+
+
+def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scalar]:
+    """A value per row of the terms' exponents: q, sin q, cos q, qd, qdd, then theta_b if that is an input."""
+    n = model.n
+    q = tracer.symbols("q", n)
+    sincos = [
+        angle.sincos() if revolute else (0.0, 0.0)
+        for angle, revolute in zip(q, model.chain.is_revolute, strict=True)
+    ]
+    rates = [*tracer.symbols("qd", n), *tracer.symbols("qdd", n)]
+    parameters = tracer.symbols("theta_b", model.l) if theta else []
+    return [*q, *(s for s, _ in sincos), *(c for _, c in sincos), *rates, *parameters]
+
+
+def polynomial_values(diagram: Diagram, rows: Sequence[Scalar]) -> dict[int, Scalar]:
+    """The diagram's polynomials by output number, computed on the rows' values."""
+    nodes: dict[int, Scalar] = {ONE: 1.0}
+    for level in diagram.levels:
+        _compute_level(nodes, level, rows[level.row])
+    return {
+        output: nodes[root] * factor
+        for output, root, factor in zip(
+            diagram.output.tolist(), diagram.root.tolist(), diagram.factor.tolist(), strict=True
+        )
+    }
+
+
+def _compute_level(nodes: dict[int, Scalar], level: Level, row: Scalar) -> None:
+    parts = zip(level.child.tolist(), level.ratio.tolist(), strict=True)
+    for number, (child, ratio) in enumerate(parts, start=level.first):
+        scaled = [None if c == NOTHING else nodes[c] * r for c, r in zip(child, ratio, strict=True)]
+        nodes[number] = _horner(scaled, row)
+
+
+def _horner(parts: Sequence[Scalar | None], row: Scalar) -> Scalar:
+    """parts[0] + row * (parts[1] + row * parts[2]), where None is nothing."""
+    constant, linear, square = parts
+    if square is None:
+        value = linear * row
+    elif linear is None:
+        value = square * (row * row)
+    else:
+        value = (linear + row * square) * row
+    return value if constant is None else constant + value
