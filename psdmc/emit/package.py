@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from psdmc.emit.describe import description
 from psdmc.emit.info import PackageInfo
 from psdmc.emit.kernel_view import FunctionView, function_views
+from psdmc.emit.lanes import VectorWidth, vector_widths
 from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
@@ -70,8 +71,14 @@ class PackageView:
     @property
     def trig_vectors(self) -> tuple[VectorTrig, ...]:
         """The inline sincos for each vector width that internal.h may choose."""
-        widths = (self.lanes, self.lanes // 2, self.lanes // 4)
-        return tuple(vector_trig(self.robot, self.real, w, vec="lanes", ivec="lane_bits") for w in widths)
+        return tuple(
+            vector_trig(self.robot, self.real, width.lanes, vec="lanes", ivec="lane_bits")
+            for width in self.widths
+        )
+
+    @property
+    def widths(self) -> tuple[VectorWidth, ...]:
+        return vector_widths(self.options)
 
     @property
     def has_vectors(self) -> str:
@@ -168,6 +175,7 @@ def library_files(package: PackageView) -> dict[str, str]:
         f"include/{package.robot}/{package.robot}.h": "header.h.jinja",
         "src/tables.c": "tables.c.jinja",
         "src/internal.h": "internal.h.jinja",
+        "src/vectors.h": "vectors.h.jinja",
         "src/sincos.h": trig,
         "src/one_state.h": "one_state.h.jinja",
         "src/lane_states.h": "lane_states.h.jinja",

@@ -1,0 +1,46 @@
+"""The vectors of the generated C: which widths there are, and how a square of them is transposed in registers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from psdmc.emit.options import EmitOptions
+
+
+@dataclass(frozen=True, slots=True)
+class TransposeStage:
+    """One step of Eklundh's transposition: vectors i and i + distance exchange blocks of `distance` lanes.
+
+    first, second  lanes of the pair (0 ... 2 width - 1) that the new vectors i and i + distance consist of
+    """
+
+    distance: int
+    first: str
+    second: str
+
+
+@dataclass(frozen=True, slots=True)
+class VectorWidth:
+    """One vector size that the target may have: reals per vector, bytes, and the integer as wide as a real."""
+
+    lanes: int
+    bytes: int
+    integer: str
+
+    @property
+    def stages(self) -> tuple[TransposeStage, ...]:
+        """The steps that transpose `lanes` vectors of `lanes` reals."""
+        distances = [1 << k for k in range(self.lanes.bit_length() - 1)]
+        return tuple(_stage(self.lanes, distance) for distance in distances)
+
+
+def vector_widths(options: EmitOptions) -> tuple[VectorWidth, ...]:
+    """64, 32 and 16 bytes, widest first."""
+    size, integer = (8, "long long") if options.real == "float64" else (4, "int")
+    return tuple(VectorWidth(width // size, width, integer) for width in (64, 32, 16))
+
+
+def _stage(width: int, distance: int) -> TransposeStage:
+    first = [k - distance + width if k & distance else k for k in range(width)]
+    second = [k + width if k & distance else k + distance for k in range(width)]
+    return TransposeStage(distance, ", ".join(map(str, first)), ", ".join(map(str, second)))
