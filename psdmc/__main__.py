@@ -1,0 +1,5 @@
+"""python -m psdmc"""
+
+from psdmc.cli import main
+
+main()

@@ -1,0 +1,168 @@
+"""The command line: arguments, progress, the error boundary. No mathematics."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from psdmc import compiler
+from psdmc.errors import InputError, InternalError, PsdmcError
+from psdmc.model.store import load
+from psdmc.robot.load import DEFAULT_SNAP
+from psdmc.toolchain.build_package import build_package
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="A compiler for robot dynamics: a robot in; small, fast, verified C out.",
+)
+
+INTERNAL_STATUS = 70
+INTERRUPTED_STATUS = 130
+
+RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="URDF, or DH table (.toml)")]
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="model file made by psdmc derive (.npz)")]
+
+
+@app.callback()
+def options(debug: Annotated[bool, typer.Option("--debug", help="show tracebacks")] = False) -> None:
+    """Options before the command."""
+
+
+@app.command()
+def derive(
+    robot: RobotFile,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="MODEL.npz")] = None,
+    base: Annotated[str | None, typer.Option(metavar="LINK", help="link that the chain starts at")] = None,
+    tip: Annotated[str | None, typer.Option(metavar="LINK", help="link that it ends at")] = None,
+    gravity: Annotated[
+        tuple[float, float, float] | None, typer.Option(metavar="GX GY GZ", help="m/s^2 in the file's root frame")
+    ] = None,
+    drive_inertia: Annotated[
+        str | None,
+        typer.Option(metavar="I1,I2,...", help="joints' drive inertias as parameters, kg m^2; 'all': values zero"),
+    ] = None,
+    assume_zero: Annotated[
+        str, typer.Option(metavar="NAME,...", help="parameters assumed zero, such as link5:mx,link5:Ixz@com")
+    ] = "",
+    snap: Annotated[
+        float, typer.Option(metavar="RAD", help="make rotations exact that are this near to exact; 0: off")
+    ] = DEFAULT_SNAP,
+    expand: Annotated[bool, typer.Option("--expand/--no-expand", help="derive E and P beside theta_b")] = True,
+) -> None:
+    """Derive a robot's model (E, P, theta_b) and save it."""
+    with steps() as progress:
+        model = compiler.derive(
+            robot,
+            base,
+            tip,
+            gravity,
+            _drive_inertia(drive_inertia),
+            tuple(name.strip() for name in assume_zero.split(",") if name.strip()),
+            snap,
+            expand,
+            progress,
+        )
+    target = output or Path(robot.stem + ".npz")
+    model.save(target)
+    sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"
+    print(f"{target}: {model.n} joints, {sizes}, largest torque error {model.certificate.max():.1e}")
+    for note in model.chain.notes:
+        print(f"note: {note}")
+
+
+def _drive_inertia(text: str | None) -> bool | tuple[float, ...]:
+    if text is None:
+        return False
+    if text == "all":
+        return True
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise InputError(
+            f"--drive-inertia is {text!r}", "give numbers separated by commas, one a joint, or 'all'"
+        ) from None
+
+
+@app.command(name="emit-c")
+def emit_c(
+    model: ModelFile,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR")],
+    lowering: Annotated[str, typer.Option(help="auto, expanded or factored")] = "auto",
+    functions: Annotated[
+        str, typer.Option(metavar="NAME,...", help="generate these functions only")
+    ] = "",
+    real: Annotated[str, typer.Option(help="float64 or float32")] = "float64",
+    trig: Annotated[str, typer.Option(help="inline or libm")] = "inline",
+    name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
+    force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
+) -> None:
+    """Write a model's C package: header, sources, build files, self-test."""
+    with steps() as progress:
+        changed = compiler.emit_c(
+            load(model),
+            output,
+            lowering,  # type: ignore[arg-type]
+            [word.strip() for word in functions.split(",") if word.strip()] or None,
+            real,  # type: ignore[arg-type]
+            trig,  # type: ignore[arg-type]
+            name,
+            force,
+            progress,
+        )
+    print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
+
+
+@app.command()
+def build(directory: Annotated[Path, typer.Argument(metavar="DIR", help="folder made by emit-c")]) -> None:
+    """Build an emitted package through its own build files and run its self-test."""
+    with steps() as progress:
+        progress("building")
+        said = build_package(directory)
+    print(said.strip().splitlines()[-1] if said.strip() else f"{directory}: built, self-test passed")
+
+
+@contextmanager
+def steps() -> Iterator[Callable[[str], None]]:
+    """A line on standard error that shows the step under way, where that is a terminal."""
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=None)
+        yield lambda step: progress.update(task, description=step)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line; errors become one line, a hint and an exit status."""
+    words = sys.argv[1:] if arguments is None else arguments
+    try:
+        app(words)
+    except PsdmcError as error:
+        _fail(words, error.message, error.hint, error.exit_status)
+    except InternalError as error:
+        _fail(words, f"internal: {error}", "this is a bug in psdmc: please report it", INTERNAL_STATUS)
+    except KeyboardInterrupt:
+        _fail(words, "interrupted", None, INTERRUPTED_STATUS)
+
+
+def _fail(words: list[str], message: str, hint: str | None, status: int) -> None:
+    """Print and leave; inside an `except`, so that --debug can show where it came from."""
+    if "--debug" in words:
+        raise
+    print("error: " + _one_line(message), file=sys.stderr)
+    if hint:
+        print("hint: " + _one_line(hint), file=sys.stderr)
+    sys.exit(status)
+
+
+def _one_line(text: Any) -> str:
+    """Untrusted text on one line of a terminal: control characters escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text))

@@ -1,0 +1,150 @@
+"""The whole pipeline, top to bottom: robot -> derive -> lower -> emit -> toolchain. Start reading here."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from psdmc.derive.derive import derive_model
+from psdmc.derive.snap_effect import snap_effect
+from psdmc.emit.info import package_info
+from psdmc.emit.options import EmitOptions, Real, Trig
+from psdmc.emit.package import PackageView, package_files, package_view
+from psdmc.emit.references import References
+from psdmc.emit.write import write_package
+from psdmc.errors import InputError
+from psdmc.lower.kernels import Lowering, lower
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.load import DEFAULT_SNAP, LoadedRobot, load_robot
+from psdmc.toolchain.call import CompiledRobot
+from psdmc.toolchain.compile import compile_library
+
+Progress = Callable[[str], None]
+
+REFERENCE_STATES = 16
+"""States that an emitted package's self-test checks."""
+
+
+def silent(step: str) -> None:
+    """Nobody listens."""
+
+
+def derive(
+    robot: str | Path,
+    base: str | None = None,
+    tip: str | None = None,
+    gravity: Sequence[float] | None = None,
+    drive_inertia: bool | Sequence[float] = False,
+    assume_zero: Sequence[str] = (),
+    snap: float = DEFAULT_SNAP,
+    expand: bool = True,
+    progress: Progress = silent,
+) -> DynamicsModel:
+    """A robot file (URDF, or DH table in TOML) to its model (E, P, theta_b), certified.
+
+    base, tip      links that the chain starts and ends at; None: the root, the end of the longest chain
+    gravity        m/s^2 in the file's root frame; None: the file's own, or (0, 0, -9.81)
+    drive_inertia  the joints' drive inertias are parameters: True, or one value a joint, kg m^2 (kg)
+    assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com"
+    snap           rad; constant rotations this near to one with exact zeros become it; 0 turns it off
+    expand         False leaves E and P out, for chains whose functions would not fit
+    Raises InputError for a wrong file or option, DerivationError where the model does not fit.
+    """
+    progress("reading the robot")
+    loaded = load_robot(
+        robot,
+        base=base,
+        tip=tip,
+        gravity=gravity,
+        drive_inertia=drive_inertia,
+        assume_zero=assume_zero,
+        snap=snap,
+    )
+    return derive_model(loaded.chain, expand=expand, progress=progress, provenance=provenance(loaded))
+
+
+def provenance(loaded: LoadedRobot) -> dict[str, Any]:
+    """Where a model comes from, as plain JSON values: enough to read the source again."""
+    effect = snap_effect(loaded.chain, loaded.unsnapped().chain) if loaded.snap_report else None
+    return {
+        "source_text": loaded.source_text,
+        "source_sha256": hashlib.sha256(loaded.source_text.encode()).hexdigest(),
+        "source_format": loaded.source_format,
+        "source_name": loaded.source_name,
+        "options": loaded.options.as_json(),
+        "snapped": [{"where": snap.where, "angle_rad": snap.angle} for snap in loaded.snap_report],
+        "snap_torque_change": None if effect is None else effect.tolist(),
+    }
+
+
+def emit_c(
+    model: DynamicsModel,
+    directory: str | Path,
+    lowering: Lowering = "auto",
+    functions: Sequence[str] | None = None,
+    real: Real = "float64",
+    trig: Trig = "inline",
+    name: str | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> list[str]:
+    """Write the model's C package; returns the files that changed.
+
+    lowering   which arithmetic: "auto" takes the cheaper per function
+    functions  names of functions to generate; None: all that the model admits
+    real       precision of the package
+    trig       sine and cosine "inline", for all joints at once, or from "libm"
+    name       the robot's name in C; None: the robot's own
+    force      whether to overwrite files that psdmc did not write
+    """
+    package = _package(model, lowering, functions, EmitOptions(real, trig), name, progress)
+    progress("writing")
+    return write_package(directory, package_files(package), force)
+
+
+def compile(
+    model: DynamicsModel,
+    lowering: Lowering = "auto",
+    functions: Sequence[str] | None = None,
+    real: Real = "float64",
+    trig: Trig = "inline",
+    progress: Progress = silent,
+) -> CompiledRobot:
+    """The model's functions, compiled for this machine and callable on NumPy arrays; cached by content."""
+    package = _package(model, lowering, functions, EmitOptions(real, trig), None, progress)
+    progress("compiling")
+    return CompiledRobot(package, compile_library(package))
+
+
+def _package(
+    model: DynamicsModel,
+    lowering: Lowering,
+    functions: Sequence[str] | None,
+    options: EmitOptions,
+    name: str | None,
+    progress: Progress,
+) -> PackageView:
+    _choose("lowering", lowering, ("auto", "expanded", "factored"))
+    _choose("real", options.real, ("float64", "float32"))
+    _choose("trig", options.trig, ("inline", "libm"))
+    kernels = lower(model, lowering, functions, progress)
+    shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
+    return package_view(package_info(model, name, shown), kernels, options, references(model))
+
+
+def _choose(option: str, value: str, allowed: Sequence[str]) -> None:
+    if value not in allowed:
+        raise InputError(f"{option} is {value!r}", f"choose one of {', '.join(allowed)}")
+
+
+def references(model: DynamicsModel) -> References | None:
+    """States and torques, from the MODEL, that a package's self-test checks; None while theta_b is unknown."""
+    if model.theta_b is None:
+        return None
+    rng = np.random.default_rng(2021)
+    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (REFERENCE_STATES, model.n)) for limit in (np.pi, 3.0, 5.0))
+    return References(q, qd, qdd, model.inverse_dynamics(q, qd, qdd))

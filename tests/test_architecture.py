@@ -1,0 +1,92 @@
+"""Imports run one way: the table of CONTRIBUTING, held against the sources with ast."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parent.parent / "psdmc"
+
+MAY_IMPORT = {
+    "robot": set(),
+    "dynamics": {"robot"},
+    "model": {"robot", "dynamics"},
+    "derive": {"robot", "dynamics", "model"},
+    "program": set(),
+    "lower": {"robot", "dynamics", "model", "program"},
+    "emit": {"program", "model"},
+    "toolchain": {"emit", "program"},
+}
+LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
+MAY_IMPORT |= {
+    "bench": LEFT_OF_TOOLS | {"lower"},
+    "calibrate": LEFT_OF_TOOLS,
+    "report": LEFT_OF_TOOLS | {"bench", "calibrate"},
+    "compiler": set(MAY_IMPORT),
+    "cli": LEFT_OF_TOOLS | {"bench", "calibrate", "report"},
+}
+
+OUTSIDE = {
+    "robot": {"numpy", "pinocchio", "defusedxml"},
+    "dynamics": {"numpy"},
+    "model": {"numpy", "scipy"},
+    "derive": {"numpy", "scipy"},
+    "program": {"numpy"},
+    "lower": {"numpy", "scipy"},
+    "emit": {"jinja2", "numpy"},
+    "toolchain": {"cffi", "numpy"},
+    "bench": {"numpy", "scipy", "pinocchio", "cffi", "jinja2", "casadi", "mujoco", "cmeel", "example_robot_data"},
+    "calibrate": {"numpy", "scipy", "pinocchio", "cvxpy", "cma", "rosbags", "pyarrow", "cffi", "jinja2"},
+    "report": {"numpy", "matplotlib", "jinja2"},
+    "compiler": {"numpy"},
+    "cli": {"typer", "rich", "numpy"},
+}
+
+SHARED = {"errors"}
+ENTRY_POINTS = {"__init__", "__main__"}
+
+
+def modules() -> Iterator[tuple[str, Path]]:
+    for path in sorted(PACKAGE.rglob("*.py")):
+        inside = path.relative_to(PACKAGE)
+        stage = inside.parts[0].removesuffix(".py")
+        if stage not in ENTRY_POINTS:
+            yield stage, path
+
+
+def imported(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            yield node.module or ""
+            yield from (f"{node.module}.{alias.name}" for alias in node.names if node.module == "psdmc")
+
+
+@pytest.mark.parametrize(("stage", "path"), modules(), ids=lambda value: getattr(value, "name", value))
+def test_imports_run_one_way(stage: str, path: Path):
+    for name in imported(path):
+        head, _, rest = name.partition(".")
+        if head == "psdmc":
+            if not rest:
+                continue
+            other = rest.split(".")[0]
+            allowed = MAY_IMPORT.get(stage, set()) | SHARED | {stage}
+            assert other in allowed, f"{path.relative_to(PACKAGE)} imports {name}: {stage} may not import {other}"
+        elif head not in sys.stdlib_module_names:
+            assert head in OUTSIDE.get(stage, set()), f"{path.relative_to(PACKAGE)} imports {head}, which {stage} does not own"
+
+
+def test_every_folder_is_a_stage_of_the_table():
+    folders = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"}
+    assert folders <= set(MAY_IMPORT)
+
+
+def test_no_vague_module_names():
+    vague = {"utils", "helpers", "common", "build", "misc"}
+    assert not [path for _, path in modules() if path.parent.name in vague or path.stem in {"utils", "helpers", "common"}]
