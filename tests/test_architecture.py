@@ -68,7 +68,7 @@ def imported(path: Path) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names if node.module == "psdmc")
 
 
-@pytest.mark.parametrize(("stage", "path"), modules(), ids=lambda value: getattr(value, "name", value))
+@pytest.mark.parametrize(("stage", "path"), list(modules()), ids=lambda value: getattr(value, "name", value))
 def test_imports_run_one_way(stage: str, path: Path):
     for name in imported(path):
         head, _, rest = name.partition(".")

@@ -25,6 +25,9 @@ ALL_FUNCTIONS = tuple(function.name for function in FUNCTIONS)
 
 REGRESSORS = ("regressor", "regressor_slotine_li")
 
+GEOMETRY = "inverse_dynamics"
+"""The function whose search decides where frames sit and the unit of length, for all functions."""
+
 SHARED = {"nonlinear_effects": "inverse_dynamics", "gravity": "inverse_dynamics", "coriolis_matrix": "inverse_dynamics"}
 """Functions that run another's recursion: its arrangement is taken over, only the choices in it are made anew."""
 
@@ -120,7 +123,8 @@ class _Lowered:
 
     def _arrangement(self, name: str, theta: bool) -> Arrangement:
         if (name, theta) not in self._arrangements:
-            self._arrangements[name, theta] = self._search(theta).best(name, SINGLE)
+            start = None if name == GEOMETRY else self._arrangement(GEOMETRY, theta)
+            self._arrangements[name, theta] = self._search(theta).best(name, SINGLE, start)
         return self._arrangements[name, theta]
 
     def _search(self, theta: bool) -> Search:

@@ -67,12 +67,15 @@ class Search:
         self.chain, self.representative, self.theta_b, self.budget = chain, representative, theta_b, budget
         self._spaces: dict[tuple[Foot, ...], tuple[Reframed, CarrierSpace]] = {}
 
-    def best(self, name: str, target: Target) -> Arrangement:
-        """The cheapest arrangement found for one function."""
+    def best(self, name: str, target: Target, start: Arrangement | None = None) -> Arrangement:
+        """The cheapest arrangement found for one function; `start` is one found for another, whose geometry stays."""
         descent = _Descent(lambda a: trace_dynamics(name, a, self.theta_b), target, self.budget)
-        for candidate in all_feet(self.chain):
-            descent.consider(self.starts(candidate))
-        descent.consider(self._units(descent.arrangement))
+        if start is not None:
+            descent.consider(replace(start, choices=choices) for choices in ALL_CHOICES)
+        else:
+            for candidate in all_feet(self.chain):
+                descent.consider(self.starts(candidate))
+            descent.consider(self._units(descent.arrangement))
         while descent.consider(self._exchanges(descent.arrangement)):
             pass
         return descent.arrangement
