@@ -1,0 +1,74 @@
+"""A compiled package's C functions, called as they are: any variant, on raw arrays."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import cffi
+import numpy as np
+
+from psdmc.emit.package import PackageView, library_files
+from psdmc.program.interpret import interpret
+from psdmc.program.kernel import Kernel
+
+
+def write_sources(package: PackageView, folder: Path) -> Path:
+    for path, text in library_files(package).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text)
+    return folder
+
+
+def shared_library(package: PackageView, folder: Path, flags: Sequence[str]) -> Path:
+    write_sources(package, folder)
+    sources = [str(folder / source) for source in package.sources]
+    library = folder / "library.so"
+    words = ["gcc", "-std=c99", *flags, "-fPIC", "-shared", f"-I{folder}/include", *sources, "-lm"]
+    subprocess.run([*words, "-o", str(library)], check=True)
+    return library
+
+
+class Direct:
+    """`call(symbol suffix, arguments)`; arrays become pointers, everything else goes through."""
+
+    def __init__(self, package: PackageView, library: Path) -> None:
+        self.ffi = cffi.FFI()
+        self.ffi.cdef(package.cdef)
+        self.library = self.ffi.dlopen(str(library))
+        self.package = package
+
+    def __call__(self, name: str, *arguments: object) -> object:
+        return getattr(self.library, f"{self.package.robot}_{name}")(*map(self._plain, arguments))
+
+    def _plain(self, argument: object) -> object:
+        if isinstance(argument, np.ndarray):
+            return self.ffi.from_buffer(f"{self.package.real} *", argument)
+        return argument
+
+
+def states(kernel: Kernel, count: int, n: int, l: int, seed: int = 7) -> dict[str, np.ndarray]:
+    """Random inputs of a kernel, rows of n; theta_b (l,) where it takes one."""
+    random = np.random.default_rng(seed)
+    given = {name: random.normal(size=(count, n)) for name in kernel.function.inputs}
+    if kernel.theta:
+        given["theta_b"] = random.normal(size=l)
+    return given
+
+
+def expected(kernel: Kernel, given: Mapping[str, np.ndarray], n: int, l: int) -> np.ndarray:
+    """The interpreted PROGRAM's output, one row per state; NaN where a pivot is not positive."""
+    output = kernel.function.output
+    sizes = {output: kernel.function.size(n, l), "pivot": n if kernel.function.pivots else 0}
+    values = interpret(kernel.single, given, sizes)
+    rows = values[output]
+    if kernel.function.pivots:
+        rows[~(values["pivot"] > 0).all(axis=-1)] = np.nan
+    return rows
+
+
+def error(found: np.ndarray, reference: np.ndarray) -> float:
+    """Largest difference relative to the largest reference value; NaN must meet NaN."""
+    assert np.array_equal(np.isnan(found), np.isnan(reference))
+    return float(np.nanmax(np.abs(found - reference), initial=0.0) / np.nanmax(np.abs(reference), initial=1e-300))
