@@ -17,7 +17,8 @@ from psdmc.derive.terms import Terms
 Array = NDArray[np.float64]
 
 PIVOT_TOLERANCE = 1e-10
-"""A column whose share left by earlier pivots is below this depends on them; rounding leaves some 1e-14."""
+"""A column whose share left by earlier pivots is below this depends on them; one below this share of the longest
+column has no effect. Rounding leaves some 1e-14."""
 
 PIVOT_SHARES = (*(0.5**k for k in range(1, 11)), PIVOT_TOLERANCE)
 """The parameters are gone through once for each of these, in their own order: a parameter becomes a pivot
@@ -82,6 +83,7 @@ def reduced(factor: Array) -> Reduction:
     """
     work = np.array(factor)
     norms = np.linalg.norm(work, axis=0)
+    work[:, norms <= PIVOT_TOLERANCE * norms.max(initial=0.0)] = 0.0
     pivots: list[int] = []
     for share in PIVOT_SHARES:
         for column in range(work.shape[1]):
@@ -104,7 +106,8 @@ def _back_substituted(rows: Array, pivots: NDArray[np.int64]) -> Reduction:
     echelon = np.zeros(rows.shape)
     if len(pivots):
         echelon[:] = np.linalg.solve(np.triu(rows[:, pivots]), rows)
-    echelon[np.abs(echelon) < ECHELON_TOLERANCE] = 0.0
+    largest = np.abs(echelon).max(axis=1, keepdims=True, initial=0.0)
+    echelon[np.abs(echelon) < ECHELON_TOLERANCE * largest] = 0.0
     echelon[:, pivots] = np.eye(len(pivots))
     order = np.argsort(pivots)
     return Reduction(pivots[order], echelon[order])

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from psdmc.model import evaluate
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, frozen_array
+from psdmc.model import equations, evaluate, payload
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement, frozen_array
 
 Array = NDArray[np.float64]
 
@@ -122,3 +123,31 @@ class DynamicsModel:
     def gravity(self, q: ArrayLike) -> Array:
         """g(q), (..., n)."""
         return evaluate.gravity(self, q)
+
+    @property
+    def base_parameters(self) -> tuple[equations.BaseParameter, ...]:
+        """Equation, unit and value of each entry of theta_b."""
+        return equations.base_parameters(self)
+
+    @property
+    def content_hash(self) -> str:
+        """SHA-256 of everything that a model file holds."""
+        from psdmc.model.store import content_hash  # the store builds models: it cannot be imported first
+
+        return content_hash(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write a model file; see psdmc.model.store."""
+        from psdmc.model.store import save
+
+        save(self, path)
+
+    def with_payload(
+        self,
+        mass: float,
+        com: ArrayLike,
+        inertia: ArrayLike | None = None,
+        frame: Placement | str | None = None,
+    ) -> DynamicsModel:
+        """The model with a rigid load on its last link; see psdmc.model.payload."""
+        return payload.with_payload(self, mass, com, inertia, frame)

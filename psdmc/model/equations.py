@@ -1,0 +1,146 @@
+"""Base parameters as equations in standard parameters: "m2 + mx2/a2 - mx3/a3", with unit and value.
+
+Standard parameters are named by their joint's number from the base, about the link frames: m2, mx2, Ixx3,
+Im1. Where the robot is a DH table its lengths have names too: a coefficient that is a length, its square, a
+product or quotient of two, or one of these upside down, is written so; every other number is printed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.robot.chain import PARAMETER_NAMES, PARAMETERS_PER_LINK, Chain, Joint
+
+if TYPE_CHECKING:
+    from psdmc.model.dynamics_model import DynamicsModel
+
+Array = NDArray[np.float64]
+
+RECOGNITION = 1e-9
+"""Relative difference up to which a coefficient is taken for a named one. Display only: the numbers stay."""
+
+DIGITS = 6
+"""Significant digits of the coefficients that have no name."""
+
+_UNITS = ("kg", "kg m", "kg m^2")
+_LENGTH_ORDER = (0, 1, 1, 1, 2, 2, 2, 2, 2, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class BaseParameter:
+    """One base parameter.
+
+    equation   in standard parameters about the link frames
+    unit       kg, kg m or kg m^2
+    value      SI; None while unknown
+    """
+
+    equation: str
+    unit: str
+    value: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """A number with a name; `order` is its exponent of metre."""
+
+    value: float
+    order: int
+    before: str
+    after: str
+
+
+def base_parameters(model: DynamicsModel) -> tuple[BaseParameter, ...]:
+    """Equation, unit and value of each entry of theta_b."""
+    known = list(_known_numbers(dh_lengths(model.chain)))
+    values = [None] * model.l if model.theta_b is None else model.theta_b.tolist()
+    return tuple(
+        BaseParameter(_equation(row, pivot, model.chain, known), _unit(pivot, model.chain), value)
+        for row, pivot, value in zip(model.B, model.pivots, values, strict=True)
+    )
+
+
+def standard_name(index: int) -> str:
+    """Name of entry `index` of x, by joint number: m2, Ixx3, Im1."""
+    joint, parameter = divmod(index, PARAMETERS_PER_LINK)
+    return f"{PARAMETER_NAMES[parameter]}{joint + 1}"
+
+
+def dh_lengths(chain: Chain) -> dict[str, float]:
+    """a and d of a DH table by name, zeros left out; empty for a URDF."""
+    lengths: dict[str, float] = {}
+    for number, joint in enumerate(chain.joints, start=1):
+        for name, value in _row_lengths(joint, chain.convention):
+            if value != 0.0:
+                lengths[f"{name}{number}"] = value
+    return lengths
+
+
+def _row_lengths(joint: Joint, convention: str) -> list[tuple[str, float]]:
+    if convention == "standard":
+        x, _, z = joint.link_frame.translation.tolist()
+        return [("a", x), ("d", z)]
+    if convention == "modified":
+        place = joint.placement
+        return [("a", float(place.translation[0])), ("d", float(place.rotation[:, 2] @ place.translation))]
+    return []
+
+
+def _order(index: int, chain: Chain) -> int:
+    joint, parameter = divmod(index, PARAMETERS_PER_LINK)
+    if parameter < len(_LENGTH_ORDER):
+        return _LENGTH_ORDER[parameter]
+    return 2 if chain.joints[joint].kind == "revolute" else 0
+
+
+def _unit(index: int, chain: Chain) -> str:
+    return _UNITS[_order(index, chain)]
+
+
+def _known_numbers(lengths: dict[str, float]) -> Iterator[_Known]:
+    """Named coefficients, simplest first; `before` and `after` go around the parameter's name."""
+    items = list(lengths.items())
+    for name, value in items:
+        yield _Known(value, 1, f"{name} ", "")
+        yield _Known(1.0 / value, -1, "", f"/{name}")
+        yield _Known(2.0 * value, 1, f"2 {name} ", "")
+        yield _Known(2.0 / value, -1, "2 ", f"/{name}")
+        yield _Known(value**2, 2, f"{name}^2 ", "")
+        yield _Known(value**-2, -2, "", f"/{name}^2")
+    for number, (name, value) in enumerate(items):
+        for other, length in items[:number] + items[number + 1 :]:
+            yield _Known(value / length, 0, f"{name} ", f"/{other}")
+        for other, length in items[number + 1 :]:
+            yield _Known(value * length, 2, f"{name} {other} ", "")
+            yield _Known(1.0 / (value * length), -2, "", f"/({name} {other})")
+
+
+def _equation(row: Array, pivot: int, chain: Chain, known: list[_Known]) -> str:
+    others = [int(index) for index in np.flatnonzero(row) if index != pivot]
+    text = standard_name(pivot)
+    for index in others:
+        order = _order(pivot, chain) - _order(index, chain)
+        sign, term = _term(float(row[index]), order, standard_name(index), known)
+        text += f" {sign} {term}"
+    return text
+
+
+def _term(value: float, order: int, name: str, known: list[_Known]) -> tuple[str, str]:
+    """Sign and text of value * name, the value's unit being m^order."""
+    plain = [number for number in (1.0, 2.0, 0.5) if order == 0 and _close(abs(value), number)]
+    if plain:
+        return "-" if value < 0 else "+", name if plain[0] == 1.0 else f"{plain[0]:g} {name}"
+    for number in known:
+        if number.order == order and _close(abs(value), abs(number.value)):
+            sign = "+" if value * number.value > 0 else "-"
+            return sign, f"{number.before}{name}{number.after}"
+    return "-" if value < 0 else "+", f"{abs(value):.{DIGITS}g} {name}"
+
+
+def _close(a: float, b: float) -> bool:
+    return abs(a - b) <= RECOGNITION * abs(b)

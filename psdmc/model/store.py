@@ -1,0 +1,214 @@
+"""Model files: one .npz that numpy.load(..., allow_pickle=False) reads, the same bytes for the same model.
+
+Arrays: E (5n, p); theta_b (l,), all NaN while unknown; P as P_joint, P_row, P_col, P_value, one entry each,
+joint by joint and row by row; B (l, 11n); manifest, JSON text: format, schema, what the arrays hold, chain,
+certificate, provenance, psdmc version, and the SHA-256 of all of that.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from psdmc.errors import InputError
+from psdmc.model.chain_json import chain_from_json, chain_to_json
+from psdmc.model.dynamics_model import DynamicsModel
+
+SCHEMA = 1
+FORMAT = "psdmc model"
+ARRAYS = ("E", "theta_b", "P_joint", "P_row", "P_col", "P_value", "B")
+
+_MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+"""By schema: what makes its manifest one of the next schema. Empty while there is only one."""
+
+_NO_DATE = (1980, 1, 1, 0, 0, 0)
+"""Zip's earliest date: a file's bytes must not tell when it was written."""
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+def save(model: DynamicsModel, path: str | Path) -> None:
+    """Write a model file, whole or not at all; InputError where the folder does not admit it."""
+    target = Path(path)
+    data = file_bytes(model)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    except OSError as error:
+        raise _unwritable(target, error) from error
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(name).chmod(0o644)
+        Path(name).replace(target)
+    except OSError as error:
+        Path(name).unlink(missing_ok=True)
+        raise _unwritable(target, error) from error
+
+
+def _unwritable(target: Path, error: OSError) -> InputError:
+    return InputError(f"{target}: cannot be written: {error.strerror}", "give a folder that you may write to")
+
+
+def file_bytes(model: DynamicsModel) -> bytes:
+    """The model file's content."""
+    arrays = _arrays(model)
+    manifest = _manifest(model)
+    manifest["content_hash"] = _hash(arrays, manifest)
+    text = np.array(json.dumps(manifest, indent=1, allow_nan=False))
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, array in (arrays | {"manifest": text}).items():
+            member = zipfile.ZipInfo(f"{name}.npy", date_time=_NO_DATE)
+            member.external_attr = 0o644 << 16
+            content = io.BytesIO()
+            np.lib.format.write_array(content, array, allow_pickle=False)
+            archive.writestr(member, content.getvalue(), zipfile.ZIP_DEFLATED)
+    return stream.getvalue()
+
+
+def content_hash(model: DynamicsModel) -> str:
+    """SHA-256 of everything that a model file holds, as hexadecimal digits."""
+    return _hash(_arrays(model), _manifest(model))
+
+
+def _arrays(model: DynamicsModel) -> dict[str, NDArray[Any]]:
+    blocks = [] if model.P is None else [sparse.coo_array(matrix) for matrix in model.P]
+    joints = [np.full(block.nnz, i) for i, block in enumerate(blocks)]
+    return {
+        "E": np.zeros((5 * model.n, 0), np.uint8) if model.E is None else np.ascontiguousarray(model.E),
+        "theta_b": np.full(model.l, np.nan) if model.theta_b is None else np.asarray(model.theta_b),
+        "P_joint": _stacked(joints, np.int32),
+        "P_row": _stacked([block.coords[0] for block in blocks], np.int32),
+        "P_col": _stacked([block.coords[1] for block in blocks], np.int32),
+        "P_value": _stacked([block.data for block in blocks], np.float64),
+        "B": np.ascontiguousarray(model.B),
+    }
+
+
+def _stacked(parts: list[NDArray[Any]], dtype: type) -> NDArray[Any]:
+    return np.concatenate([np.zeros(0), *parts]).astype(dtype)
+
+
+def _manifest(model: DynamicsModel) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "schema": SCHEMA,
+        "psdmc": _psdmc_version(),
+        "expanded": model.E is not None,
+        "theta_b_known": model.theta_b is not None,
+        "certificate": model.certificate.tolist(),
+        "chain": chain_to_json(model.chain),
+        "provenance": dict(model.provenance),
+    }
+
+
+def _psdmc_version() -> str:
+    try:
+        return version("psdmc")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _hash(arrays: Arrays, manifest: Mapping[str, Any]) -> str:
+    digest = hashlib.sha256()
+    plain = {key: value for key, value in manifest.items() if key != "content_hash"}
+    digest.update(json.dumps(plain, sort_keys=True, allow_nan=False).encode())
+    for name in ARRAYS:
+        array = arrays[name]
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def load(path: str | Path) -> DynamicsModel:
+    """Read a model file; InputError where it is missing, damaged, foreign or of a newer psdmc."""
+    source = Path(path)
+    arrays, manifest = _read(source)
+    if manifest.get("content_hash") != _hash(arrays, manifest):
+        raise _damaged(source, "its content does not match its hash")
+    manifest = _migrated(manifest)
+    try:
+        return _model(arrays, manifest)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise _damaged(source, f"its parts do not fit together ({error})") from error
+
+
+def _read(source: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Arrays and manifest, the manifest known to be psdmc's and of no newer schema."""
+    try:
+        with np.load(io.BytesIO(source.read_bytes()), allow_pickle=False) as file:
+            if not isinstance(file, np.lib.npyio.NpzFile) or "manifest" not in file.files:
+                raise _foreign(source)
+            manifest = json.loads(str(file["manifest"]))
+            _check_schema(source, manifest)
+            return {name: file[name] for name in ARRAYS}, manifest
+    except FileNotFoundError as error:
+        raise InputError(f"{source}: no such file", "psdmc derive ROBOT -o MODEL.npz makes one") from error
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError) as error:
+        raise _damaged(source, "it is truncated or altered") from error
+    except (ValueError, TypeError, AttributeError) as error:
+        raise _foreign(source) from error
+
+
+def _check_schema(source: Path, manifest: Any) -> None:
+    schema = manifest.get("schema")
+    if manifest.get("format") != FORMAT or not isinstance(schema, int):
+        raise _foreign(source)
+    if schema > SCHEMA:
+        raise InputError(
+            f"{source}: model schema {schema}, this psdmc reads up to {SCHEMA}",
+            f"install psdmc {manifest.get('psdmc', '')} or newer, or derive the model again",
+        )
+
+
+def _migrated(manifest: dict[str, Any]) -> dict[str, Any]:
+    while manifest["schema"] < SCHEMA:
+        manifest = _MIGRATIONS[manifest["schema"]](manifest)
+    return manifest
+
+
+def _damaged(source: Path, why: str) -> InputError:
+    return InputError(f"{source}: damaged model file: {why}", "derive the model again")
+
+
+def _foreign(source: Path) -> InputError:
+    return InputError(f"{source}: not a psdmc model file", "psdmc derive ROBOT -o MODEL.npz makes one")
+
+
+def _model(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
+    chain = chain_from_json(manifest["chain"])
+    is_expanded = manifest["expanded"]
+    shape = (arrays["E"].shape[1], arrays["B"].shape[0])
+    return DynamicsModel(
+        E=arrays["E"] if is_expanded else None,
+        P=_matrices(arrays, len(chain), shape) if is_expanded else None,
+        theta_b=arrays["theta_b"] if manifest["theta_b_known"] else None,
+        B=arrays["B"],
+        chain=chain,
+        certificate=np.array(manifest["certificate"]),
+        provenance=manifest["provenance"],
+    )
+
+
+def _matrices(arrays: Arrays, n: int, shape: tuple[int, int]) -> tuple[sparse.csr_array, ...]:
+    matrices = []
+    for joint in range(n):
+        own = arrays["P_joint"] == joint
+        entries = (arrays["P_value"][own], (arrays["P_row"][own], arrays["P_col"][own]))
+        matrices.append(sparse.csr_array(entries, shape=shape))
+    return tuple(matrices)
