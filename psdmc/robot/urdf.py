@@ -58,9 +58,6 @@ class UrdfRobot:
     def joints_below(self, link: str) -> tuple[UrdfJoint, ...]:
         return tuple(joint for joint in self.joints if joint.parent == link)
 
-    def joint_above(self, link: str) -> UrdfJoint | None:
-        return next((joint for joint in self.joints if joint.child == link), None)
-
 
 def read_urdf(text: str, source: str) -> UrdfRobot:
     """The file's content; InputError names everything that is wrong with its links and joints at once."""
