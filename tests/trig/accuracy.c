@@ -2,7 +2,7 @@
 
    Compile with REAL, DIGITS (53 or 24) and VARIANTS, a list of X(name): each name is a function
    void name(size_t count, const REAL *x, REAL *s, REAL *c), count a multiple of 16. Reference: long double
-   (x87, 64 digits, glibc's full argument reduction). Prints "range variant sin_ulp cos_ulp worst_angle" lines. */
+   (x87, 64 digits, glibc's full argument reduction). */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -48,47 +48,55 @@ static REAL neighbour(long double value, int steps)
     return x;
 }
 
-/* Distance to the exact value in units of the last place of the exact value. */
-static double ulps(REAL got, long double exact)
+/* 1 / (unit in the last place) of a number this large. */
+static long double places_per_unit(long double exact)
 {
-    int exponent;
-    if (exact == 0)
-        return got == 0 ? 0.0 : INFINITY;
-    frexpl(exact, &exponent);
     const int lowest = DIGITS == 53 ? -1074 : -149;
-    const int place = exponent - DIGITS < lowest ? lowest : exponent - DIGITS;
-    const double error = (double)fabsl(ldexpl((long double)got - exact, -place));
+    int exponent;
+    frexpl(exact, &exponent);
+    return ldexpl(1.0L, -(exact == 0 || exponent - DIGITS < lowest ? lowest : exponent - DIGITS));
+}
+
+static double ulps(REAL got, long double exact, long double scale)
+{
+    const double error = (double)(fabsl((long double)got - exact) * scale);
     return error == error ? error : INFINITY;
 }
 
 static REAL x[BLOCK], s[BLOCK], c[BLOCK];
-static long double exact_s[BLOCK], exact_c[BLOCK];
+static long double exact_s[BLOCK], exact_c[BLOCK], scale_s[BLOCK], scale_c[BLOCK];
 static double worst_s[COUNT], worst_c[COUNT], worst_at[COUNT];
+static long angles;
 
 static void compare_block(void)
 {
     for (int i = 0; i < BLOCK; ++i) {
         exact_s[i] = sinl((long double)x[i]);
         exact_c[i] = cosl((long double)x[i]);
+        scale_s[i] = places_per_unit(exact_s[i]);
+        scale_c[i] = places_per_unit(exact_c[i]);
     }
     for (int v = 0; v < (int)COUNT; ++v) {
         variants[v].run(BLOCK, x, s, c);
         for (int i = 0; i < BLOCK; ++i) {
-            const double of_s = ulps(s[i], exact_s[i]), of_c = ulps(c[i], exact_c[i]);
+            const double of_s = ulps(s[i], exact_s[i], scale_s[i]), of_c = ulps(c[i], exact_c[i], scale_c[i]);
             if (of_s > worst_s[v] || of_c > worst_c[v])
                 worst_at[v] = (double)x[i];
-            worst_s[v] = fmax(worst_s[v], of_s);
-            worst_c[v] = fmax(worst_c[v], of_c);
+            worst_s[v] = of_s > worst_s[v] ? of_s : worst_s[v];
+            worst_c[v] = of_c > worst_c[v] ? of_c : worst_c[v];
         }
     }
+    angles += BLOCK;
 }
 
+/* One line per build: range, build, angles, greatest error of sine and cosine, an angle with such an error. */
 static void report(const char *range)
 {
     for (int v = 0; v < (int)COUNT; ++v) {
-        printf("%s %s %.4f %.4f %a\n", range, variants[v].name, worst_s[v], worst_c[v], worst_at[v]);
+        printf("%s %s %ld %.4f %.4f %a\n", range, variants[v].name, angles, worst_s[v], worst_c[v], worst_at[v]);
         worst_s[v] = worst_c[v] = worst_at[v] = 0;
     }
+    angles = 0;
 }
 
 static void uniform_range(const char *name, double limit, long blocks)
@@ -111,7 +119,8 @@ static void logarithmic_range(const char *name, double least, double limit, long
     report(name);
 }
 
-/* Every multiple of pi/4 within the limit: the nearest number and `around` on both sides. */
+/* The nearest number to every multiple of pi/4 within the limit, and `around` on both sides: with the multiples of
+   pi/2, where reduction cancels most, these are all hard cases there are. */
 static void near_multiples(const char *name, double limit, int around)
 {
     const long double quarter_pi = 0.785398163397448309615660845819875721L;
@@ -133,7 +142,7 @@ static void near_multiples(const char *name, double limit, int around)
     report(name);
 }
 
-/* accuracy LIMIT BLOCKS < hard angles, one per line */
+/* accuracy LIMIT BLOCKS: BLOCKS blocks of angles per uniform range. */
 int main(int count, char **words)
 {
     const double limit = count > 1 ? atof(words[1]) : 0;
@@ -144,14 +153,7 @@ int main(int count, char **words)
     uniform_range("uniform_1e3", 1e3, blocks);
     uniform_range("uniform_limit", limit, blocks);
     logarithmic_range("logarithmic", DIGITS == 53 ? 1e-320 : 1e-42, limit, blocks / 2 + 1);
-    logarithmic_range("logarithmic_1", 1e-6, limit, blocks / 2 + 1);
+    logarithmic_range("logarithmic_1e-6", 1e-6, limit, blocks / 2 + 1);
     near_multiples("near_multiples", limit, 4);
-    int filled = 0;
-    for (double angle; filled < BLOCK && scanf("%la", &angle) == 1; ++filled)
-        x[filled] = (REAL)angle;
-    for (; filled < BLOCK; ++filled)
-        x[filled] = 0;
-    compare_block();
-    report("hard");
     return 0;
 }

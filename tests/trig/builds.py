@@ -1,0 +1,105 @@
+"""Builds of the rendered sincos for the tests: every compiler, target and floating-point mode that is promised."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from psdmc.emit.trig import NUMBERS, Far, Real, scalar_trig, trig_preamble, vector_trig
+
+TEMPLATES = Path(__file__).parents[2] / "templates"
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Werror".split()
+FAST_CONTRACT = "-ffp-contract=fast"
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """One instantiation and how it is compiled; vector_bytes 0 is the scalar form."""
+
+    name: str
+    compiler: str
+    vector_bytes: int
+    far: Far
+    flags: str
+
+    @property
+    def fast_math(self) -> bool:
+        """Signed zeros and denormals are not promised then."""
+        return "fast-math" in self.flags or "associative" in self.flags
+
+
+_ALL = (
+    Build("native", "gcc", 64, "libm", f"-O3 -march=native {FAST_CONTRACT}"),
+    Build("native_separate", "gcc", 64, "nan", "-O3 -march=native -ffp-contract=off"),
+    Build("native_fast_math", "gcc", 64, "nan", "-O3 -march=native -ffast-math"),
+    Build("native_32", "gcc", 32, "libm", f"-O2 -march=native {FAST_CONTRACT}"),
+    Build("v3", "gcc", 32, "libm", f"-O3 -march=x86-64-v3 {FAST_CONTRACT}"),
+    Build("v3_separate", "gcc", 32, "nan", "-O3 -march=x86-64-v3 -ffp-contract=off"),
+    Build("v3_fast_math", "gcc", 32, "libm", "-O3 -march=x86-64-v3 -ffast-math"),
+    Build("v3_wide_fast_math", "gcc", 64, "libm", "-O3 -march=x86-64-v3 -ffast-math"),
+    Build("v3_associative", "gcc", 32, "nan", "-O3 -fassociative-math -fno-signed-zeros -fno-trapping-math"),
+    Build("baseline", "gcc", 16, "libm", "-O3"),
+    Build("baseline_unoptimised", "gcc", 16, "nan", "-O0"),
+    Build("scalar", "gcc", 0, "libm", "-O2"),
+    Build("scalar_nan", "gcc", 0, "nan", f"-O3 -march=native {FAST_CONTRACT}"),
+    Build("scalar_fast_math", "gcc", 0, "nan", "-O3 -march=native -ffast-math"),
+    Build("scalar_plain_c", "gcc", 0, "nan", "-O3 -U__GNUC__"),
+    Build("scalar_plain_c_fast_math", "gcc", 0, "nan", "-O3 -march=native -ffast-math -U__GNUC__"),
+    Build("clang_native", "clang", 64, "libm", f"-O3 -march=native {FAST_CONTRACT}"),
+    Build("clang_fast_math", "clang", 64, "nan", "-O3 -march=native -ffast-math"),
+    Build("clang_baseline", "clang", 16, "nan", "-O2"),
+)
+
+
+def builds() -> tuple[Build, ...]:
+    """Those whose compiler is on this machine."""
+    return tuple(build for build in _ALL if shutil.which(build.compiler))
+
+
+def render(build: Build, real: Real) -> str:
+    """C source of `void <build name>(count, x, s, c)` around the sincos."""
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+
+    def fill(template: str, view: object) -> str:
+        return environment.get_template(f"trig/{template}.jinja").render(trig=view) + "\n"
+
+    text = "#include <stddef.h>\n#include <string.h>\n" + fill("preamble", trig_preamble("arm", real, build.far))
+    lanes = build.vector_bytes * 8 // NUMBERS[real].bits
+    if lanes == 0:
+        scalar = scalar_trig("arm", real, build.far)
+        return text + fill("sincos_scalar", scalar) + _loop(build.name, real, scalar.vec, scalar.symbol, 1)
+    vector = vector_trig("arm", real, lanes, build.far)
+    text += fill("types", vector) + fill("sincos_vector", vector)
+    return text + _loop(build.name, real, vector.vec, vector.symbol, lanes)
+
+
+def _loop(name: str, real: Real, vec: str, symbol: str, lanes: int) -> str:
+    signature = f"void {name}(size_t count, const {real} *x, {real} *s, {real} *c)"
+    return (
+        f"{signature};\n{signature}\n{{\n    for (size_t i = 0; i < count; i += {lanes}) {{\n"
+        f"        {vec} angle, sine, cosine;\n        memcpy(&angle, x + i, sizeof angle);\n"
+        f"        {symbol}(&angle, &sine, &cosine);\n        memcpy(s + i, &sine, sizeof sine);\n"
+        "        memcpy(c + i, &cosine, sizeof cosine);\n    }\n}\n"
+    )
+
+
+def compile_build(build: Build, real: Real, folder: Path) -> Path:
+    """Object file, position independent, without a warning."""
+    source = folder / f"{build.name}.c"
+    target = source.with_suffix(".o")
+    source.write_text(render(build, real))
+    run(build.compiler, *STRICT, "-fPIC", *build.flags.split(), "-c", str(source), "-o", str(target))
+    return target
+
+
+def run(*command: str) -> str:
+    """What the command prints; its complaints in the failure."""
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{' '.join(command)}\n{done.stdout}{done.stderr}"
+    return done.stdout
