@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psdmc.dynamics.parameters import joint_frame_map, standard_parameters
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
 
 DRIVE = PARAMETERS_PER_LINK - 1
@@ -15,15 +17,29 @@ FLOOR_MOUNT = (0.0, 0.0, -9.81)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A robot to measure: `chain` has no unknown inertia; `note` says where its numbers come from."""
+    """A robot to measure.
+
+    name            in tables
+    model           with theta_b known; its chain has no unknown inertia
+    note            where its numbers come from
+    derive_seconds  how long the derivation took, None where the model was given
+    """
 
     name: str
-    chain: Chain
+    model: DynamicsModel
     note: str = ""
+    derive_seconds: float | None = None
 
     def __post_init__(self) -> None:
-        if np.isnan(self.chain.parameters).any():
-            raise ValueError(f"{self.name}: the benchmark needs every inertial parameter")
+        if self.model.theta_b is None or np.isnan(self.chain.parameters).any():
+            raise InputError(
+                f"{self.name}: the benchmark needs every inertial parameter, and some are unknown",
+                "give the links' inertia, or calibrate first",
+            )
+
+    @property
+    def chain(self) -> Chain:
+        return self.model.chain
 
     @property
     def n(self) -> int:
@@ -31,7 +47,7 @@ class Case:
         return len(self.chain)
 
 
-def generic_case(name: str, chain: Chain, seed: int) -> Case:
+def generic_chain(chain: Chain, seed: int) -> Chain:
     """The chain's geometry standing on the floor with generic physical inertias and no drive inertia.
 
     Nobody's special zeros then make one contestant look better; the same seed gives the same robot.
@@ -40,13 +56,12 @@ def generic_case(name: str, chain: Chain, seed: int) -> Case:
     n = len(chain)
     parameters = np.array([[*physical_body(rng), 0.0] for _ in range(n)])
     free = [j for j in range(PARAMETERS_PER_LINK * n) if j % PARAMETERS_PER_LINK != DRIVE]
-    generic = replace(
+    return replace(
         chain,
         parameters=parameters,
         parameter_span=np.eye(PARAMETERS_PER_LINK * n)[:, free],
         gravity=np.array(FLOOR_MOUNT),
     )
-    return Case(name, generic, f"generic physical inertias, floor mount, no drive inertia, seed {seed}")
 
 
 def physical_body(rng: np.random.Generator) -> Array:

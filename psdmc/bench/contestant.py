@@ -19,8 +19,12 @@ Layout = Literal["state", "rows", "lanes"]
 RING_BYTES = 1 << 18
 """Outputs go round in this much: within any L2 cache, so that the code is measured and not memory."""
 
-BLOCK = 64
-"""Calls per timed block, as in loops.hpp."""
+BLOCK = 1024
+"""States per timed block: some 50 us, long against reading the clock, short against the scheduler's slices. Batch
+calls take what the ring holds."""
+
+TAIL_BLOCK = 64
+"""Calls per block for the worst case: single calls are too short for the clock."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +89,9 @@ class Runner:
         self.contestant = contestant
         self._library = ctypes.CDLL(str(contestant.library))
         self._inputs = states.inputs(contestant.function, contestant.lanes)
-        ring = max(64, 1 << int(np.log2(RING_BYTES / (8 * contestant.outputs))))
-        self._ring = min(ring, states.count)
-        self._output = np.zeros(self._ring * contestant.outputs)
+        ring = min(states.count, max(TAIL_BLOCK, 1 << int(np.log2(RING_BYTES / (8 * contestant.outputs)))))
+        self._output = np.zeros(ring * contestant.outputs)
+        self._block = min(BLOCK, states.count) if contestant.layout == "state" else ring
         self._states = states
         self.setup()
 
@@ -96,45 +100,43 @@ class Runner:
         if self.contestant.robot is not None:
             self._library.setup(self.contestant.robot.encode())
 
-    def throughput(self) -> float:
-        """ns per state."""
-        return self._ns(self._timer("throughput")(ctypes.byref(self._work(self._output, self._ring))))
+    def throughput(self) -> Array:
+        """ns per state, block by block: median blocks are untouched by whatever else the machine does for a moment."""
+        return self._timed("throughput", self._output, self._block)
 
-    def latency(self) -> float:
-        """ns per state where each waits for the one before."""
-        return self._ns(self._timer("latency")(ctypes.byref(self._work(self._output, self._ring))))
+    def latency(self) -> Array:
+        """ns per state, block by block, where each state waits for the one before."""
+        return self._timed("latency", self._output, self._block)
 
-    def blocks(self) -> Array:
-        """ns per call in each block of 64, clock included."""
-        seconds = np.zeros(self._states.count // BLOCK)
-        work = self._work(self._output, self._ring)
-        self._timer("blocks")(ctypes.byref(work), ctypes.c_void_p(seconds.ctypes.data))
-        return seconds * (1e9 / BLOCK)
+    def tail(self) -> Array:
+        """ns per call over blocks of 64 calls, the clock's own cost subtracted."""
+        return self._timed("throughput", self._output, TAIL_BLOCK) - self._clock_cost() / TAIL_BLOCK
 
     def outputs(self) -> Array:
         """(count, outputs) what the function puts out at every state, as rows."""
-        count, size = self._states.count, self.contestant.outputs
+        count, size, lanes = self._states.count, self.contestant.outputs, self.contestant.lanes
         output = np.full(count * size, np.nan)
         self._copy_matrices(True)
-        self._timer("throughput")(ctypes.byref(self._work(output, count)))
+        self._timed("throughput", output, count)
         self._copy_matrices(False)
-        lanes = self.contestant.lanes
-        if self.contestant.layout == "lanes":
-            return output.reshape(count // lanes, size, lanes).transpose(0, 2, 1).reshape(count, size)
-        return output.reshape(count, size)
+        return output.reshape(count // lanes, size, lanes).transpose(0, 2, 1).reshape(count, size)
 
-    def _timer(self, kind: str) -> ctypes._CFuncPtr:
-        function = getattr(self._library, f"{self.contestant.symbol}_{kind}")
-        function.restype = ctypes.c_double
-        return function  # type: ignore[no-any-return]
-
-    def _work(self, output: Array, ring: int) -> Work:
+    def _timed(self, kind: str, output: Array, block: int) -> Array:
+        """Seconds of each block from the library's loop, as ns per state."""
         q, qd, x = (vector.ctypes.data for vector in self._inputs)
         states = self._states
-        return Work(states.count, states.n, self.contestant.outputs, ring, q, qd, x, output.ctypes.data)
+        ring = len(output) // self.contestant.outputs
+        work = Work(states.count, states.n, self.contestant.outputs, ring, q, qd, x, output.ctypes.data)
+        seconds = np.zeros(states.count // block)
+        loop = getattr(self._library, f"{self.contestant.symbol}_{kind}")
+        loop(ctypes.byref(work), ctypes.c_size_t(block), ctypes.c_void_p(seconds.ctypes.data))
+        return seconds * (1e9 / block)
 
-    def _ns(self, seconds: float) -> float:
-        return 1e9 * seconds / self._states.count
+    def _clock_cost(self) -> float:
+        """ns for an empty block."""
+        seconds = np.zeros(1024)
+        self._library.clock_cost(ctypes.c_size_t(len(seconds)), ctypes.c_void_p(seconds.ctypes.data))
+        return 1e9 * float(np.median(seconds))
 
     def _copy_matrices(self, yes: bool) -> None:
         if hasattr(self._library, "copy_matrices"):

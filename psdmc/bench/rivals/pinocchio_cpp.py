@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from psdmc.bench.build import OPTIMISED, BuildFailed, built, compiler
+from psdmc.bench.build import NATIVE, built, cxx
 from psdmc.bench.case import DRIVE, Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import joint_frame_map
+from psdmc.errors import ToolchainError
+from psdmc.robot.chain import Array
 
 Way = Literal["library", "header-only"]
 
@@ -35,13 +37,13 @@ DEFINES = (
 """How the wheel's library was compiled: Pinocchio's variant of joints outgrows Boost's defaults."""
 
 
-def contestants(case: Case, way: Way, flags: tuple[str, ...] = OPTIMISED) -> list[Contestant | Unavailable]:
+def contestants(case: Case, way: Way, flags: tuple[str, ...] = NATIVE) -> list[Contestant | Unavailable]:
     """Pinocchio's algorithms for one robot."""
     rival = "Pinocchio" if way == "library" else "Pinocchio header-only"
     try:
         library = compiled(way, flags)
-    except BuildFailed as reason:
-        return [Unavailable(rival, str(reason))]
+    except ToolchainError as error:
+        return [Unavailable(rival, error.message)]
     robot = robot_as_numbers(case.chain)
     n = case.n
     outputs = {"mass_matrix": n * n, "regressor": 10 * n * n}
@@ -54,7 +56,7 @@ def contestants(case: Case, way: Way, flags: tuple[str, ...] = OPTIMISED) -> lis
             outputs.get(function, n),
             variant=symbol.removeprefix(function).strip("_").upper(),
             robot=robot,
-            weights=_standard_parameters(case) if function == "regressor" else None,
+            weights=standard_parameters(case) if function == "regressor" else None,
         )
         for function, symbols in SYMBOLS.items()
         for symbol in symbols
@@ -62,41 +64,34 @@ def contestants(case: Case, way: Way, flags: tuple[str, ...] = OPTIMISED) -> lis
 
 
 def compiled(way: Way, flags: tuple[str, ...]) -> Path:
-    """The shared library around Pinocchio's algorithms; BuildFailed says what is missing."""
+    """The shared library around Pinocchio's algorithms; ToolchainError says what is missing."""
     prefix = pinocchio_prefix()
     link = _library_flags(prefix) if way == "library" else ()
     # The shipped library is plain x86-64, and Eigen's alignment follows the instruction set: the two never mix.
     used = tuple(flag for flag in flags if way == "header-only" or not flag.startswith("-march"))
     product = f"pinocchio_{way.replace('-', '_')}.so"
     names = ("pinocchio_cpp.cpp", "pinocchio_model.hpp", "loops.hpp")
-    command = [compiler(), "-std=c++17", *used, "-fPIC", "-shared", *DEFINES, *includes(prefix)]
+    command = [cxx(), "-std=c++17", *used, "-fPIC", "-shared", *DEFINES, *includes(prefix)]
     command += ["pinocchio_cpp.cpp", "-o", product, *link]
-    return built(product, command, {name: source(name) for name in names}, [pinocchio_version()])
+    return built(product, command, {name: source(name) for name in names}, [version_of("pin")])
 
 
 @lru_cache
 def pinocchio_prefix() -> Path:
-    """Where the pin wheel keeps headers and libraries; BuildFailed where they, or Eigen's, are not installed."""
+    """Where the pin wheel keeps headers and libraries; ToolchainError where they, or Eigen's, are not installed."""
     found = find_spec("pinocchio")
     if found is None or found.origin is None:
-        raise BuildFailed("the wheel 'pin' is not installed")
+        raise ToolchainError("the wheel 'pin' is not installed")
     prefix = next((p for p in Path(found.origin).parents if p.name == "cmeel.prefix"), None)
     if prefix is None or not (prefix / "include/pinocchio").is_dir():
-        raise BuildFailed("this Pinocchio came without C++ headers; the wheel 'pin' has them")
+        raise ToolchainError("this Pinocchio came without C++ headers; the wheel 'pin' has them")
     if not (prefix / "include/eigen3/Eigen/Core").is_file():
-        raise BuildFailed("Eigen's headers are missing; the wheel 'cmeel-eigen' has them")
+        raise ToolchainError("Eigen's headers are missing; the wheel 'cmeel-eigen' has them")
     return prefix
 
 
 def includes(prefix: Path) -> tuple[str, ...]:
     return ("-isystem", str(prefix / "include"), "-isystem", str(prefix / "include/eigen3"))
-
-
-def pinocchio_version() -> str:
-    try:
-        return f"pin {version('pin')}"
-    except PackageNotFoundError:
-        return "pin unknown"
 
 
 def _library_flags(prefix: Path) -> tuple[str, ...]:
@@ -110,7 +105,7 @@ def _library_flags(prefix: Path) -> tuple[str, ...]:
     )
 
 
-def _standard_parameters(case: Case) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def standard_parameters(case: Case) -> Array:
     """(10 n,) about the joint frames: what Pinocchio's regressor multiplies to give torques."""
     pairs = zip(case.chain.joints, case.chain.parameters, strict=True)
     return np.concatenate([joint_frame_map(joint.link_frame) @ row[:DRIVE] for joint, row in pairs])

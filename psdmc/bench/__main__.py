@@ -1,0 +1,40 @@
+"""python -m psdmc.bench [NAME ...] [--rounds N] [--json FILE]: measure the standard robots."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from psdmc.bench.cases import standard_cases
+from psdmc.bench.rivals import EVERYONE
+from psdmc.bench.run import ROUNDS, Settings, run
+from psdmc.bench.table import as_text
+from psdmc.errors import PsdmcError
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m psdmc.bench", description=__doc__)
+    parser.add_argument("names", nargs="*", help="standard robots; all where none is named")
+    parser.add_argument("--rounds", type=int, default=ROUNDS, help="trials that count (default %(default)s)")
+    parser.add_argument("--rivals", nargs="+", choices=[entrant.name for entrant in EVERYONE], help="whom to measure")
+    parser.add_argument("--json", type=Path, help="write everything measured there")
+    options = parser.parse_args()
+    settings = Settings(rounds=options.rounds, rivals=tuple(options.rivals) if options.rivals else None)
+    try:
+        result = run(list(standard_cases(options.names or None)), settings, _tell)
+    except PsdmcError as error:
+        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
+        return error.exit_status
+    print(as_text(result))
+    if options.json:
+        options.json.write_text(result.to_json())
+    return 1 if result.wrong else 0
+
+
+def _tell(message: str) -> None:
+    print(message, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+"""Nothing is timed before it was seen to be right: outputs against psdmc's Newton-Euler on arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from psdmc.bench.contestant import Runner
+from psdmc.bench.states import States
+from psdmc.robot.chain import Array
+
+CHECKED = 1024
+"""States compared; enough to meet every term of a robot's dynamics."""
+
+TOLERANCE = {"forward_dynamics": 1e-7}
+STRICT = 1e-10
+"""Largest error of an output relative to its largest value; forward dynamics amplifies rounding by the mass matrix's
+condition number."""
+
+SMALL = 1e-3
+"""Outputs that stay below this share of the largest one are compared on that scale: they may be zero."""
+
+
+def disagreement(runner: Runner, states: States) -> float:
+    """Largest error of a contestant's outputs, relative to each output's largest value."""
+    expected = states.expected(runner.contestant.function)
+    found = runner.outputs()
+    weights = runner.contestant.weights
+    if weights is not None:
+        found = found.reshape(states.count, -1, len(weights)) @ weights
+    return relative_error(found, expected)
+
+
+def relative_error(found: Array, expected: Array) -> float:
+    """Infinite where anything is not a number."""
+    largest = np.max(np.abs(expected), axis=0)
+    error = np.abs(found - expected) / np.maximum(largest, SMALL * np.max(largest))
+    return float(np.max(error)) if np.isfinite(error).all() else float("inf")
+
+
+def tolerance(function: str) -> float:
+    return TOLERANCE.get(function, STRICT)

@@ -1,0 +1,123 @@
+"""The robots that psdmc is measured on: published geometry, popular arms, and two that nobody has tuned for."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.bench.case import FLOOR_MOUNT, Case, generic_chain
+from psdmc.derive.derive import derive_model
+from psdmc.errors import InputError
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Placement
+from psdmc.robot.load import load_robot
+
+SEED = 4
+"""Of generic inertias and geometry; printed with every result."""
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "robots"
+
+BUNDLED = {"Denso": "denso_floor.toml", "KR6": "kr6.toml", "LBR7": "lbr7.toml"}
+
+POPULAR = {
+    "UR5": ("ur_description/urdf/ur5_robot.urdf", None),
+    "Panda": ("panda_description/urdf/panda.urdf", "panda_link7"),
+}
+"""Path inside example-robot-data's robots, and the tip that leaves fingers out."""
+
+
+def standard_chains(seed: int = SEED) -> dict[str, Callable[[], Chain]]:
+    """What makes each standard robot's chain, by name: two generic arms beside the known ones."""
+    makers: dict[str, Callable[[], Chain]] = {}
+    for name in ("Denso", "KR6", "LBR7", "UR5", "Panda"):
+        makers[name] = lambda name=name: generic_chain(_known(name), seed)  # type: ignore[misc]
+    for n in (6, 7):
+        makers[f"generic {n}R"] = lambda n=n: generic_chain(oblique_chain(n, seed + n), seed)  # type: ignore[misc]
+    return makers
+
+
+def standard_cases(names: Sequence[str] | None = None, seed: int = SEED) -> Iterator[Case]:
+    """The standard robots, derived one by one; InputError where a robot's file is not installed or a name unknown."""
+    makers = standard_chains(seed)
+    for name in makers if names is None else names:
+        if name not in makers:
+            raise InputError(f"there is no standard robot {name!r}", f"choose from {', '.join(makers)}")
+        yield derived(name, makers[name](), f"generic physical inertias, floor mount, no drive inertia, seed {seed}")
+
+
+def derived(name: str, chain: Chain, note: str, expand: bool = True) -> Case:
+    """A case with its MODEL, and how long deriving it took."""
+    start = time.perf_counter()
+    model = derive_model(chain, expand=expand)
+    return Case(name, model, note, time.perf_counter() - start)
+
+
+def oblique_chain(n: int, seed: int) -> Chain:
+    """n revolute joints about axes that neither meet nor stand parallel or square: nothing to exploit."""
+    rng = np.random.default_rng(seed)
+    joints = tuple(
+        Joint(f"joint{i + 1}", f"link{i + 1}", "revolute", _anywhere(rng), Placement.identity()) for i in range(n)
+    )
+    return Chain(
+        name=f"generic_{n}r",
+        convention="modified",
+        base_name="base",
+        tip_name="tip",
+        joints=joints,
+        parameters=np.zeros((n, PARAMETERS_PER_LINK)),
+        parameter_span=np.eye(PARAMETERS_PER_LINK * n),
+        gravity=np.array(FLOOR_MOUNT),
+        tip=_anywhere(rng),
+    )
+
+
+def first_joints(chain: Chain, n: int) -> Chain:
+    """The chain cut after its first n joints, for measuring how cost grows with n."""
+    rows = PARAMETERS_PER_LINK * n
+    span = chain.parameter_span[:rows]
+    kept = np.any(span != 0.0, axis=0)
+    return Chain(
+        name=f"{chain.name}_{n}",
+        convention=chain.convention,
+        base_name=chain.base_name,
+        tip_name=chain.joints[n - 1].link_name,
+        joints=chain.joints[:n],
+        parameters=chain.parameters[:n],
+        parameter_span=span[:, kept],
+        gravity=chain.gravity,
+        tip=Placement.identity(),
+    )
+
+
+def _known(name: str) -> Chain:
+    if name in BUNDLED:
+        return load_robot(EXAMPLES / BUNDLED[name]).chain
+    path, tip = POPULAR[name]
+    return load_robot(_robot_data() / path, tip=tip).chain
+
+
+def _robot_data() -> Path:
+    """Where the example-robot-data wheel keeps its robots."""
+    found = find_spec("example_robot_data")
+    for folder in Path(found.origin).parents if found and found.origin else ():
+        robots = folder / "share/example-robot-data/robots"
+        if robots.is_dir():
+            return robots
+    raise InputError("example-robot-data is not installed", "pip install example-robot-data")
+
+
+def _anywhere(rng: np.random.Generator) -> Placement:
+    return Placement(_rotation(rng), rng.uniform(-0.3, 0.3, size=3))
+
+
+def _rotation(rng: np.random.Generator) -> Array:
+    """A uniformly random rotation."""
+    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
+    q *= np.sign(np.diag(r))
+    if np.linalg.det(q) < 0.0:
+        q[:, 0] = -q[:, 0]
+    rotation: Array = q
+    return rotation

@@ -1,0 +1,91 @@
+"""The machine that a figure was measured on, and whether it was idle meanwhile."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.bench.build import NATIVE
+from psdmc.errors import ToolchainError
+from psdmc.toolchain.compiler_command import find_compiler
+
+IDLE_SHARE = 0.05
+"""Cores that others may keep busy while a trial counts: beyond, a shared core costs up to a factor of two."""
+
+_TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What a reader needs to judge a time."""
+
+    processor: str
+    cores: int
+    system: str
+    compiler: str
+    flags: str
+    governor: str
+    python: str
+    numpy: str
+
+
+def this_machine() -> Machine:
+    return Machine(
+        processor=_cpu_line("model name") or platform.processor() or platform.machine(),
+        cores=os.cpu_count() or 1,
+        system=f"{platform.system()} {platform.release()} {platform.machine()}",
+        compiler=_compiler_version(),
+        flags=" ".join(NATIVE),
+        governor=_text("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor") or "not stated by this machine",
+        python=platform.python_version(),
+        numpy=np.__version__,
+    )
+
+
+def others_share() -> Callable[[], float]:
+    """Starts watching; the returned call says how many cores' worth of time others have used since.
+
+    Zero where the system does not say (no /proc/stat).
+    """
+    begin = _busy_seconds(), time.process_time(), time.monotonic()
+
+    def share() -> float:
+        busy, own, wall = _busy_seconds(), time.process_time(), time.monotonic()
+        others = (busy - begin[0]) - (own - begin[1])
+        return max(0.0, others) / max(wall - begin[2], 1e-9) if busy else 0.0
+
+    return share
+
+
+def _busy_seconds() -> float:
+    """All cores' time that was not idle, time stolen by other virtual machines included."""
+    fields = _text("/proc/stat").split("\n", 1)[0].split()[1:9]
+    if len(fields) < 8:
+        return 0.0
+    user, nice, system, _idle, _wait, irq, soft_irq, steal = (int(field) for field in fields)
+    return (user + nice + system + irq + soft_irq + steal) / _TICKS
+
+
+def _compiler_version() -> str:
+    try:
+        return find_compiler().version.splitlines()[0]
+    except (ToolchainError, IndexError):
+        return "none found"
+
+
+def _cpu_line(key: str) -> str:
+    lines = _text("/proc/cpuinfo").splitlines()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith(key)), "")
+
+
+def _text(path: str) -> str:
+    try:
+        return Path(path).read_text().strip()
+    except OSError:
+        return ""

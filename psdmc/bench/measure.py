@@ -1,0 +1,108 @@
+"""Interleaved trials: every contestant in turn, again and again, counted only while the machine is idle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from psdmc.bench.contestant import Runner
+from psdmc.bench.machine import IDLE_SHARE, others_share
+from psdmc.robot.chain import Array
+
+PATIENCE = 3
+"""Rounds tried for each that must count; after that busy ones count too, and the result says so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """A figure over several trials: median, quartiles and the best, ns."""
+
+    median: float
+    low: float
+    high: float
+    best: float
+
+    @staticmethod
+    def of(values: Sequence[float] | Array) -> Spread:
+        low, median, high = np.percentile(values, [25, 50, 75]).tolist()
+        return Spread(median, low, high, float(np.min(values)))
+
+
+@dataclass(frozen=True, slots=True)
+class Tail:
+    """ns per call over blocks of 64 calls, the clock's own cost subtracted: what a control loop must expect."""
+
+    median: float
+    percentile_99_99: float
+    worst: float
+    blocks: int
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """One contestant's times; latency and tail only where it takes one state a call."""
+
+    throughput: Spread
+    latency: Spread | None
+    tail: Tail | None
+
+
+@dataclass(slots=True)
+class _Trials:
+    throughput: list[float] = field(default_factory=list)
+    latency: list[float] = field(default_factory=list)
+    tail: list[Array] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Times in the runners' order, and whether the machine was idle while they were taken."""
+
+    times: tuple[Times, ...]
+    rounds: int
+    idle: bool
+
+
+def measure(
+    runners: Sequence[Runner], rounds: int, progress: Callable[[str], None] = lambda message: None
+) -> Measured:
+    """Every runner once a round, `rounds` rounds that count."""
+    _round(runners)  # caches, branch predictors and the clock speed settle
+    quiet: list[list[_Trials]] = []
+    noisy: list[list[_Trials]] = []
+    while len(quiet) < rounds and len(quiet) + len(noisy) < PATIENCE * rounds:
+        progress(f"round {len(quiet) + 1} of {rounds}")
+        share = others_share()
+        trials = _round(runners)
+        (quiet if share() < IDLE_SHARE else noisy).append(trials)
+    idle = len(quiet) == rounds
+    taken = quiet if idle else quiet + noisy
+    return Measured(tuple(_times(trials) for trials in zip(*taken, strict=True)), len(taken), idle)
+
+
+def _round(runners: Sequence[Runner]) -> list[_Trials]:
+    trials = []
+    for runner in runners:
+        trial = _Trials([float(np.median(runner.throughput()))])
+        if runner.contestant.layout == "state":
+            trial.latency.append(float(np.median(runner.latency())))
+            trial.tail.append(runner.tail())
+        trials.append(trial)
+    return trials
+
+
+def _times(trials: Sequence[_Trials]) -> Times:
+    latency = [value for trial in trials for value in trial.latency]
+    blocks = [block for trial in trials for block in trial.tail]
+    return Times(
+        throughput=Spread.of([value for trial in trials for value in trial.throughput]),
+        latency=Spread.of(latency) if latency else None,
+        tail=_tail(np.concatenate(blocks)) if blocks else None,
+    )
+
+
+def _tail(blocks: Array) -> Tail:
+    median, high = np.percentile(blocks, [50, 99.99]).tolist()
+    return Tail(median, high, float(blocks.max()), len(blocks))

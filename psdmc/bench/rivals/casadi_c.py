@@ -1,0 +1,128 @@
+"""CasADi's C from Pinocchio's algorithms on symbols: one state a call, and one state per SIMD lane."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from psdmc.bench.build import NATIVE, built, cxx
+from psdmc.bench.case import Case, robot_as_numbers
+from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.bench.rivals.pinocchio_cpp import DEFINES, SYMBOLS, includes, pinocchio_prefix, standard_parameters
+from psdmc.bench.versions import version_of
+from psdmc.errors import ToolchainError
+from psdmc.toolchain.compiler_command import find_compiler
+
+RIVAL = "CasADi"
+
+WAYS = {**{name: (name,) for name in SYMBOLS}, "forward_dynamics": ("forward_dynamics_aba", "forward_dynamics_ldl")}
+"""Its functions; forward dynamics by articulated bodies, or from M and h by L D L^T."""
+
+
+def contestants(case: Case, flags: tuple[str, ...] = NATIVE) -> list[Contestant | Unavailable]:
+    """CasADi's functions for one robot."""
+    try:
+        generated, counts = written(case)
+    except ToolchainError as error:
+        return [Unavailable(RIVAL, error.message)]
+    found: list[Contestant | Unavailable] = []
+    for layout, build in (("state", _scalar), ("lanes", _by_lane)):
+        try:
+            found += _entered(case, build(case, generated, flags), layout == "lanes", counts)
+        except ToolchainError as error:
+            found.append(Unavailable(f"{RIVAL} ({layout})", error.message))
+    return found
+
+
+def _entered(case: Case, library: Path, by_lane: bool, counts: dict[str, tuple[int, int]]) -> list[Contestant]:
+    n = case.n
+    outputs = {"mass_matrix": n * n, "regressor": 10 * n * n}
+    return [
+        Contestant(
+            RIVAL,
+            function,
+            library,
+            way,
+            outputs.get(function, n),
+            variant=way.removeprefix(function).strip("_").upper(),
+            layout="lanes" if by_lane else "state",
+            lanes=ctypes.CDLL(str(library)).lanes() if by_lane else 1,
+            weights=standard_parameters(case) if function == "regressor" else None,
+            operations=counts[way],
+        )
+        for function, ways in WAYS.items()
+        for way in ways
+    ]
+
+
+def written(case: Case) -> tuple[str, dict[str, tuple[int, int]]]:
+    """CasADi's C for the case, and (multiplications, additions) of its functions."""
+    command = [str(_writer()), "robot.txt", "generated"]
+    product = built("generated.c", command, {"robot.txt": robot_as_numbers(case.chain)})
+    lines = (line.split() for line in product.with_suffix(".txt").read_text().splitlines())
+    return product.read_text(), {name: (int(mul), int(add)) for name, mul, add in lines}
+
+
+@lru_cache
+def _writer() -> Path:
+    """The program that writes C; it is compiled once for all robots, unoptimised: it runs for a tenth of a second."""
+    prefix, casadi = pinocchio_prefix(), _casadi()
+    names = ("casadi_writer.cpp", "pinocchio_model.hpp")
+    command = [cxx(), "-std=c++17", "-O0", "-DNDEBUG", *DEFINES, *includes(prefix)]
+    command += ["-isystem", str(casadi / "include"), "casadi_writer.cpp", "-o", "casadi_writer"]
+    command += [f"-L{prefix / 'lib'}", f"-L{casadi}", "-lcasadi", "-lpinocchio_default"]
+    command += [f"-Wl,-rpath,{prefix / 'lib'}", f"-Wl,-rpath,{casadi}", f"-Wl,-rpath-link,{prefix / 'lib'}"]
+    depends = [version_of("pin"), version_of("casadi")]
+    return built("casadi_writer", command, {name: source(name) for name in names}, depends)
+
+
+def _casadi() -> Path:
+    """Where the casadi wheel keeps headers and libraries."""
+    found = find_spec("casadi")
+    if found is None or found.origin is None:
+        raise ToolchainError("the wheel 'casadi' is not installed", "pip install casadi")
+    folder = Path(found.origin).parent
+    if not (folder / "include/casadi/casadi.hpp").is_file():
+        raise ToolchainError("this CasADi came without C++ headers", "install the wheel 'casadi'")
+    return folder
+
+
+def _scalar(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
+    """The C as CasADi wrote it, compiled as C."""
+    del case
+    lines = ['#include "loops.hpp"', 'extern "C" {']
+    lines += [f"int {way}(const double **, double **, int *, double *, int);" for way in _all_ways()]
+    lines += ["}"]
+    lines += [
+        f"PSDMC_CONTESTANT({way}, [](const double *q, const double *qd, const double *x, double *out) {{ "
+        f"const double *in[] = {{q, qd, x}}; {way}(in, &out, nullptr, nullptr, 0); }})"
+        for way in _all_ways()
+    ]
+    sources = {"generated.c": generated, "glue.cpp": "\n".join(lines) + "\n", "loops.hpp": source("loops.hpp")}
+    command = [*find_compiler().command, *flags, "-shared", "generated.c", "glue.cpp", "-o", "casadi.so", "-lm"]
+    return built("casadi.so", command, sources)
+
+
+def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
+    """The same C as C++, where its number is a vector."""
+    size = {way: case.n for way in _all_ways()} | {"mass_matrix": case.n**2, "regressor": 10 * case.n**2}
+    lines = ['#include "loops.hpp"', '#include "casadi_lanes.hpp"', "namespace casadi_c {", '#include "generated.c"', "}"]
+    lines += ['PSDMC_EXPORT int lanes() { return PSDMC_LANES; }']
+    lines += [
+        f"PSDMC_BATCH_CONTESTANT({way}, [](std::size_t count, const double *q, const double *qd, const double *x, "
+        f"double *out) {{ for (std::size_t i = 0; i < count; i += PSDMC_LANES) {{ "
+        f"const Lanes *in[] = {{(const Lanes *)(q + i * {case.n}), (const Lanes *)(qd + i * {case.n}), "
+        f"(const Lanes *)(x + i * {case.n})}}; Lanes *to = (Lanes *)(out + i * {size[way]}); "
+        f"casadi_c::{way}(in, &to, nullptr, nullptr, 0); }} }})"
+        for way in _all_ways()
+    ]
+    names = ("loops.hpp", "casadi_lanes.hpp")
+    sources = {"generated.c": generated, "glue.cpp": "\n".join(lines) + "\n"} | {name: source(name) for name in names}
+    command = [cxx(), "-std=c++17", "-w", *flags, "-shared", "glue.cpp", "-o", "casadi_lanes.so", "-lmvec", "-lm"]
+    return built("casadi_lanes.so", command, sources)
+
+
+def _all_ways() -> list[str]:
+    return [way for ways in WAYS.values() for way in ways]

@@ -1,0 +1,134 @@
+// Writes C for one robot: Pinocchio's algorithms run on CasADi's symbols, printed by CasADi's code generator.
+//
+// usage: casadi_writer ROBOT.txt NAME; writes NAME.c, and NAME.txt: per function its multiplications and additions
+#include <pinocchio/autodiff/casadi.hpp>
+
+#include <fstream>
+#include <pinocchio/algorithm/aba.hpp>
+#include <pinocchio/algorithm/crba.hpp>
+#include <pinocchio/algorithm/regressor.hpp>
+#include <pinocchio/algorithm/rnea.hpp>
+
+#include "pinocchio_model.hpp"
+
+namespace {
+
+using casadi::SX;
+using Model = pinocchio::ModelTpl<SX>;
+using Data = pinocchio::DataTpl<SX>;
+using Vector = Eigen::Matrix<SX, Eigen::Dynamic, 1>;
+using Matrix = Eigen::Matrix<SX, Eigen::Dynamic, Eigen::Dynamic>;
+
+/// Row-major, as psdmc puts matrices out.
+SX column(const Matrix &matrix) {
+  SX all(matrix.size(), 1);
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
+    for (Eigen::Index k = 0; k < matrix.cols(); ++k) all(row * matrix.cols() + k) = matrix(row, k);
+  return casadi::SX::densify(all);
+}
+
+/// x with A x = b, A symmetric and positive definite: unrolled A = L D L^T, from the last joint to the first.
+Vector solved(Matrix A, Vector b) {
+  const auto n = A.rows();
+  for (Eigen::Index k = n - 1; k > 0; --k)
+    for (Eigen::Index i = k - 1; i >= 0; --i) {
+      const SX factor = A(i, k) / A(k, k);
+      for (Eigen::Index j = i; j >= 0; --j) A(j, i) -= factor * A(j, k);
+      b(i) -= factor * b(k);
+      A(k, i) = factor;
+    }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    b(i) /= A(i, i);
+    for (Eigen::Index j = 0; j < i; ++j) b(i) -= A(i, j) * b(j);
+  }
+  return b;
+}
+
+/// Multiplications, and additions with subtractions and divisions, as psdmc counts its own.
+std::string operations(const casadi::Function &f) {
+  int mul = 0, add = 0;
+  for (casadi_int k = 0; k < f.n_instructions(); ++k) switch (f.instruction_id(k)) {
+      case casadi::OP_MUL:
+      case casadi::OP_SQ:
+        ++mul;
+        break;
+      case casadi::OP_ADD:
+      case casadi::OP_SUB:
+      case casadi::OP_TWICE:
+      case casadi::OP_DIV:
+      case casadi::OP_INV:
+        ++add;
+    }
+  return f.name() + " " + std::to_string(mul) + " " + std::to_string(add);
+}
+
+/// The two files that grow function by function.
+struct Generated {
+  casadi::CodeGenerator code;
+  std::ofstream counts;
+
+  explicit Generated(const std::string &name)
+      : code(name, {{"with_header", false}, {"casadi_int", "int"}}), counts(name + ".txt") {}
+
+  void add(const casadi::Function &function) {
+    code.add(function);
+    counts << operations(function) << "\n";
+  }
+
+  void generate() { code.generate(); }
+};
+
+struct Writer {
+  Model model;
+  SX q, qd, x;
+  Vector q_, qd_, x_;
+
+  explicit Writer(const pinocchio::Model &numbers) : model(numbers.cast<SX>()) {
+    const auto n = numbers.nv;
+    q = SX::sym("q", n), qd = SX::sym("qd", n), x = SX::sym("x", n);
+    q_.resize(n), qd_.resize(n), x_.resize(n);
+    for (int i = 0; i < n; ++i) q_(i) = q(i), qd_(i) = qd(i), x_(i) = x(i);
+  }
+
+  casadi::Function function(const std::string &name, const Matrix &output) const {
+    return casadi::Function(name, {q, qd, x}, {cse(column(output))});
+  }
+
+  Matrix mass_matrix() const {
+    Data data(model);
+    pinocchio::crba(model, data, q_, pinocchio::Convention::LOCAL);
+    Matrix M = data.M;
+    for (Eigen::Index i = 0; i < M.rows(); ++i)
+      for (Eigen::Index j = 0; j < i; ++j) M(i, j) = M(j, i);
+    return M;
+  }
+
+  Vector nonlinear_effects() const {
+    Data data(model);
+    return pinocchio::nonLinearEffects(model, data, q_, qd_);
+  }
+
+  void write(const std::string &name) const {
+    Data data(model);
+    Generated code(name);
+    code.add(function("inverse_dynamics", pinocchio::rnea(model, data, q_, qd_, x_)));
+    code.add(function("forward_dynamics_aba", pinocchio::aba(model, data, q_, qd_, x_)));
+    code.add(function("forward_dynamics_ldl", solved(mass_matrix(), x_ - nonlinear_effects())));
+    code.add(function("mass_matrix", mass_matrix()));
+    code.add(function("nonlinear_effects", nonlinear_effects()));
+    code.add(function("gravity", pinocchio::computeGeneralizedGravity(model, data, q_)));
+    code.add(function("regressor", pinocchio::computeJointTorqueRegressor(model, data, q_, qd_, x_)));
+    code.generate();
+  }
+};
+
+}  // namespace
+
+int main(int count, char **arguments) {
+  if (count != 3) return 2;
+  std::ifstream text(arguments[1]);
+  pinocchio::Model numbers;
+  read_model(text, numbers);
+  Writer(numbers).write(arguments[2]);
+  return 0;
+}

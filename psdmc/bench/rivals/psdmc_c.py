@@ -1,0 +1,112 @@
+"""psdmc's own libraries: the compiled package behind the same loops as every rival."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from psdmc.bench.build import NATIVE, built, cxx, produced
+from psdmc.bench.case import Case
+from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.emit.info import package_info
+from psdmc.emit.options import EmitOptions
+from psdmc.emit.package import PackageView, library_files, package_view
+from psdmc.errors import PsdmcError
+from psdmc.lower.kernels import Lowering, lower
+from psdmc.program.cost import cost
+from psdmc.program.functions import BY_NAME, Function
+from psdmc.program.kernel import Kernel
+from psdmc.toolchain.compiler_command import find_compiler, run
+
+FUNCTIONS = (
+    "inverse_dynamics",
+    "forward_dynamics",
+    "mass_matrix",
+    "nonlinear_effects",
+    "gravity",
+    "regressor",
+)
+"""What the benchmark measures, of all that psdmc generates."""
+
+EXPANDED = ("inverse_dynamics", "forward_dynamics")
+"""What PSDM-2021 and Denso-2022 published times of."""
+
+
+def contestants(
+    case: Case, lowering: Lowering, flags: tuple[str, ...] = NATIVE
+) -> list[Contestant | Unavailable]:
+    """psdmc's functions for one robot: one state a call, rows, and lane by lane."""
+    rival = f"psdmc {lowering}"
+    try:
+        functions = EXPANDED if lowering == "expanded" else FUNCTIONS
+        kernels = {name: k for name, k in lower(case.model, lowering, functions).items() if not k.theta}
+        package = package_view(package_info(case.model, name="bench"), kernels, EmitOptions())
+        library = compiled(package, flags)
+    except PsdmcError as error:
+        return [Unavailable(rival, error.message)]
+    return [one for kernel in kernels.values() for one in _ways(case, rival, kernel, library, package.lanes)]
+
+
+def _ways(case: Case, rival: str, kernel: Kernel, library: Path, lanes: int) -> list[Contestant]:
+    name = kernel.name
+    size = kernel.function.size(case.n, case.model.l)
+    weights = case.model.theta_b if name == "regressor" else None
+    single, batch = (cost(program) for program in (kernel.single, kernel.batch))
+    one = Contestant(
+        rival, name, library, name, size, weights=weights, operations=(single.mul, single.add + single.div)
+    )
+    many = (batch.mul, batch.add + batch.div)
+    rows = Contestant(
+        rival, name, library, f"{name}_batch", size, layout="rows", weights=weights, operations=many
+    )
+    by_lane = Contestant(
+        rival, name, library, f"{name}_batch_soa", size,
+        layout="lanes", lanes=lanes, weights=weights, operations=many,
+    )  # fmt: skip
+    return [one, rows, by_lane]
+
+
+def compiled(package: PackageView, flags: tuple[str, ...]) -> Path:
+    """The package as a shared library behind the loops; ToolchainError where it does not compile."""
+    files = library_files(package)
+    robot = package.robot
+    home = _library(files, package.sources, robot, flags)
+    header = next(path for path in files if path.startswith("include/"))
+    sources = {"loops.hpp": source("loops.hpp"), "glue.cpp": glue(package), "library.h": files[header]}
+    command = [cxx(), "-std=c++17", *flags, "-shared", "-I.", "glue.cpp", str(home / "library.so")]
+    return built("contestant.so", [*command, "-o", "contestant.so"], sources)
+
+
+def _library(files: dict[str, str], sources: tuple[str, ...], robot: str, flags: tuple[str, ...]) -> Path:
+    """Folder of the package's own library, compiled file by file as toolchain/compile.py does."""
+    command = (*find_compiler().command, "-std=c99", *flags, "-shared", "-Iinclude", *sources, "-o", "library.so")
+
+    def build(folder: Path) -> None:
+        for path, text in files.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text)
+        run((*command, "-lm"), robot, str(folder))
+
+    return produced(build, files, ("bench", *command))
+
+
+def glue(package: PackageView) -> str:
+    """C++ that puts the package's functions behind the loops."""
+    lines = ['#include "loops.hpp"', '#include "library.h"']
+    for view in package.functions:
+        function = BY_NAME[view.name]
+        symbol = f"{package.robot}_{view.name}"
+        lines += [
+            f"PSDMC_CONTESTANT({view.name}, [](const double *q, const double *qd, const double *x, double *out) "
+            f"{{ {symbol}({_arguments(function)}); }})"
+        ]
+        lines += [
+            f"PSDMC_BATCH_CONTESTANT({view.name}{suffix}, [](size_t count, const double *q, const double *qd, "
+            f"const double *x, double *out) {{ {symbol}{suffix}(count, {_arguments(function)}); }})"
+            for suffix in ("_batch", "_batch_soa")
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _arguments(function: Function) -> str:
+    return ", ".join((*(("q", "qd", "x")[: len(function.inputs)]), "out"))
+

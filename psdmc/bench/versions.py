@@ -1,0 +1,18 @@
+"""Installed versions of what is compared."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+
+PACKAGES = ("psdmc", "numpy", "pin", "casadi", "mujoco")
+
+
+def version_of(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def versions() -> dict[str, str]:
+    return {package: version_of(package) for package in PACKAGES}
