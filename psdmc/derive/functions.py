@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +22,6 @@ Integers = NDArray[np.int64]
 RADIX = 5
 _SINE_COSINE = np.array([(0, 0), (1, 0), (0, 1), (1, 1), (0, 2)], dtype=np.uint8)
 """Exponents of sine and cosine by a revolute joint's digit."""
-
-
-class Sizes(NamedTuple):
-    """How many functions each kind of acceleration has."""
-
-    gravity: int
-    acceleration: int
-    centrifugal: int
-    coriolis: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,18 +90,3 @@ class Functions:
                 table[n + j], table[2 * n + j] = _SINE_COSINE[digits].T
         table[3 * n :] = self.rate_exponents()[rates].T
         return table
-
-
-def sizes_of(E: NDArray[np.uint8]) -> Sizes:
-    """Count functions by kind of acceleration."""
-    n = E.shape[0] // 5
-    speeds, accelerations = E[3 * n : 4 * n], E[4 * n :]
-    by_acceleration = accelerations.any(axis=0)
-    squared = (speeds == 2).any(axis=0)
-    moving = speeds.any(axis=0)
-    return Sizes(
-        int(np.count_nonzero(~moving & ~by_acceleration)),
-        int(np.count_nonzero(by_acceleration)),
-        int(np.count_nonzero(squared)),
-        int(np.count_nonzero(moving & ~squared)),
-    )

@@ -17,8 +17,8 @@ from psdmc.derive.terms import Terms
 Array = NDArray[np.float64]
 
 PIVOT_TOLERANCE = 1e-10
-"""A column whose share left by earlier pivots is below this depends on them; one below this share of the longest
-column has no effect. Rounding leaves some 1e-14."""
+"""A column whose share left by earlier pivots is below this depends on them; one below this share of the
+longest column has no effect. Rounding leaves some 1e-14."""
 
 PIVOT_SHARES = (*(0.5**k for k in range(1, 11)), PIVOT_TOLERANCE)
 """The parameters are gone through once for each of these, in their own order: a parameter becomes a pivot

@@ -83,3 +83,11 @@ def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
         terms.value[source] * right.data[place],
     )
     return summed(spread, tolerance)
+
+
+def restricted(terms: Terms, columns: Integers) -> Terms:
+    """The terms of some columns alone, renumbered in the order given."""
+    number = np.full(int(max(terms.column.max(initial=0), columns.max(initial=0))) + 1, -1)
+    number[columns] = np.arange(len(columns))
+    place = number[terms.column]
+    return selected(terms._replace(column=place), place >= 0)

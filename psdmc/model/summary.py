@@ -1,0 +1,101 @@
+"""What a robotics engineer wants to know about a model, as plain data for whoever prints it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.equations import BaseParameter
+from psdmc.model.evaluate import expanded
+from psdmc.robot.chain import Joint
+
+
+class Sizes(NamedTuple):
+    """How many functions each kind of acceleration has."""
+
+    gravity: int
+    acceleration: int
+    centrifugal: int
+    coriolis: int
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A model at a glance.
+
+    sizes        functions by kind of acceleration; None where the model was not expanded
+    entries      non-zero entries of P; None likewise
+    certificate  largest torque error relative to the joint's largest torque, per joint
+    """
+
+    name: str
+    convention: str
+    base: str
+    tip: str
+    gravity: tuple[float, float, float]
+    joints: tuple[Joint, ...]
+    p: int | None
+    l: int
+    sizes: Sizes | None
+    entries: int | None
+    base_parameters: tuple[BaseParameter, ...]
+    certificate: tuple[float, ...]
+    notes: tuple[str, ...]
+    source_name: str | None
+    source_sha256: str | None
+    content_hash: str
+
+
+def summary(model: DynamicsModel) -> Summary:
+    """Everything that `psdmc show` prints by default."""
+    chain, kept = model.chain, model.provenance
+    gx, gy, gz = chain.gravity.tolist()
+    return Summary(
+        name=chain.name,
+        convention=chain.convention,
+        base=chain.base_name,
+        tip=chain.tip_name,
+        gravity=(gx, gy, gz),
+        joints=chain.joints,
+        p=model.p,
+        l=model.l,
+        sizes=None if model.E is None else sizes_of(model.E),
+        entries=None if model.P is None else sum(int(matrix.nnz) for matrix in model.P),
+        base_parameters=model.base_parameters,
+        certificate=tuple(model.certificate.tolist()),
+        notes=chain.notes,
+        source_name=kept.get("source_name"),
+        source_sha256=kept.get("source_sha256"),
+        content_hash=model.content_hash,
+    )
+
+
+def sizes_of(E: NDArray[np.uint8]) -> Sizes:
+    """Count the functions of E (5n, p) by kind of acceleration."""
+    n = E.shape[0] // 5
+    speeds, accelerations = E[3 * n : 4 * n], E[4 * n :]
+    accelerating, moving = accelerations.any(axis=0), speeds.any(axis=0)
+    squared = (speeds == 2).any(axis=0)
+    return Sizes(
+        int(np.count_nonzero(~moving & ~accelerating)),
+        int(np.count_nonzero(accelerating)),
+        int(np.count_nonzero(squared)),
+        int(np.count_nonzero(moving & ~squared)),
+    )
+
+
+def term_texts(model: DynamicsModel) -> Iterator[str]:
+    """Every function of y as text, in the order of E: 'g s2 c3', 'qdd1 c2^2', 'qd1 qd2 s2 c2'."""
+    exponents, _ = expanded(model)
+    n = model.n
+    names = [f"{symbol}{j + 1}" for symbol in ("q", "s", "c", "qd", "qdd") for j in range(n)]
+    order = [*range(4 * n, 5 * n), *range(3 * n, 4 * n), *range(3 * n)]
+    for column in exponents.T:
+        factors = [names[r] + ("^2" if column[r] == 2 else "") for r in order if column[r]]
+        is_gravity = not column[3 * n :].any()
+        yield " ".join(["g", *factors] if is_gravity else factors)
