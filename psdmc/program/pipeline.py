@@ -10,6 +10,7 @@ from psdmc.program.passes.absorb_negations import absorb_negations
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.passes.factor_common import factor_common
 from psdmc.program.passes.fold_constants import fold_constants
+from psdmc.program.passes.fuse_sums import fuse_sums
 from psdmc.program.passes.merge_duplicates import merge_duplicates
 from psdmc.program.passes.schedule import schedule
 from psdmc.program.program import Program
@@ -26,7 +27,7 @@ ROUND: tuple[Pass, ...] = (
 )
 """Repeated while it saves operations: a bracket taken out of one sum may equal another, or be a factor."""
 
-LAST: tuple[Pass, ...] = (merge_duplicates, drop_unused, schedule)
+LAST: tuple[Pass, ...] = (merge_duplicates, drop_unused, fuse_sums, schedule)
 
 LONGEST = 10
 """Rounds at most; two or three are usual."""

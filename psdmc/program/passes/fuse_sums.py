@@ -1,0 +1,134 @@
+"""Nest sums so that their results are ready early: what arrives late is added last, products by multiply-add."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from psdmc.program.program import Instr, Op, Program
+
+Term = tuple[bool, int]
+"""A term of a sum: whether it is subtracted, and the value."""
+
+LATENCY = {Op.LOAD: 5, Op.CONST: 0, Op.ADD: 3, Op.SUB: 3, Op.MUL: 3, Op.DIV: 13, Op.NEG: 1, Op.SIN: 60, Op.COS: 60}
+"""Cycles until a result is ready, about as on current x86 and Arm cores; only their order of size matters."""
+
+FUSED_LATENCY = 4
+
+
+def fuse_sums(program: Program) -> Program:
+    """Re-nest every sum, always adding the two parts that are ready soonest.
+
+    Needs:  every argument precedes its use.
+    Keeps:  operation counts; output values up to rounding (sums are reordered).
+    Gives:  short dependency chains, counted with fused multiply-adds.
+    """
+    return _Fusion(program).run()
+
+
+class _Part(NamedTuple):
+    """A term or partial sum under construction: `factors` of a product that the next addition swallows, else none."""
+
+    negative: bool
+    factors: tuple[int, ...]
+    index: int
+
+
+class _Fusion:
+    """Rebuilds the program; sums whose value is used once inside another sum are taken apart first."""
+
+    def __init__(self, program: Program) -> None:
+        self.program, self.uses = program, program.uses()
+        self.inner = self._inner_sums()
+        self.body: list[Instr] = []
+        self.ready: list[int] = []
+        self.new_index: dict[int, int] = {}
+
+    def run(self) -> Program:
+        for i, instr in enumerate(self.program.body):
+            if i in self.inner:
+                continue
+            if instr.op in (Op.ADD, Op.SUB):
+                self.new_index[i] = self._chain(self._terms(i))
+            else:
+                self.new_index[i] = self._append(instr.renumbered(self.new_index))
+        outputs = tuple((slot, self.new_index[i]) for slot, i in self.program.outputs)
+        return Program(tuple(self.body), outputs)
+
+    def _inner_sums(self) -> set[int]:
+        """Sums used once, by a sum."""
+        body = self.program.body
+        return {
+            a
+            for instr in body
+            if instr.op in (Op.ADD, Op.SUB)
+            for a in instr.args
+            if body[a].op in (Op.ADD, Op.SUB) and self.uses[a] == 1
+        }
+
+    def _terms(self, root: int) -> list[Term]:
+        """The flattened sum; its first term is never subtracted."""
+        out: list[Term] = []
+        pending: list[Term] = [(False, root)]
+        while pending:
+            negative, index = pending.pop()
+            instr = self.program.body[index]
+            if index == root or index in self.inner:
+                left, right = instr.args
+                pending.append((negative != (instr.op is Op.SUB), right))
+                pending.append((negative, left))
+            else:
+                out.append((negative, index))
+        return out
+
+    def _chain(self, terms: list[Term]) -> int:
+        """Add the two terms that are done soonest until one is left."""
+        parts = [_Part(negative, self._operands(index), self.new_index[index]) for negative, index in terms]
+        parts.sort(key=lambda part: part.index)
+        while len(parts) > 1:
+            first = min(range(len(parts)), key=lambda k: (self._done(parts[k]), k))
+            second = min(
+                (k for k in range(len(parts)) if k != first),
+                key=lambda k: (self._sum_done(parts[first], parts[k]), k),
+            )
+            low, high = sorted((first, second))
+            total = self._add(parts[low], parts[high])
+            parts[low] = total
+            del parts[high]
+        return parts[0].index
+
+    def _operands(self, index: int) -> tuple[int, ...]:
+        """Factors of a product that an addition may swallow."""
+        instr = self.program.body[index]
+        if instr.op is Op.MUL and self.uses[index] == 1:
+            return tuple(self.new_index[a] for a in instr.args)
+        return ()
+
+    def _done(self, part: _Part) -> int:
+        return max(self.ready[a] for a in part.factors) if part.factors else self.ready[part.index]
+
+    def _sum_done(self, a: _Part, b: _Part) -> int:
+        if not a.factors and not b.factors:
+            return max(self.ready[a.index], self.ready[b.index]) + LATENCY[Op.ADD]
+        if a.factors and b.factors:
+            return min(
+                max(self.ready[x.index], self._done(y)) + FUSED_LATENCY for x, y in ((a, b), (b, a))
+            )
+        return max(self._done(a), self._done(b)) + FUSED_LATENCY
+
+    def _add(self, a: _Part, b: _Part) -> _Part:
+        """The sum of two parts, negated where both or the one that is left negative are."""
+        when = self._sum_done(a, b)
+        if a.negative == b.negative:
+            instr = Instr(Op.ADD, (a.index, b.index)).canonical()
+        else:
+            plus, minus = (b, a) if a.negative else (a, b)
+            instr = Instr(Op.SUB, (plus.index, minus.index))
+        self.body.append(instr)
+        self.ready.append(when)
+        return _Part(a.negative and b.negative, (), len(self.body) - 1)
+
+    def _append(self, instr: Instr) -> int:
+        start = max((self.ready[a] for a in instr.args), default=0)
+        self.body.append(instr)
+        self.ready.append(start + LATENCY[instr.op])
+        return len(self.body) - 1
