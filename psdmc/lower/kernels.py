@@ -81,6 +81,10 @@ def _refusal(model: DynamicsModel, singular: SingularMassMatrix) -> InputError:
     )
 
 
+def _kernel(function: Function, theta: bool, single: Program, batch: Program, lowering: str) -> Kernel:
+    return Kernel(function, theta, optimize(single), optimize(batch, lanes=True), lowering)
+
+
 class _Lowered:
     """One model's programs; searches are shared between the functions that run the same recursion."""
 
@@ -92,12 +96,12 @@ class _Lowered:
     def kernel(self, function: Function, theta: bool) -> Kernel:
         candidates: list[Kernel] = []
         if self._may_expand(function):
-            program = optimize(lower_expanded(self.model, function.name, theta))
-            candidates.append(Kernel(function, theta, program, program, "expanded"))
+            program = lower_expanded(self.model, function.name, theta)
+            candidates.append(_kernel(function, theta, program, program, "expanded"))
         if self.lowering != "expanded" or not candidates:
-            single = optimize(self._factored(function.name, theta, SINGLE))
-            batch = optimize(self._factored(function.name, theta, BATCH))
-            candidates.append(Kernel(function, theta, single, batch, "factored"))
+            single = self._factored(function.name, theta, SINGLE)
+            batch = self._factored(function.name, theta, BATCH)
+            candidates.append(_kernel(function, theta, single, batch, "factored"))
         return min(candidates, key=lambda kernel: SINGLE.score(kernel.single))
 
     def _may_expand(self, function: Function) -> bool:
