@@ -3,6 +3,7 @@
 from psdmc.compiler import compile, derive, emit_c
 from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.store import load
 
 __all__ = [
     "DerivationError",
@@ -14,4 +15,5 @@ __all__ = [
     "compile",
     "derive",
     "emit_c",
+    "load",
 ]

@@ -1,21 +1,23 @@
-"""The command line: arguments, progress, the error boundary. No mathematics."""
+"""The commands and their arguments."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from psdmc import compiler
-from psdmc.errors import InputError, InternalError, PsdmcError
+from psdmc.cli.show import print_check, print_cost, print_model, print_terms
+from psdmc.errors import InputError
+from psdmc.lower.kernels import Lowering
+from psdmc.model.check import check_model
 from psdmc.model.store import load
-from psdmc.robot.load import DEFAULT_SNAP
+from psdmc.robot.load import DEFAULT_SNAP, load_robot
 from psdmc.toolchain.build_package import build_package
 
 app = typer.Typer(
@@ -26,8 +28,9 @@ app = typer.Typer(
     help="A compiler for robot dynamics: a robot in; small, fast, verified C out.",
 )
 
-INTERNAL_STATUS = 70
-INTERRUPTED_STATUS = 130
+CHECK_FAILED_STATUS = 5
+LARGEST_EXPANDED = 2000
+"""`show --cost` prints the expanded lowering too up to this many functions; beyond, it takes minutes."""
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="URDF, or DH table (.toml)")]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="model file made by psdmc derive (.npz)")]
@@ -93,6 +96,46 @@ def _drive_inertia(text: str | None) -> bool | tuple[float, ...]:
         ) from None
 
 
+@app.command()
+def show(
+    model: ModelFile,
+    terms: Annotated[bool, typer.Option("--terms", help="list the functions y")] = False,
+    cost: Annotated[bool, typer.Option("--cost", help="operations per function and lowering")] = False,
+) -> None:
+    """Print a model: joints, sizes, base parameters with equations, values and units, certificate."""
+    found = load(model)
+    if terms:
+        print_terms(found)
+    elif cost:
+        small = found.p is not None and found.p <= LARGEST_EXPANDED
+        both: tuple[Lowering, ...] = ("factored", "expanded")
+        with steps() as progress:
+            progress("lowering")
+            print_cost(found, both if small else both[:1])
+    else:
+        print_model(found)
+
+
+@app.command()
+def check(
+    model: ModelFile,
+    robot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="robot file to check against instead of the embedded source")
+    ] = None,
+) -> None:
+    """Check a model again, independently, against Pinocchio's own reading of its source."""
+    found = load(model)
+    source = None
+    if robot is not None:
+        source = load_robot(robot, **found.provenance.get("options", {}))
+    with steps() as progress:
+        progress("checking against Pinocchio")
+        rows = check_model(found, source)
+    print_check(rows)
+    if not all(row.passed for row in rows):
+        raise typer.Exit(CHECK_FAILED_STATUS)
+
+
 @app.command(name="emit-c")
 def emit_c(
     model: ModelFile,
@@ -127,42 +170,15 @@ def build(directory: Annotated[Path, typer.Argument(metavar="DIR", help="folder 
     """Build an emitted package through its own build files and run its self-test."""
     with steps() as progress:
         progress("building")
-        said = build_package(directory)
-    print(said.strip().splitlines()[-1] if said.strip() else f"{directory}: built, self-test passed")
+        build_package(directory)
+    print(f"{directory}: built, self-test passed")
 
 
 @contextmanager
 def steps() -> Iterator[Callable[[str], None]]:
     """A line on standard error that shows the step under way, where that is a terminal."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("", total=None)
         yield lambda step: progress.update(task, description=step)
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; errors become one line, a hint and an exit status."""
-    words = sys.argv[1:] if arguments is None else arguments
-    try:
-        app(words)
-    except PsdmcError as error:
-        _fail(words, error.message, error.hint, error.exit_status)
-    except InternalError as error:
-        _fail(words, f"internal: {error}", "this is a bug in psdmc: please report it", INTERNAL_STATUS)
-    except KeyboardInterrupt:
-        _fail(words, "interrupted", None, INTERRUPTED_STATUS)
-
-
-def _fail(words: list[str], message: str, hint: str | None, status: int) -> None:
-    """Print and leave; inside an `except`, so that --debug can show where it came from."""
-    if "--debug" in words:
-        raise
-    print("error: " + _one_line(message), file=sys.stderr)
-    if hint:
-        print("hint: " + _one_line(hint), file=sys.stderr)
-    sys.exit(status)
-
-
-def _one_line(text: Any) -> str:
-    """Untrusted text on one line of a terminal: control characters escaped."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text))

@@ -1,0 +1,122 @@
+"""What `show` and `check` print."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from psdmc.lower.kernels import Lowering, lower
+from psdmc.model.check import CheckRow
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.summary import Summary, summary, term_texts
+from psdmc.program.cost import cost
+from psdmc.robot.chain import Joint
+
+WIDTH = 160
+"""Columns of a table where the output is no terminal, so that nothing is cut."""
+
+
+def console() -> Console:
+    terminal = Console()
+    return terminal if terminal.is_terminal else Console(width=WIDTH)
+
+
+def print_model(model: DynamicsModel) -> None:
+    """The model at a glance: robot, joints, sizes, base parameters, certificate, notes."""
+    found = summary(model)
+    out = console()
+    out.print(f"[bold]{escape(found.name)}[/bold]  {escape(found.base)} to {escape(found.tip)}, {found.convention} frames")
+    out.print(f"gravity {_numbers(found.gravity)} m/s^2 in the base frame")
+    out.print(_sizes(found))
+    out.print(_joints(found.joints, found.certificate))
+    out.print(_parameters(found))
+    out.print(f"largest torque error against Newton-Euler, relative: {max(found.certificate):.1e}")
+    for note in found.notes:
+        out.print(f"note: {escape(note)}")
+    for line in _snapping(model):
+        out.print(line)
+    source = f"{found.source_name} (sha256 {found.source_sha256})" if found.source_name else "not kept"
+    out.print(f"source {escape(source)}")
+    out.print(f"model hash {found.content_hash}")
+
+
+def _sizes(found: Summary) -> str:
+    if found.sizes is None or found.p is None:
+        return f"l = {found.l} base parameters; functions not expanded (--no-expand)"
+    parts = ", ".join(f"{count} {kind}" for kind, count in found.sizes._asdict().items())
+    return f"p = {found.p} functions ({parts}), l = {found.l} base parameters, {found.entries} entries of P"
+
+
+def _joints(joints: Sequence[Joint], errors: Sequence[float]) -> Table:
+    table = Table("joint", "link", "type", "position", "speed", "acceleration", "effort", "error")
+    for joint, error in zip(joints, errors, strict=True):
+        unit = "rad" if joint.kind == "revolute" else "m"
+        limits = joint.limits
+        table.add_row(
+            escape(joint.name),
+            escape(joint.link_name),
+            joint.kind,
+            f"{_limit(limits.lower)} .. {_limit(limits.upper)} {unit}",
+            f"{_limit(limits.speed)} {unit}/s",
+            f"{_limit(limits.acceleration)} {unit}/s^2",
+            f"{_limit(limits.effort)} {'N m' if joint.kind == 'revolute' else 'N'}",
+            f"{error:.1e}",
+        )
+    return table
+
+
+def _parameters(found: Summary) -> Table:
+    table = Table("theta_b", "value", "unit", "equation, about the link frames")
+    for index, parameter in enumerate(found.base_parameters, start=1):
+        value = "unknown" if parameter.value is None else f"{parameter.value:.6g}"
+        table.add_row(str(index), value, parameter.unit, escape(parameter.equation))
+    return table
+
+
+def _snapping(model: DynamicsModel) -> list[str]:
+    effect = model.provenance.get("snap_torque_change")
+    if not model.provenance.get("snapped"):
+        return []
+    if effect is None:
+        return ["snapping: its effect on torques is unknown, as the inertias are"]
+    return [f"snapping changed torques by at most {max(effect):.2g} N m"]
+
+
+def _limit(value: float) -> str:
+    return "none" if math.isinf(value) else f"{value:.4g}"
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{value:g}" for value in values)
+
+
+def print_terms(model: DynamicsModel) -> None:
+    """Every function of y, one a line."""
+    for index, text in enumerate(term_texts(model), start=1):
+        print(f"y{index} = {text}")
+
+
+def print_cost(model: DynamicsModel, lowerings: Sequence[Lowering]) -> None:
+    """Operations of each function per lowering; for one state, and where they differ for one state per lane."""
+    table = Table("function", "lowering", "mul", "add", "mul + add", "div", "sincos", "fused", "in lanes")
+    for lowering in lowerings:
+        for name, kernel in lower(model, lowering).items():
+            if kernel.lowering == lowering:
+                one, lanes = cost(kernel.single), cost(kernel.batch)
+                figures = (one.mul, one.add, one.total, one.div, one.sincos, one.fused)
+                table.add_row(name, lowering, *map(str, figures), f"{lanes.total} + {lanes.sincos} sincos")
+    console().print(table)
+
+
+def print_check(rows: Sequence[CheckRow]) -> None:
+    """Each comparison with Pinocchio and its verdict."""
+    table = Table("quantity", "Pinocchio's", "relative error", "limit", "")
+    for row in rows:
+        limit = "" if row.limit is None else f"{row.limit:.0e}"
+        verdict = "" if row.limit is None else "pass" if row.passed else "FAIL"
+        table.add_row(row.name, row.against, f"{row.error:.1e}", limit, verdict)
+    console().print(table)
