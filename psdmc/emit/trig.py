@@ -91,10 +91,10 @@ NUMBERS: dict[Real, Numbers] = {
     "float": Numbers(
         two_over_pi=float.fromhex("0x1.45f306p-1"),
         half_pi=(
-            float.fromhex("0x1.922p+0"),
-            float.fromhex("-0x1.2afp-18"),
-            float.fromhex("0x1.0b48p-34"),
-            float.fromhex("-0x1.ee59dap-50"),
+            float.fromhex("0x1.9218p+0"),
+            float.fromhex("0x1.ed5p-14"),
+            float.fromhex("0x1.10bp-30"),
+            float.fromhex("0x1.184698p-44"),
         ),
         sin_terms=(
             float.fromhex("0x1.555546p-3"),

@@ -1,12 +1,20 @@
 /* Greatest error, in units in the last place, of several builds of one sincos over many angles.
 
    Compile with REAL, DIGITS (53 or 24) and VARIANTS, a list of X(name): each name is a function
-   void name(size_t count, const REAL *x, REAL *s, REAL *c), count a multiple of 16. Reference: long double
-   (x87, 64 digits, glibc's full argument reduction). */
+   void name(size_t count, const REAL *x, REAL *s, REAL *c), count a multiple of 16. Reference: glibc's
+   long double (x87, 64 digits, full argument reduction), for float its double. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+
+#if DIGITS == 53
+#define EXACT_SIN(angle) sinl((long double)(angle))
+#define EXACT_COS(angle) cosl((long double)(angle))
+#else
+#define EXACT_SIN(angle) sin((double)(angle))
+#define EXACT_COS(angle) cos((double)(angle))
+#endif
 
 enum { BLOCK = 16384 };
 
@@ -71,8 +79,8 @@ static long angles;
 static void compare_block(void)
 {
     for (int i = 0; i < BLOCK; ++i) {
-        exact_s[i] = sinl((long double)x[i]);
-        exact_c[i] = cosl((long double)x[i]);
+        exact_s[i] = EXACT_SIN(x[i]);
+        exact_c[i] = EXACT_COS(x[i]);
         scale_s[i] = places_per_unit(exact_s[i]);
         scale_c[i] = places_per_unit(exact_c[i]);
     }
@@ -142,11 +150,33 @@ static void near_multiples(const char *name, double limit, int around)
     report(name);
 }
 
-/* accuracy LIMIT BLOCKS: BLOCKS blocks of angles per uniform range. */
+#if DIGITS == 24
+/* Every float from `least` to the limit: the others have k = 0 and no reduction, the negative ones the same digits. */
+static void every_float(const char *name, float least, float limit)
+{
+    float angle = least;
+    while (angle < limit) {
+        for (int i = 0; i < BLOCK; ++i) {
+            x[i] = angle;
+            angle = angle < limit ? nextafterf(angle, INFINITY) : limit;
+        }
+        compare_block();
+    }
+    report(name);
+}
+#endif
+
+/* accuracy LIMIT BLOCKS: BLOCKS blocks of angles per uniform range; accuracy LIMIT every: all floats. */
 int main(int count, char **words)
 {
     const double limit = count > 1 ? atof(words[1]) : 0;
     const long blocks = count > 2 ? atol(words[2]) : 0;
+#if DIGITS == 24
+    if (limit > 0 && count > 2 && words[2][0] == 'e') {
+        every_float("every_float", 0x1p-3f, (float)limit);
+        return 0;
+    }
+#endif
     if (limit <= 0 || blocks <= 0)
         return 2;
     uniform_range("uniform_pi", 3.2, blocks);

@@ -1,18 +1,23 @@
-"""Builds of the rendered sincos for the tests: every compiler, target and floating-point mode that is promised."""
+"""Builds of the rendered sincos for the tests: each compiler, target and floating-point mode promised."""
 
 from __future__ import annotations
 
+import ctypes
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from numpy.typing import NDArray
 
 from psdmc.emit.trig import NUMBERS, Far, Real, scalar_trig, trig_preamble, vector_trig
 
 TEMPLATES = Path(__file__).parents[2] / "templates"
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Werror".split()
+STRICT = ("-std=c99", *(f"-W{kind}" for kind in ("all", "extra", "pedantic", "conversion", "shadow")))
+STRICT += ("-Wdouble-promotion", "-Werror")
 FAST_CONTRACT = "-ffp-contract=fast"
 
 
@@ -69,7 +74,9 @@ def render(build: Build, real: Real) -> str:
     def fill(template: str, view: object) -> str:
         return environment.get_template(f"trig/{template}.jinja").render(trig=view) + "\n"
 
-    text = "#include <stddef.h>\n#include <string.h>\n" + fill("preamble", trig_preamble("arm", real, build.far))
+    text = "#include <stddef.h>\n#include <string.h>\n" + fill(
+        "preamble", trig_preamble("arm", real, build.far)
+    )
     lanes = build.vector_bytes * 8 // NUMBERS[real].bits
     if lanes == 0:
         scalar = scalar_trig("arm", real, build.far)
@@ -103,3 +110,23 @@ def run(*command: str) -> str:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"{' '.join(command)}\n{done.stdout}{done.stderr}"
     return done.stdout
+
+
+Sincos = Callable[[NDArray[np.floating]], tuple[NDArray[np.floating], NDArray[np.floating]]]
+
+
+def load(compiled: Path, name: str, real: Real) -> Sincos:
+    """The compiled function on NumPy arrays whose length is a multiple of 16."""
+    library = compiled.with_suffix(".so")
+    run("gcc", "-shared", str(compiled), "-lm", "-o", str(library))
+    function = getattr(ctypes.CDLL(str(library)), name)
+    dtype = np.float64 if real == "double" else np.float32
+
+    def sincos(angles: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+        x = np.ascontiguousarray(angles, dtype=dtype)
+        assert x.size % 16 == 0
+        s, c = np.empty_like(x), np.empty_like(x)
+        function(ctypes.c_size_t(x.size), *(array.ctypes.data_as(ctypes.c_void_p) for array in (x, s, c)))
+        return s, c
+
+    return sincos

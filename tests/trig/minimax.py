@@ -117,11 +117,15 @@ def greatest_error(coefficients: list[mp.mpf], target: Function, weight: Functio
 
 
 def half_pi_parts(exact: int, digits: int, index_digits: int) -> list[mp.mpf]:
-    """pi/2 as a sum of `exact` parts whose products with any index k are exact, and a rounded rest."""
+    """pi/2 as a sum of `exact` parts whose products with any index k are exact, and a rounded rest.
+
+    Cut off, not rounded: a negative part times k = 0 is -0, and would turn an angle of -0 into +0.
+    """
     rest = mp.pi / 2
     parts: list[mp.mpf] = []
     for _ in range(exact):
-        parts.append(round_to(rest, digits - index_digits))
+        unit = mp.mpf(2) ** (int(mp.floor(mp.log(rest, 2))) + 1 - (digits - index_digits))
+        parts.append(mp.floor(rest / unit) * unit)
         rest -= parts[-1]
     return [*parts, round_to(rest, digits)]
 
