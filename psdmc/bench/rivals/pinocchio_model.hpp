@@ -27,7 +27,9 @@ inline void read_model(std::istream &text, pinocchio::Model &model) {
     const std::string name = "joint" + std::to_string(i);
     const auto joint = kind == "revolute" ? model.addJoint(i, pinocchio::JointModelRZ(), placement, name)
                                           : model.addJoint(i, pinocchio::JointModelPZ(), placement, name);
-    model.inertias[joint] = pinocchio::Inertia::FromDynamicParameters(body);
+    // A link without a body: FromDynamicParameters would divide by its mass.
+    const bool is_empty = body.isZero(0.0);
+    model.inertias[joint] = is_empty ? pinocchio::Inertia::Zero() : pinocchio::Inertia::FromDynamicParameters(body);
   }
   model.armature = drive;
   model.gravity.linear(gravity);

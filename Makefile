@@ -1,0 +1,69 @@
+# Everything a developer runs. `make help` lists the targets; a fresh machine needs python3 (>= 3.11), gcc, g++ and make.
+
+PYTHON ?= python3
+VENV ?= .venv
+EXTRAS ?= test,bench,calibrate
+JOBS ?= auto
+RUN := $(VENV)/bin
+READY := $(VENV)/ready
+GENERATED := generated
+PSDMC := $(RUN)/psdmc
+
+# One thread per process: the tests and the benchmark bring their own parallelism, or want none.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.DEFAULT_GOAL := help
+.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+venv: $(READY) ## make the environment in .venv (the others do so where it is missing)
+
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "error: $(PYTHON) is older than 3.11"; echo "hint: make $(MAKECMDGOALS) PYTHON=python3.12"; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	@touch $@
+
+demo: $(READY) ## derive, emit, build, check and benchmark the bundled Denso VS-6556G
+	@mkdir -p $(GENERATED)
+	$(PSDMC) derive examples/robots/denso_wall.toml -o $(GENERATED)/denso_wall.npz
+	$(PSDMC) emit-c $(GENERATED)/denso_wall.npz -o $(GENERATED)/denso_wall
+	$(PSDMC) build $(GENERATED)/denso_wall
+	$(PSDMC) check $(GENERATED)/denso_wall.npz
+	$(RUN)/python -m psdmc.bench.demo $(GENERATED)/denso_wall.npz
+
+test: $(READY) ## run all tests
+	$(RUN)/python -m pytest -n $(JOBS) tests
+
+FAST := tests/test_architecture.py tests/program tests/robot
+
+check: $(READY) ## format, lint, types and the fast tests: seconds
+	$(RUN)/ruff format --check .
+	$(RUN)/ruff check .
+	$(RUN)/mypy
+	$(RUN)/python -m pytest -m 'not slow' $(FAST)
+
+golden: $(READY) ## rewrite the golden files; review their diff like code
+	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit
+	git --no-pager diff --stat -- tests/golden generated
+
+bench: $(READY) ## measure the standard robots against every rival, on an idle machine
+	$(RUN)/python -m psdmc.bench --json $(GENERATED)/bench.json
+
+bench-save: $(READY) ## keep this machine's figures to compare with later
+	$(RUN)/python -m pytest benchmarks --benchmark-only --benchmark-autosave
+
+bench-compare: $(READY) ## the same again, against the figures kept last
+	$(RUN)/python -m pytest benchmarks --benchmark-only --benchmark-compare
+
+calibrate-demo: $(READY) ## calibrate the virtual Denso end to end
+	$(RUN)/python -m psdmc.calibrate.demo
+
+clean: ## remove the environment and everything generated but the reference robot
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
+	find $(GENERATED) -mindepth 1 -maxdepth 1 ! -name two_link ! -name .gitkeep -exec rm -rf {} +
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

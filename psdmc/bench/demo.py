@@ -1,0 +1,119 @@
+"""python -m psdmc.bench.demo MODEL: one table of what a model's generated code computes, how exactly, and how fast."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from psdmc import compiler
+from psdmc.bench.agree import relative_error
+from psdmc.bench.case import Case
+from psdmc.bench.results import BenchResult, CaseResult, Measurement
+from psdmc.bench.run import Settings, run
+from psdmc.errors import PsdmcError
+from psdmc.model.check import source_of
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.store import load
+from psdmc.robot.chain import Array
+from psdmc.robot.reference import reference
+from psdmc.toolchain.call import CompiledRobot
+
+OURS, THEIRS = "psdmc factored", "Pinocchio"
+SETTINGS = Settings(rounds=3, rivals=(OURS, THEIRS))
+"""Fewer trials than `make bench`: a look, not a record."""
+
+STATES = 1000
+RANGES = (np.pi, 3.0, 5.0)
+SEED = 2021
+FUNCTIONS = ("inverse_dynamics", "forward_dynamics", "mass_matrix", "nonlinear_effects", "gravity")
+
+Progress = Callable[[str], None]
+
+
+def demo(model: DynamicsModel, progress: Progress) -> str:
+    """The table as text."""
+    progress("compiling, and comparing with Pinocchio")
+    errors = errors_against_pinocchio(model, compiler.compile(model, "factored", FUNCTIONS))
+    result = run([Case(model.chain.name, model)], SETTINGS, progress)
+    return "\n".join(_lines(model, errors, result))
+
+
+def errors_against_pinocchio(model: DynamicsModel, robot: CompiledRobot) -> dict[str, float]:
+    """Largest error of each compiled function against Pinocchio's reading of the source, relative to each output's
+    largest value over random states."""
+    pinocchio = reference(source_of(model))
+    rng = np.random.default_rng(SEED)
+    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (STATES, model.n)) for limit in RANGES)
+    arguments: dict[str, tuple[Array, ...]] = {
+        "inverse_dynamics": (q, qd, qdd),
+        "forward_dynamics": (q, qd, pinocchio.inverse_dynamics(q, qd, qdd)),
+        "mass_matrix": (q,),
+        "nonlinear_effects": (q, qd),
+        "gravity": (q,),
+    }
+    return {
+        name: relative_error(
+            getattr(robot, name)(*given).reshape(STATES, -1),
+            getattr(pinocchio, name)(*given).reshape(STATES, -1),
+        )
+        for name, given in arguments.items()
+    }
+
+
+def _lines(model: DynamicsModel, errors: dict[str, float], result: BenchResult) -> Iterator[str]:
+    case, machine = result.cases[0], result.machine
+    p = "not expanded" if model.p is None else str(model.p)
+    yield ""
+    yield f"{model.chain.name}: {model.n} joints, p = {p} functions, l = {model.l} base parameters"
+    yield f"{machine.processor}, {machine.compiler}, {machine.flags}"
+    yield ""
+    yield (
+        f"{'':<20}{'operations':>14}{'largest error':>16}{'psdmc':>12}{'psdmc batch':>13}{'Pinocchio C++':>15}{'':>8}"
+    )
+    yield f"{'':<20}{'mul + add':>14}{'to Pinocchio':>16}{'ns/call':>12}{'ns/state':>13}{'ns/call':>15}{'faster':>8}"
+    for name in FUNCTIONS:
+        yield _row(case, name, errors[name])
+    yield ""
+    if not case.idle:
+        yield "The machine was busy with other work meanwhile: times are not reliable."
+    wrong = (w for w in case.wrong if any(name in w.rival for name in FUNCTIONS))
+    for missing in (*case.unavailable, *wrong):
+        yield f"not measured: {missing.rival}: {missing.reason}"
+
+
+def _row(case: CaseResult, name: str, error: float) -> str:
+    ours, rows, theirs = (case.best(OURS, name), case.best(OURS, name, "rows"), case.best(THEIRS, name))
+    operations = "{} + {}".format(*ours.operations) if ours and ours.operations else "-"
+    ratio = f"{theirs.ns / ours.ns:.1f}x" if ours and theirs else "-"
+    label = name.replace("_", " ")
+    return (
+        f"{label:<20}{operations:>14}{error:>16.1e}{_ns(ours):>12}{_ns(rows):>13}{_ns(theirs):>15}{ratio:>8}"
+    )
+
+
+def _ns(measured: Measurement | None) -> str:
+    return f"{measured.ns:.1f}" if measured else "-"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m psdmc.bench.demo", description=__doc__)
+    parser.add_argument("model", type=Path, help="model file made by psdmc derive (.npz)")
+    options = parser.parse_args()
+    try:
+        print(demo(load(options.model), _tell))
+    except PsdmcError as error:
+        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+def _tell(step: str) -> None:
+    print(step, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
