@@ -10,7 +10,9 @@ from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Placement
 RIGHT_ANGLES = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 
 
-def random_chain(seed: int, kinds: str, *, tidy: bool = False, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> Chain:
+def random_chain(
+    seed: int, kinds: str, *, tidy: bool = False, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+) -> Chain:
     """A chain with one joint per letter of `kinds` (R or P); `tidy` takes DH-like placements with right angles,
     parallel axes and zero lengths, else axes are oblique."""
     rng = np.random.default_rng(seed)
@@ -52,7 +54,9 @@ def _tidy(rng: np.random.Generator) -> Placement:
 def _body(rng: np.random.Generator) -> np.ndarray:
     """A physical body: point masses all over."""
     points, masses = rng.uniform(-0.3, 0.3, (6, 3)), rng.uniform(0.2, 1.0, 6)
-    inertia = sum(m * (np.dot(p, p) * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, points, strict=True))
+    inertia = sum(
+        m * (np.dot(p, p) * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, points, strict=True)
+    )
     i = inertia
     return np.array([masses.sum(), *(masses @ points), i[0, 0], i[0, 1], i[1, 1], i[0, 2], i[1, 2], i[2, 2]])
 

@@ -48,11 +48,14 @@ def derive(
     base: Annotated[str | None, typer.Option(metavar="LINK", help="link that the chain starts at")] = None,
     tip: Annotated[str | None, typer.Option(metavar="LINK", help="link that it ends at")] = None,
     gravity: Annotated[
-        tuple[float, float, float] | None, typer.Option(metavar="GX GY GZ", help="m/s^2 in the file's root frame")
+        tuple[float, float, float] | None,
+        typer.Option(metavar="GX GY GZ", help="m/s^2 in the file's root frame"),
     ] = None,
     drive_inertia: Annotated[
         str | None,
-        typer.Option(metavar="I1,I2,...", help="joints' drive inertias as parameters, kg m^2; 'all': values zero"),
+        typer.Option(
+            metavar="I1,I2,...", help="joints' drive inertias as parameters, kg m^2; 'all': values zero"
+        ),
     ] = None,
     assume_zero: Annotated[
         str, typer.Option(metavar="NAME,...", help="parameters assumed zero, such as link5:mx,link5:Ixz@com")
@@ -60,7 +63,9 @@ def derive(
     snap: Annotated[
         float, typer.Option(metavar="RAD", help="make rotations exact that are this near to exact; 0: off")
     ] = DEFAULT_SNAP,
-    expand: Annotated[bool, typer.Option("--expand/--no-expand", help="derive E and P beside theta_b")] = True,
+    expand: Annotated[
+        bool, typer.Option("--expand/--no-expand", help="derive E and P beside theta_b")
+    ] = True,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     with steps() as progress:
@@ -120,7 +125,8 @@ def show(
 def check(
     model: ModelFile,
     robot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="robot file to check against instead of the embedded source")
+        Path | None,
+        typer.Option(metavar="FILE", help="robot file to check against instead of the embedded source"),
     ] = None,
 ) -> None:
     """Check a model again, independently, against Pinocchio's own reading of its source."""
@@ -141,9 +147,7 @@ def emit_c(
     model: ModelFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR")],
     lowering: Annotated[str, typer.Option(help="auto, expanded or factored")] = "auto",
-    functions: Annotated[
-        str, typer.Option(metavar="NAME,...", help="generate these functions only")
-    ] = "",
+    functions: Annotated[str, typer.Option(metavar="NAME,...", help="generate these functions only")] = "",
     real: Annotated[str, typer.Option(help="float64 or float32")] = "float64",
     trig: Annotated[str, typer.Option(help="inline or libm")] = "inline",
     name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,

@@ -29,7 +29,9 @@ def print_model(model: DynamicsModel) -> None:
     """The model at a glance: robot, joints, sizes, base parameters, certificate, notes."""
     found = summary(model)
     out = console()
-    out.print(f"[bold]{escape(found.name)}[/bold]  {escape(found.base)} to {escape(found.tip)}, {found.convention} frames")
+    out.print(
+        f"[bold]{escape(found.name)}[/bold]  {escape(found.base)} to {escape(found.tip)}, {found.convention} frames"
+    )
     out.print(f"gravity {_numbers(found.gravity)} m/s^2 in the base frame")
     out.print(_sizes(found))
     out.print(_joints(found.joints, found.certificate))

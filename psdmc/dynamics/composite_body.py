@@ -89,4 +89,4 @@ def shifted(body: Body, offset: Vector) -> Body:
 def joined(a: Body, b: Body) -> Body:
     """Two bodies about one frame as one."""
     second = tuple(x + y for x, y in zip(a.second, b.second, strict=True))
-    return Body(a.mass + b.mass, add(a.moment, b.moment), second)  # type: ignore[arg-type]
+    return Body(a.mass + b.mass, add(a.moment, b.moment), second)

@@ -164,6 +164,4 @@ def body_from_parameters(x: Sequence[Scalar]) -> Body:
     """Ten standard parameters (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about any frame, as a Body about it."""
     m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = x[:10]
     half_trace = 0.5 * (ixx + iyy + izz)
-    return Body(
-        m, (hx, hy, hz), (half_trace - ixx, half_trace - iyy, half_trace - izz, -ixy, -ixz, -iyz)
-    )
+    return Body(m, (hx, hy, hz), (half_trace - ixx, half_trace - iyy, half_trace - izz, -ixy, -ixz, -iyz))

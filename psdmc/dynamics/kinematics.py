@@ -9,9 +9,7 @@ from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, cross, multiply, 
 from psdmc.robot.chain import Placement
 
 
-def forward_kinematics(
-    frames: Sequence[Frame], q: Sequence[Scalar]
-) -> tuple[tuple[Matrix, Vector], ...]:
+def forward_kinematics(frames: Sequence[Frame], q: Sequence[Scalar]) -> tuple[tuple[Matrix, Vector], ...]:
     """Rotation and origin (m) of every joint frame in the base frame."""
     rotation: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     origin: Vector = (0.0, 0.0, 0.0)
@@ -32,9 +30,7 @@ def _turned(rotation: Matrix, s: Scalar, c: Scalar) -> Matrix:
     return rows  # type: ignore[return-value]
 
 
-def jacobian(
-    frames: Sequence[Frame], tip: Placement, q: Sequence[Scalar]
-) -> tuple[tuple[Scalar, ...], ...]:
+def jacobian(frames: Sequence[Frame], tip: Placement, q: Sequence[Scalar]) -> tuple[tuple[Scalar, ...], ...]:
     """6 x n: velocity (linear, then angular) of the tip frame's origin per unit joint rate, in the base frame.
 
     `tip` is the tip frame in the last joint frame.
@@ -53,9 +49,7 @@ def jacobian(
     return tuple(tuple(column[row] for column in columns) for row in range(6))
 
 
-def tip_placement(
-    frames: Sequence[Frame], tip: Placement, q: Sequence[Scalar]
-) -> tuple[Matrix, Vector]:
+def tip_placement(frames: Sequence[Frame], tip: Placement, q: Sequence[Scalar]) -> tuple[Matrix, Vector]:
     """Rotation and origin (m) of the tip frame in the base frame."""
     rotation, origin = forward_kinematics(frames, q)[-1]
     point = add(origin, transform(rotation, as_vector(tip.translation.tolist())))

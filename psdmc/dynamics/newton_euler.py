@@ -32,7 +32,7 @@ from psdmc.dynamics.frames import (
     outward,
     to_previous,
 )
-from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, transform, transpose, multiply
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transform, transpose
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,9 @@ def spin_of(rates: Rates) -> Spin:
     return Spin(field, (zz - yy, xx - zz, yy - xx))
 
 
-def spin_before_turn(frame: Frame, previous: Spin, base: Rates, qd: Scalar, qd_r: Scalar, qdd_r: Scalar) -> Spin:
+def spin_before_turn(
+    frame: Frame, previous: Spin, base: Rates, qd: Scalar, qd_r: Scalar, qdd_r: Scalar
+) -> Spin:
     """The last frame's spin seen from before its turn: its predecessor's plus ([qd w_r + qd_r w + qd qd_r z] + qdd_r)[z]."""
     if frame.kind == "prismatic":
         rotated = _turned_field(frame, previous)
@@ -139,15 +141,15 @@ def _turned_field(frame: Frame, spin: Spin) -> Spin:
 def _permuted_differences(rotation: Matrix, spin: Spin, field: Matrix) -> Vector:
     """The differences again: the old ones in another order where axes map to axes, else from the diagonal."""
     columns = transpose(rotation)
-    axes = [next((k for k in range(3) if abs(column[k]) == 1.0), None) for column in columns]
-    pairs = ((2, 1), (0, 2), (1, 0))
+    axes = [next((k for k in range(3) if abs(column[k]) == 1.0), -1) for column in columns]
     known = {(2, 1): spin.differences[0], (0, 2): spin.differences[1], (1, 0): spin.differences[2]}
     known |= {(b, a): -value for (a, b), value in known.items()}
-    out = tuple(
-        field[a][a] - field[b][b] if axes[a] is None or axes[b] is None else known[axes[a], axes[b]]
-        for a, b in pairs
-    )
-    return out  # type: ignore[return-value]
+
+    def difference(a: int, b: int) -> Scalar:
+        pair = (axes[a], axes[b])
+        return known[pair] if pair in known else field[a][a] - field[b][b]
+
+    return (difference(2, 1), difference(0, 2), difference(1, 0))
 
 
 def sweep_outward(
@@ -317,4 +319,3 @@ def sweep_inward(
             gathered = ZERO
             moment = add(moment, cross(state.offset, force))
     return tuple(torques)
-

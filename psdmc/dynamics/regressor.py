@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from psdmc.dynamics.frames import Frame, from_previous, outward
-from psdmc.dynamics.newton_euler import PLAIN, Choices, Forward, LinkMotion, Spin, sweep_outward
+from psdmc.dynamics.newton_euler import PLAIN, Forward, LinkMotion, Spin, sweep_outward
 from psdmc.dynamics.scalar import (
     ZERO,
     Matrix,
@@ -129,8 +129,16 @@ def unit_wrench(name: int, motion: LinkMotion) -> tuple[Vector, Vector]:
         force = (u[0][k], u[1][k], u[2][k])
         return force, ((0.0, -az, ay), (az, 0.0, -ax), (-ay, ax, 0.0))[k]
     half = 0.5
-    turn_x, turn_y, turn_z = half * (u[2][1] - u[1][2]), half * (u[0][2] - u[2][0]), half * (u[1][0] - u[0][1])
-    bend_x, bend_y, bend_z = half * (u[2][1] + u[1][2]), half * (u[0][2] + u[2][0]), half * (u[1][0] + u[0][1])
+    turn_x, turn_y, turn_z = (
+        half * (u[2][1] - u[1][2]),
+        half * (u[0][2] - u[2][0]),
+        half * (u[1][0] - u[0][1]),
+    )
+    bend_x, bend_y, bend_z = (
+        half * (u[2][1] + u[1][2]),
+        half * (u[0][2] + u[2][0]),
+        half * (u[1][0] + u[0][1]),
+    )
     moment = (
         (turn_x, bend_y, -bend_z),
         (-u[2][0], u[2][1], -d[2]),

@@ -22,7 +22,19 @@ from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Placement
 PSEUDO_NAMES = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz", "Im")
 """A link's parameters in pseudo-inertia form, in the order of carriers."""
 
-WEIGHTS = dict(m=6.0, hx=10.0, hy=10.1, hz=10.2, xx=4.0, yy=4.1, zz=4.2, xy=6.0, xz=6.1, yz=6.2, Im=1.0)
+WEIGHTS = {
+    "m": 6.0,
+    "hx": 10.0,
+    "hy": 10.1,
+    "hz": 10.2,
+    "xx": 4.0,
+    "yy": 4.1,
+    "zz": 4.2,
+    "xy": 6.0,
+    "xz": 6.1,
+    "yz": 6.2,
+    "Im": 1.0,
+}
 """Operations that a parameter adds to Newton-Euler, roughly; the start of the search."""
 
 INDEPENDENT = 1e-7
@@ -78,7 +90,8 @@ class CarrierSpace:
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
         """The basis of least weight, ascending; ties go to the earlier parameter."""
         order = sorted(range(self.count), key=lambda j: (weights[j], j))
-        rank, chosen = self.columns.shape[0], []
+        chosen: list[int] = []
+        rank = self.columns.shape[0]
         basis = np.zeros((rank, 0))
         for j in order:
             column = self.columns[:, j]
@@ -108,7 +121,7 @@ class CarrierSpace:
     def transfer(self, carriers: Sequence[int]) -> Array:
         """(len(carriers), l): theta_b to the carriers' values, with exact zeros and ones."""
         raw = np.linalg.solve(self.columns[:, list(carriers)], self.target)
-        return cleaned(raw)
+        return cleaned(np.asarray(raw, np.float64))
 
 
 def cleaned(matrix: Array) -> Array:
@@ -143,9 +156,7 @@ def _sampled_columns(reframed: Reframed) -> Array:
     n = len(reframed.frames)
     q, qd, qdd = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(3, n, STATES))
     here = [Placement.identity()] * n
-    rows = regressor(
-        reframed.frames, here, range(11 * n), list(q), list(qd), list(qdd), reframed.base
-    )
+    rows = regressor(reframed.frames, here, range(11 * n), list(q), list(qd), list(qdd), reframed.base)
     standard = np.zeros((n, STATES, 11 * n))
     for i, row in enumerate(rows):
         for column, value in row.items():
@@ -163,5 +174,8 @@ def bodies_from_carriers(
     for carrier, value in zip(carriers, values, strict=True):
         link, name = divmod(carrier, PARAMETERS_PER_LINK)
         rows[link][name] = value * unit ** powers[name] if unit != 1.0 else value
-    bodies = tuple(Body(row[0], (row[1], row[2], row[3]), tuple(row[4:10])) for row in rows)  # type: ignore[arg-type]
+    bodies = tuple(
+        Body(row[0], (row[1], row[2], row[3]), (row[4], row[5], row[6], row[7], row[8], row[9]))
+        for row in rows
+    )
     return bodies, tuple(row[10] for row in rows)

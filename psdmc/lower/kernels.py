@@ -28,7 +28,11 @@ REGRESSORS = ("regressor", "regressor_slotine_li")
 GEOMETRY = "inverse_dynamics"
 """The function whose search decides where frames sit and the unit of length, for all functions."""
 
-SHARED = {"nonlinear_effects": "inverse_dynamics", "gravity": "inverse_dynamics", "coriolis_matrix": "inverse_dynamics"}
+SHARED = {
+    "nonlinear_effects": "inverse_dynamics",
+    "gravity": "inverse_dynamics",
+    "coriolis_matrix": "inverse_dynamics",
+}
 """Functions that run another's recursion: its arrangement is taken over, only the choices in it are made anew."""
 
 

@@ -102,7 +102,7 @@ def _clean(direction: Array) -> Array:
 
 def _clean_lengths(lengths: Array, scale: float) -> Array:
     """Rounding of zeros removed, and of decimal lengths, so that equal lengths stay equal."""
-    return np.round(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), DECIMALS)
+    return np.asarray(np.round(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), DECIMALS), np.float64)
 
 
 def _parallel(a: Array, b: Array) -> bool:

@@ -55,15 +55,16 @@ SINGLE = Target("single", SINCOS_LANES)
 BATCH = Target("batch", 1)
 
 ALL_CHOICES = tuple(
-    Choices(compound, fold, double)
-    for compound, fold, double in product((False, True), repeat=3)
+    Choices(compound, fold, double) for compound, fold, double in product((False, True), repeat=3)
 )
 
 
 class Search:
     """The descent for one model; geometry is shared between functions."""
 
-    def __init__(self, chain: Chain, representative: Array, theta_b: Array | None, budget: int = BUDGET) -> None:
+    def __init__(
+        self, chain: Chain, representative: Array, theta_b: Array | None, budget: int = BUDGET
+    ) -> None:
         self.chain, self.representative, self.theta_b, self.budget = chain, representative, theta_b, budget
         self._spaces: dict[tuple[Foot, ...], tuple[Reframed, CarrierSpace]] = {}
 
@@ -145,9 +146,6 @@ class _Descent:
 
 def all_feet(chain: Chain) -> Iterator[tuple[Foot, ...]]:
     """Where frames may sit: all on the normal to the axis before, then one at a time on the next, then all of them."""
-    feet: tuple[Foot, ...] = ("previous",) * len(chain)
-    yield feet
-    other: Foot = "next"
-    for i in range(len(feet) - 1):
-        yield (*feet[:i], other, *feet[i + 1 :])
-    yield (other,) * len(feet)
+    n = len(chain)
+    for moved in [(), *((i,) for i in range(n - 1)), tuple(range(n))]:
+        yield tuple("next" if i in moved else "previous" for i in range(n))

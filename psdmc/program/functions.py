@@ -50,7 +50,13 @@ FUNCTIONS = (
         "Y with M(q) qdd_r + C(q, qd) qd_r + g(q) = Y theta_b",
     ),
     Function(
-        "jacobian", ("q",), "J", "6", "n", False, "linear then angular velocity of the tip per unit joint rate, base frame"
+        "jacobian",
+        ("q",),
+        "J",
+        "6",
+        "n",
+        False,
+        "linear then angular velocity of the tip per unit joint rate, base frame",
     ),
 )
 

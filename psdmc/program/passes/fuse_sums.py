@@ -9,7 +9,17 @@ from psdmc.program.program import Instr, Op, Program
 Term = tuple[bool, int]
 """A term of a sum: whether it is subtracted, and the value."""
 
-LATENCY = {Op.LOAD: 5, Op.CONST: 0, Op.ADD: 3, Op.SUB: 3, Op.MUL: 3, Op.DIV: 13, Op.NEG: 1, Op.SIN: 60, Op.COS: 60}
+LATENCY = {
+    Op.LOAD: 5,
+    Op.CONST: 0,
+    Op.ADD: 3,
+    Op.SUB: 3,
+    Op.MUL: 3,
+    Op.DIV: 13,
+    Op.NEG: 1,
+    Op.SIN: 60,
+    Op.COS: 60,
+}
 """Cycles until a result is ready, about as on current x86 and Arm cores; only their order of size matters."""
 
 FUSED_LATENCY = 4
@@ -30,7 +40,7 @@ class _Part(NamedTuple):
 
     negative: bool
     factors: tuple[int, ...]
-    index: int
+    value: int
 
 
 class _Fusion:
@@ -83,7 +93,7 @@ class _Fusion:
     def _chain(self, terms: list[Term]) -> int:
         """Add the two terms that are done soonest until one is left."""
         parts = [_Part(negative, self._operands(index), self.new_index[index]) for negative, index in terms]
-        parts.sort(key=lambda part: part.index)
+        parts.sort(key=lambda part: part.value)
         while len(parts) > 1:
             first = min(range(len(parts)), key=lambda k: (self._done(parts[k]), k))
             second = min(
@@ -94,7 +104,7 @@ class _Fusion:
             total = self._add(parts[low], parts[high])
             parts[low] = total
             del parts[high]
-        return parts[0].index
+        return parts[0].value
 
     def _operands(self, index: int) -> tuple[int, ...]:
         """Factors of a product that an addition may swallow."""
@@ -104,25 +114,23 @@ class _Fusion:
         return ()
 
     def _done(self, part: _Part) -> int:
-        return max(self.ready[a] for a in part.factors) if part.factors else self.ready[part.index]
+        return max(self.ready[a] for a in part.factors) if part.factors else self.ready[part.value]
 
     def _sum_done(self, a: _Part, b: _Part) -> int:
         if not a.factors and not b.factors:
-            return max(self.ready[a.index], self.ready[b.index]) + LATENCY[Op.ADD]
+            return max(self.ready[a.value], self.ready[b.value]) + LATENCY[Op.ADD]
         if a.factors and b.factors:
-            return min(
-                max(self.ready[x.index], self._done(y)) + FUSED_LATENCY for x, y in ((a, b), (b, a))
-            )
+            return min(max(self.ready[x.value], self._done(y)) + FUSED_LATENCY for x, y in ((a, b), (b, a)))
         return max(self._done(a), self._done(b)) + FUSED_LATENCY
 
     def _add(self, a: _Part, b: _Part) -> _Part:
         """The sum of two parts, negated where both or the one that is left negative are."""
         when = self._sum_done(a, b)
         if a.negative == b.negative:
-            instr = Instr(Op.ADD, (a.index, b.index)).canonical()
+            instr = Instr(Op.ADD, (a.value, b.value)).canonical()
         else:
             plus, minus = (b, a) if a.negative else (a, b)
-            instr = Instr(Op.SUB, (plus.index, minus.index))
+            instr = Instr(Op.SUB, (plus.value, minus.value))
         self.body.append(instr)
         self.ready.append(when)
         return _Part(a.negative and b.negative, (), len(self.body) - 1)
