@@ -71,4 +71,6 @@ def expected(kernel: Kernel, given: Mapping[str, np.ndarray], n: int, l: int) ->
 def error(found: np.ndarray, reference: np.ndarray) -> float:
     """Largest difference relative to the largest reference value; NaN must meet NaN."""
     assert np.array_equal(np.isnan(found), np.isnan(reference))
-    return float(np.nanmax(np.abs(found - reference), initial=0.0) / np.nanmax(np.abs(reference), initial=1e-300))
+    return float(
+        np.nanmax(np.abs(found - reference), initial=0.0) / np.nanmax(np.abs(reference), initial=1e-300)
+    )

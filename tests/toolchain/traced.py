@@ -158,9 +158,7 @@ def arm_package(
     names: Sequence[str] | None = None,
     references: References | None = None,
 ) -> PackageView:
-    return package_view(
-        arm_info(name, seed), arm_kernels(seed, names), options or EmitOptions(), references
-    )
+    return package_view(arm_info(name, seed), arm_kernels(seed, names), options or EmitOptions(), references)
 
 
 def arm_references(count: int = 11, seed: int = 0) -> References:

@@ -1,0 +1,178 @@
+"""The emitted package without psdmc: built by its own files, tested by its own test, used by other programs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from traced import arm_package, arm_references
+
+from psdmc.emit.options import EmitOptions
+from psdmc.emit.package import package_files
+from psdmc.emit.references import References
+from psdmc.emit.write import write_package
+from psdmc.errors import InputError, ToolchainError
+from psdmc.toolchain.build_package import build_package
+
+NAMES = ["inverse_dynamics", "forward_dynamics"]
+
+
+def _need(*programs: str) -> None:
+    for program in programs:
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed")
+
+
+def _emit(folder: Path, references: References | None = None, **options: str) -> Path:
+    made = EmitOptions(**options)  # type: ignore[arg-type]
+    package = arm_package(options=made, names=NAMES, references=references or arm_references())
+    write_package(folder, package_files(package))
+    return folder
+
+
+def _run(words: list[str], **more: object) -> str:
+    done = subprocess.run(words, capture_output=True, text=True, check=False, **more)  # type: ignore[call-overload]
+    assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    return str(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def emitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return _emit(tmp_path_factory.mktemp("emitted") / "arm")
+
+
+@pytest.fixture(scope="module")
+def installed(emitted: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    _need("cmake")
+    prefix = tmp_path_factory.mktemp("prefix")
+    build_package(emitted)
+    _run(["cmake", "--install", str(emitted / "build"), "--prefix", str(prefix)])
+    yield prefix
+
+
+def test_build_runs_the_self_test_with_cmake(emitted: Path) -> None:
+    _need("cmake")
+    report = build_package(emitted)
+    for name in (
+        "inverse_dynamics",
+        "inverse_dynamics_theta, batch",
+        "forward_dynamics",
+        "forward_dynamics, batch",
+    ):
+        assert any(name in line and line.endswith(": ok") for line in report.splitlines()), name
+
+
+def test_build_runs_the_self_test_with_make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _need("make")
+    folder = _emit(tmp_path / "arm", real="float32")
+    which = shutil.which
+    monkeypatch.setattr("shutil.which", lambda name: None if name == "cmake" else which(name))
+    assert "inverse_dynamics, batch" in build_package(folder)
+    assert (folder / "build" / "libtest_arm.so").is_file()
+
+
+def test_a_self_test_that_fails_fails_the_build(tmp_path: Path) -> None:
+    _need("cmake")
+    good = arm_references()
+    tau = good.tau.copy()
+    tau[3, 1] *= 1 + 1e-6
+    with pytest.raises(ToolchainError, match="ctest failed"):
+        build_package(_emit(tmp_path / "arm", References(good.q, good.qd, good.qdd, tau)))
+
+
+def test_a_self_test_does_not_let_a_nan_pass(tmp_path: Path) -> None:
+    good = arm_references()
+    tau = good.tau.copy()
+    tau[0, 1] = np.nan
+    with pytest.raises(ToolchainError, match="failed"):
+        build_package(_emit(tmp_path / "arm", References(good.q, good.qd, good.qdd, tau)))
+
+
+def test_a_folder_without_a_package_is_said(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no emitted package") as caught:
+        build_package(tmp_path)
+    assert "emit-c" in str(caught.value.hint)
+
+
+def test_a_machine_without_build_tools_is_said(emitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "psdmc.toolchain.build_package.shutil.which", lambda name: "/usr/bin/cc" if name == "cc" else None
+    )
+    with pytest.raises(ToolchainError, match="neither cmake nor make"):
+        build_package(emitted)
+
+
+@pytest.mark.parametrize(
+    "flags", ["-fsanitize=address,undefined", "-march=native -fsanitize=address,undefined"]
+)
+def test_the_self_test_is_clean_under_sanitizers(flags: str, tmp_path: Path) -> None:
+    _need("make")
+    folder = _emit(tmp_path / "arm")
+    sanitize = f"-O1 -g {flags} -fno-sanitize-recover=all"
+    _run(["make", "-C", str(folder), "CC=gcc", f"CFLAGS={sanitize}", "check"])
+
+
+CONSUMER = r"""
+#include <test_arm/test_arm.h>
+#include <stdio.h>
+
+int main(void)
+{
+    double q[test_arm_DOF] = {0.1, 0.2, 0.3, 0.4}, qd[test_arm_DOF] = {1, 2, 3, 4}, tau[test_arm_DOF];
+    test_arm_inverse_dynamics(q, qd, qd, tau);
+    printf("%.17g %s\n", tau[0], test_arm_joint_names[0]);
+    return 0;
+}
+"""
+
+CMAKE = """
+cmake_minimum_required(VERSION 3.13)
+project(consumer LANGUAGES C)
+find_package(test_arm 0.1 REQUIRED)
+add_executable(consumer main.c)
+target_link_libraries(consumer PRIVATE test_arm::test_arm)
+"""
+
+
+def test_a_cmake_project_finds_the_installed_package(installed: Path, tmp_path: Path) -> None:
+    (tmp_path / "main.c").write_text(CONSUMER)
+    (tmp_path / "CMakeLists.txt").write_text(CMAKE)
+    _run(["cmake", "-S", str(tmp_path), "-B", str(tmp_path / "b"), f"-DCMAKE_PREFIX_PATH={installed}"])
+    _run(["cmake", "--build", str(tmp_path / "b")])
+    assert _run([str(tmp_path / "b" / "consumer")]).endswith(" joint 0\n")
+
+
+def test_pkg_config_finds_the_installed_package(installed: Path, tmp_path: Path) -> None:
+    _need("pkg-config")
+    (tmp_path / "main.c").write_text(CONSUMER)
+    (place,) = (str(path.parent) for path in installed.rglob("test_arm.pc"))
+    environment = {**os.environ, "PKG_CONFIG_PATH": place}
+    flags = _run(["pkg-config", "--cflags", "--libs", "test_arm"], env=environment).split()
+    _run(["gcc", "-std=c99", str(tmp_path / "main.c"), *flags, "-o", str(tmp_path / "main")])
+    assert _run([str(tmp_path / "main")]).endswith(" joint 0\n")
+
+
+def test_make_install_gives_the_same_layout(tmp_path: Path) -> None:
+    _need("make")
+    folder, prefix = _emit(tmp_path / "arm"), tmp_path / "prefix"
+    _run(["make", "-C", str(folder), f"PREFIX={prefix}", "install"])
+    found = sorted(str(path.relative_to(prefix)) for path in prefix.rglob("*") if path.is_file())
+    assert found == [
+        "include/test_arm/test_arm.h",
+        "lib/libtest_arm.a",
+        "lib/libtest_arm.so",
+        "lib/pkgconfig/test_arm.pc",
+    ]
+    assert "prefix=${pcfiledir}/../..\n" in (prefix / "lib/pkgconfig/test_arm.pc").read_text()
+
+
+def test_openmp_gives_the_same_results(tmp_path: Path) -> None:
+    _need("make")
+    folder = _emit(tmp_path / "arm")
+    report = _run(["make", "-C", str(folder), "CFLAGS=-O2 -fopenmp -Dtest_arm_OPENMP", "check"])
+    assert report.count(": ok") == 8

@@ -1,0 +1,159 @@
+"""What design.md promises of the C text: no warnings, no foreign symbols, no state, C++ headers, packages side by side."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from direct import write_sources
+from traced import arm_package
+
+from psdmc.emit.options import EmitOptions
+
+STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Werror".split()
+EXTRA = "-Wstrict-prototypes -Wmissing-prototypes -Wundef -Wvla".split()
+COMPILERS = ["gcc", "clang"]
+NAMES = ["inverse_dynamics", "forward_dynamics", "jacobian"]
+"""One of each kind: torques with parameters, pivots, a matrix without parameters."""
+
+
+def _need(program: str) -> None:
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
+
+
+def _compile(words: list[str]) -> None:
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[:2000]
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "flag"),
+    [
+        (("float64", "inline"), "-march=native"),
+        (("float64", "inline"), "-g0"),
+        (("float64", "inline"), "-Dtest_arm_NO_VECTORS"),
+        (("float32", "inline"), "-march=native"),
+        (("float32", "libm"), "-g0"),
+        (("float64", "libm"), "-march=native"),
+    ],
+)
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_no_warnings(compiler: str, options: tuple[str, str], flag: str, tmp_path: Path) -> None:
+    _need(compiler)
+    package = arm_package(options=EmitOptions(*options), names=NAMES)  # type: ignore[arg-type]
+    write_sources(package, tmp_path)
+    for source in package.sources:
+        words = [compiler, *STRICT, *EXTRA, "-O1", flag, f"-I{tmp_path}/include", "-c"]
+        _compile([*words, str(tmp_path / source), "-o", str(tmp_path / "x.o")])
+
+
+@pytest.fixture(scope="module")
+def objects(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """The object files of two arms of different names and inertias."""
+    made = []
+    for number, name in enumerate(("first arm", "second arm")):
+        folder = tmp_path_factory.mktemp("objects")
+        package = arm_package(name, seed=number, names=[*NAMES, "gravity"])
+        write_sources(package, folder)
+        for source in package.sources:
+            made.append(folder / f"{number}_{Path(source).stem}.o")
+            _compile(
+                [
+                    "gcc",
+                    "-std=c99",
+                    "-O1",
+                    f"-I{folder}/include",
+                    "-c",
+                    str(folder / source),
+                    "-o",
+                    str(made[-1]),
+                ]
+            )
+    return made
+
+
+def _symbols(objects: list[Path], kinds: str) -> list[str]:
+    listing = subprocess.run(["nm", *map(str, objects)], capture_output=True, text=True, check=True).stdout
+    rows = [line.split() for line in listing.splitlines() if line and not line.endswith(":")]
+    return [row[-1] for row in rows if row[-2] in kinds]
+
+
+def test_every_public_symbol_starts_with_the_robots_name(objects: list[Path]) -> None:
+    public = _symbols(objects, "TDBRVC")
+    assert len(public) > 40
+    assert [s for s in public if not s.startswith(("first_arm_", "second_arm_"))] == []
+
+
+def test_nothing_is_called_but_sines_and_cosines_and_no_state_is_kept(objects: list[Path]) -> None:
+    foreign = {s for s in _symbols(objects, "U") if not s.startswith(("first_arm_", "second_arm_"))}
+    # gcc merges sin and cos, and may call its own memset, memcpy and stack guard
+    assert foreign <= {
+        "sin",
+        "cos",
+        "sincos",
+        "memset",
+        "memcpy",
+        "memmove",
+        "__stack_chk_fail",
+        "_GLOBAL_OFFSET_TABLE_",
+    }
+    assert _symbols(objects, "BbCGgSs") == []
+    assert _symbols(objects, "Dd") == [
+        s for s in _symbols(objects, "Dd") if "names" in s or "units" in s or "equations" in s
+    ]
+
+
+TWO_ROBOTS = r"""
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+#include "first_arm/first_arm.h"
+#include "second_arm/second_arm.h"
+
+static_assert(first_arm_DOF == 4 && second_arm_DOF == 4, "");
+
+int main()
+{
+    std::array<first_arm_REAL, first_arm_DOF> q{0.1, 0.2, 0.3, 0.4}, a{}, b{}, a2{}, b2{};
+    first_arm_gravity(q.data(), a.data());
+    second_arm_gravity(q.data(), b.data());
+    std::thread one([&] { for (int k = 0; k < 10000; k++) first_arm_gravity(q.data(), a2.data()); });
+    std::thread two([&] { for (int k = 0; k < 10000; k++) second_arm_gravity(q.data(), b2.data()); });
+    one.join();
+    two.join();
+    return !(a == a2 && b == b2 && a != b && std::isfinite(a[1]));
+}
+"""
+
+
+def test_two_robots_run_side_by_side_in_a_cpp17_program(objects: list[Path], tmp_path: Path) -> None:
+    _need("g++")
+    source, program = tmp_path / "main.cpp", tmp_path / "main"
+    source.write_text(TWO_ROBOTS)
+    folders = sorted({f"-I{path.parent}/include" for path in objects})
+    flags = ["-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *folders]
+    _compile(["g++", *flags, str(source), *map(str, objects), "-lm", "-pthread", "-o", str(program)])
+    assert subprocess.run([str(program)], check=False).returncode == 0
+
+
+def test_the_stack_frame_of_a_call_is_small(tmp_path: Path) -> None:
+    package = arm_package(names=["forward_dynamics", "regressor"])
+    write_sources(package, tmp_path)
+    for source in package.sources:
+        words = ["gcc", "-std=c99", "-O2", "-march=native", "-fno-math-errno", f"-I{tmp_path}/include"]
+        _compile(
+            [
+                *words,
+                "-Wstack-usage=16384",
+                "-Werror",
+                "-c",
+                str(tmp_path / source),
+                "-o",
+                str(tmp_path / "x.o"),
+            ]
+        )
