@@ -50,8 +50,9 @@ TRACED = 3
 def lower_expanded(model: DynamicsModel, function_name: str, theta: bool) -> Program:
     """The PROGRAM of one function in SUPPORTED; with `theta`, theta_b is an input instead of constants.
 
-    Row order, and whether parameters enter before or after equal parts are found, are chosen by cost, the same on
-    every machine. InputError where the model has no E and P, or its base parameters are needed and unknown.
+    Row order, and whether parameters enter before or after equal parts are found, are chosen by cost, the
+    same on every machine. InputError where the model has no E and P, or its base parameters are needed and
+    unknown; SingularMassMatrix where the mass matrix cannot be inverted for any q.
     """
     if function_name not in SUPPORTED or (theta and not BY_NAME[function_name].theta):
         raise ValueError(f"the expanded lowering does not make {function_name}{'_theta' * theta}")
@@ -61,8 +62,8 @@ def lower_expanded(model: DynamicsModel, function_name: str, theta: bool) -> Pro
 
 
 def _diagrams(model: DynamicsModel, function_name: str, theta: bool) -> Iterator[Diagram]:
-    """Candidates. Baked parameters enter either as rows that become constants afterwards - equal parts are then found
-    whatever the parameters' values, and constants sit furthest in - or in the coefficients from the start."""
+    """Candidates. Baked parameters enter as rows that become constants afterwards - equal parts are then found
+    whatever the parameters' values, and constants sit furthest in - or in the coefficients at once."""
     n = model.n
     if function_name == "regressor":
         yield from _in_all_orders(with_gravity(regressor_terms(model), model.chain), tip_first(n))
@@ -126,5 +127,3 @@ def _vector(name: str, values: Sequence[Scalar]) -> Outputs:
 
 def _symmetric(values: dict[int, Scalar], n: int) -> list[list[Scalar]]:
     return [[values.get(min(i, j) * n + max(i, j), 0.0) for j in range(n)] for i in range(n)]
-
-

@@ -58,6 +58,8 @@ class Diagram:
 
 def nested_horner(terms: Terms, rows: Sequence[int]) -> Diagram:
     """The diagram of all polynomials in `terms`, rows taken in the given order, outermost first."""
+    if len(terms) == 0:
+        return Diagram((), terms.output, np.zeros(0, dtype=np.int64), np.zeros(0))
     order, differs = _sorted(terms, rows)
     constants = Constants()
     coefficient, uncertainty = terms.coefficient[order], terms.uncertainty[order]
@@ -150,7 +152,7 @@ class _Groups:
 
 
 def with_constants(diagram: Diagram, values: Mapping[int, float]) -> Diagram:
-    """The diagram with numbers for some of its innermost rows, whose nodes become factors of the nodes around.
+    """The diagram with numbers for its innermost rows, whose nodes become factors of the nodes around.
 
     ValueError where a row that gets a number has one outside it that does not.
     """
@@ -171,7 +173,7 @@ def with_constants(diagram: Diagram, values: Mapping[int, float]) -> Diagram:
 
 
 def _numbers_as_factors(node: Integers, ratio: Array, number: Array) -> tuple[Integers, Array]:
-    """References to nodes that are numbers become references to ONE, or to NOTHING where the number is zero."""
+    """References to nodes that are numbers become references to ONE, or to NOTHING where it is zero."""
     is_number = node < len(number)
     value = np.where(is_number, number[np.where(is_number, node, ONE)], 1.0) * ratio
     return np.where(is_number, np.where(value == 0.0, NOTHING, ONE), node), value
@@ -203,4 +205,4 @@ def _products_with_row(level: Level) -> int:
     index = np.arange(len(highest))
     is_row_itself = (level.child[index, highest] == ONE) & (np.abs(level.ratio[index, highest]) == 1.0)
     products = np.where(square & linear, 2, 1) - is_row_itself
-    return int(products.sum()) + int(square.any())
+    return int(products.sum()) + int((square & ~linear).any())

@@ -98,7 +98,7 @@ def known_parameters(model: DynamicsModel) -> Array:
 
 
 def _stacked(E: NDArray[np.uint8], weights: Sequence[sparse.sparray]) -> tuple[Terms, Integers]:
-    """One term per entry of each joint's (p, columns) weights, and its column; the uncertainty goes by columns."""
+    """One term per entry of each joint's (p, columns) weights, and its column; doubt goes by columns."""
     functions, outputs, columns, values, uncertainties = [], [], [], [], []
     for joint, weight in enumerate(weights):
         entries = sparse.coo_array(weight)

@@ -25,7 +25,7 @@ def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scala
 
 def polynomial_values(diagram: Diagram, rows: Sequence[Scalar]) -> dict[int, Scalar]:
     """The diagram's polynomials by output number, computed on the rows' values."""
-    nodes: dict[int, Scalar] = {ONE: 1.0}
+    nodes: dict[int, Scalar] = {NOTHING: 0.0, ONE: 1.0}
     for level in diagram.levels:
         _compute_level(nodes, level, rows[level.row])
     return {
@@ -46,10 +46,11 @@ def _compute_level(nodes: dict[int, Scalar], level: Level, row: Scalar) -> None:
 def _horner(parts: Sequence[Scalar | None], row: Scalar) -> Scalar:
     """parts[0] + row * (parts[1] + row * parts[2]), where None is nothing."""
     constant, linear, square = parts
-    if square is None:
-        value = linear * row
-    elif linear is None:
-        value = square * (row * row)
-    else:
+    value: Scalar = 0.0
+    if square is not None and linear is not None:
         value = (linear + row * square) * row
+    elif square is not None:
+        value = square * (row * row)
+    elif linear is not None:
+        value = linear * row
     return value if constant is None else constant + value
