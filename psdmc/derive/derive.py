@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -59,7 +60,7 @@ def derive_model(
         B=B,
         chain=chain,
         certificate=np.zeros(len(chain)),
-        provenance=dict(provenance or {}) | {"tolerances": tolerances()},
+        provenance=_plain(dict(provenance or {}) | {"tolerances": tolerances()}),
     )
     tell("certificate")
     return replace(model, certificate=certificate(model))
@@ -70,6 +71,12 @@ _expanded = expand
 
 def _silent(step: str) -> None:
     """Nobody listens."""
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """As a model file will give them back: tuples become lists."""
+    plain: dict[str, Any] = json.loads(json.dumps(values))
+    return plain
 
 
 def tolerances() -> dict[str, float]:

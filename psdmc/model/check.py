@@ -68,8 +68,9 @@ def source_of(model: DynamicsModel) -> LoadedRobot:
 def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tuple[CheckRow, ...]:
     """Every function of the model against Pinocchio's; `source` None: the source embedded in the model.
 
-    A model with other parameters than its source (unknown, calibrated, with a payload) is compared under its
-    own, or random physical ones while they are unknown. InputError where the source is another robot.
+    A model with other parameters than its source is compared under its own where its chain has them (a
+    payload), and under random physical ones where no standard parameters are known (unknown or calibrated
+    theta_b). InputError where the source is another robot.
     """
     loaded = source_of(model) if source is None else source
     if loaded.chain.joint_names != model.chain.joint_names:
@@ -88,17 +89,20 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
 
 def _parameters(model: DynamicsModel, loaded: LoadedRobot) -> tuple[Array, Array | None]:
     """theta_b, and the standard parameters that Pinocchio must be given; None where its own are meant."""
-    if model.theta_b is None:
-        x = random_parameters(model)
-        return model.B @ x, x.reshape(model.n, PARAMETERS_PER_LINK)
-    own = np.asarray(loaded.chain.parameters)
-    is_own = not np.isnan(own).any() and np.allclose(
-        model.B @ own.reshape(-1), model.theta_b, rtol=1e-9, atol=1e-12
-    )
-    if is_own:
-        return model.theta_b, None
-    lifted = model.representative @ model.theta_b
-    return model.theta_b, lifted.reshape(model.n, PARAMETERS_PER_LINK)
+    if model.theta_b is not None:
+        theta = np.asarray(model.theta_b)
+        for known in (loaded.chain.parameters, model.chain.parameters):
+            if _gives(theta, model.B, known):
+                return theta, None if known is loaded.chain.parameters else known
+    x = random_parameters(model)
+    return model.B @ x, x.reshape(model.n, PARAMETERS_PER_LINK)
+
+
+def _gives(theta: Array, B: Array, parameters: Array) -> bool:
+    """Whether standard parameters (n, 11) are known and have these base parameters."""
+    if np.isnan(parameters).any():
+        return False
+    return bool(np.allclose(B @ parameters.reshape(-1), theta, rtol=1e-9, atol=1e-12))
 
 
 def random_parameters(model: DynamicsModel) -> Array:

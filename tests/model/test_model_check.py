@@ -1,0 +1,100 @@
+"""check: passes what is right and notices what is not; and what show is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bundled import bundled_model, bundled_robot
+from random_chains import random_chain
+
+from psdmc.derive.derive import derive_model
+from psdmc.errors import InputError
+from psdmc.model.check import check_model
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.summary import summary, term_texts
+
+
+@pytest.mark.parametrize("name", ["two_link", "scara", "denso_floor", "kr6", "rounded_arm"])
+def test_bundled_models_pass(name: str) -> None:
+    rows = check_model(bundled_model(name))
+    assert {row.against for row in rows} >= {"rnea", "crba", "nonLinearEffects", "aba"}
+    assert all(row.passed for row in rows), rows
+
+
+def test_snapping_is_told_and_not_judged() -> None:
+    (row,) = (row for row in check_model(bundled_model("rounded_arm")) if row.limit is None)
+    assert 1e-7 < row.error < 1e-3
+    assert row.passed
+
+
+def wrong_theta(model: DynamicsModel) -> DynamicsModel:
+    return replace(model, theta_b=None, B=model.B * (1 + 1e-6))
+
+
+def wrong_P(model: DynamicsModel) -> DynamicsModel:
+    matrices = [matrix.copy() for matrix in model.P]
+    matrices[0].data[7] += 1e-5
+    return replace(model, P=tuple(matrices))
+
+
+def wrong_E(model: DynamicsModel) -> DynamicsModel:
+    exponents = model.E.copy()
+    exponents[[model.n + 1, 2 * model.n + 1]] = exponents[[2 * model.n + 1, model.n + 1]]
+    return replace(model, E=exponents)
+
+
+@pytest.mark.parametrize("spoil", [wrong_theta, wrong_P, wrong_E])
+def test_mistakes_are_noticed(spoil) -> None:
+    rows = check_model(spoil(bundled_model("denso_floor")))
+    assert not all(row.passed for row in rows)
+
+
+def test_unknown_and_changed_parameters_are_checked_under_their_own() -> None:
+    model = bundled_model("kr6")
+    loaded = model.with_payload(2.0, [0.0, 0.01, 0.1])
+    calibrated = replace(model, theta_b=1.1 * model.theta_b)
+    for other in (replace(model, theta_b=None), loaded, calibrated):
+        assert all(row.passed for row in check_model(other))
+
+
+def test_unexpanded_models_are_checked_too() -> None:
+    model = bundled_model("scara")
+    plain = derive_model(model.chain, expand=False, provenance=model.provenance)
+    assert all(row.passed for row in check_model(plain))
+
+
+def test_another_robot_is_refused() -> None:
+    with pytest.raises(InputError, match="has joints"):
+        check_model(bundled_model("scara"), bundled_robot("kr6"))
+
+
+def test_a_model_without_source_is_refused() -> None:
+    with pytest.raises(InputError, match="holds no source"):
+        check_model(derive_model(random_chain(0, "R")))
+
+
+def test_summary() -> None:
+    found = summary(bundled_model("two_link"))
+    assert (found.name, found.p, found.l, found.sizes) == ("two_link", 10, 4, (3, 4, 2, 1))
+    assert found.entries == sum(np.count_nonzero(m.toarray()) for m in bundled_model("two_link").P)
+    assert len(found.certificate) == len(found.joints) == 2
+    assert found.source_name == "two_link.toml"
+    plain = summary(derive_model(random_chain(0, "RR"), expand=False))
+    assert (plain.p, plain.sizes, plain.entries, plain.source_name) == (None, None, None, None)
+
+
+def test_terms_in_words() -> None:
+    assert list(term_texts(bundled_model("two_link"))) == [
+        "g s1 s2",
+        "g c1",
+        "g c1 c2",
+        "qdd1",
+        "qdd1 c2",
+        "qdd2",
+        "qdd2 c2",
+        "qd1^2 s2",
+        "qd2^2 s2",
+        "qd1 qd2 s2",
+    ]
