@@ -110,8 +110,9 @@ def function_views(
 
 def kernel_view(kernel: Kernel, n: int, l: int, robot: str, options: EmitOptions) -> KernelView:
     function = kernel.function
-    shared = kernel.single == kernel.batch
     single_body = _body(kernel, kernel.single, n, l, options)
+    lanes_body = _body(kernel, kernel.batch, n, l, options)
+    shared = single_body == lanes_body
     return KernelView(
         name=kernel.name,
         meaning=function.meaning,
@@ -122,7 +123,7 @@ def kernel_view(kernel: Kernel, n: int, l: int, robot: str, options: EmitOptions
         single_file=f"{kernel.name}.inc",
         lanes_file=f"{kernel.name}.inc" if shared else f"{kernel.name}_lanes.inc",
         single_body=single_body,
-        lanes_body=single_body if shared else _body(kernel, kernel.batch, n, l, options),
+        lanes_body=lanes_body,
         pivot_order=tuple(slot.index for slot, _ in kernel.single.outputs if slot.vector == "pivot"),
         cost=cost(kernel.single),
         lowering=kernel.lowering,

@@ -1,0 +1,73 @@
+/* forward_dynamics: qdd = M(q)^-1 (tau - h(q, qd)) */
+#include "internal.h"
+#include "rows.h"
+#include "pivots.h"
+
+#include "one_state.h"
+
+int pendulum_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd)
+{
+    real pivot[1];
+#include "forward_dynamics.inc"
+    if (!(pivot[0] > 0)) {
+        return fail(qdd, 1);
+    }
+    return 0;
+}
+
+#include "lane_states.h"
+static void forward_dynamics_lanes(const real *q, const real *qd, const real *tau, real *qdd, real *pivot)
+{
+#include "forward_dynamics.inc"
+}
+
+size_t pendulum_forward_dynamics_batch(size_t count, const double *q, const double *qd, const double *tau, double *qdd)
+{
+    const size_t blocks = count / LANES + (count % LANES != 0);
+    size_t failed = count;
+    PARALLEL_FOR_FIRST(failed)
+    for (size_t block = 0; block < blocks; block++) {
+        const size_t first = block * LANES;
+        const size_t rows = count - first < LANES ? count - first : LANES;
+        real q_block[1 * LANES] ALIGNED;
+        real qd_block[1 * LANES] ALIGNED;
+        real tau_block[1 * LANES] ALIGNED;
+        real qdd_block[1 * LANES] ALIGNED;
+        real pivot_block[1 * LANES] ALIGNED;
+        load_rows(1, rows, q + first * 1, q_block);
+        load_rows(1, rows, qd + first * 1, qd_block);
+        load_rows(1, rows, tau + first * 1, tau_block);
+        for (size_t lane = 0; lane < LANES; lane += WIDTH) {
+            forward_dynamics_lanes(q_block + lane, qd_block + lane, tau_block + lane, qdd_block + lane, pivot_block + lane);
+        }
+        const size_t bad = mark_failed(rows, pivot_block, qdd_block);
+        if (bad < rows && first + bad < failed) {
+            failed = first + bad;
+        }
+        store_rows(1, rows, qdd_block, qdd + first * 1);
+    }
+    return failed < count ? failed + 1 : 0;
+}
+size_t pendulum_forward_dynamics_batch_soa(size_t count, const double *q, const double *qd, const double *tau, double *qdd)
+{
+    const size_t blocks = count / LANES + (count % LANES != 0);
+    size_t failed = count;
+    PARALLEL_FOR_FIRST(failed)
+    for (size_t block = 0; block < blocks; block++) {
+        const real *q_block = q + block * 1 * LANES;
+        const real *qd_block = qd + block * 1 * LANES;
+        const real *tau_block = tau + block * 1 * LANES;
+        real *qdd_block = qdd + block * 1 * LANES;
+        real pivot_block[1 * LANES] ALIGNED;
+        for (size_t lane = 0; lane < LANES; lane += WIDTH) {
+            forward_dynamics_lanes(q_block + lane, qd_block + lane, tau_block + lane, qdd_block + lane, pivot_block + lane);
+        }
+        const size_t first = block * LANES;
+        const size_t rows = count - first < LANES ? count - first : LANES;
+        const size_t bad = mark_failed(rows, pivot_block, qdd_block);
+        if (bad < rows && first + bad < failed) {
+            failed = first + bad;
+        }
+    }
+    return failed < count ? failed + 1 : 0;
+}
