@@ -17,7 +17,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench", description=__doc__)
     parser.add_argument("names", nargs="*", help="standard robots; all where none is named")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="trials that count (default %(default)s)")
-    parser.add_argument("--rivals", nargs="+", choices=[entrant.name for entrant in EVERYONE], help="whom to measure")
+    parser.add_argument(
+        "--rivals", nargs="+", choices=[entrant.name for entrant in EVERYONE], help="whom to measure"
+    )
     parser.add_argument("--json", type=Path, help="write everything measured there")
     options = parser.parse_args()
     settings = Settings(rounds=options.rounds, rivals=tuple(options.rivals) if options.rivals else None)

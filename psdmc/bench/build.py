@@ -20,7 +20,9 @@ COUNTED = tuple("-march=x86-64-v3" if flag == "-march=native" else flag for flag
 CXX_CANDIDATES = ("c++", "g++", "clang++")
 
 
-def built(product: str, command: Sequence[str], sources: Mapping[str, str], depends: Sequence[str] = ()) -> Path:
+def built(
+    product: str, command: Sequence[str], sources: Mapping[str, str], depends: Sequence[str] = ()
+) -> Path:
     """Path of the file `product` that `command` makes in a folder that holds `sources`.
 
     command  argument list; runs only where no earlier result came from the same content

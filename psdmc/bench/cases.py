@@ -45,7 +45,9 @@ def standard_cases(names: Sequence[str] | None = None, seed: int = SEED) -> Iter
     for name in makers if names is None else names:
         if name not in makers:
             raise InputError(f"there is no standard robot {name!r}", f"choose from {', '.join(makers)}")
-        yield derived(name, makers[name](), f"generic physical inertias, floor mount, no drive inertia, seed {seed}")
+        yield derived(
+            name, makers[name](), f"generic physical inertias, floor mount, no drive inertia, seed {seed}"
+        )
 
 
 def derived(name: str, chain: Chain, note: str, expand: bool = True) -> Case:
@@ -59,7 +61,8 @@ def oblique_chain(n: int, seed: int) -> Chain:
     """n revolute joints about axes that neither meet nor stand parallel or square: nothing to exploit."""
     rng = np.random.default_rng(seed)
     joints = tuple(
-        Joint(f"joint{i + 1}", f"link{i + 1}", "revolute", _anywhere(rng), Placement.identity()) for i in range(n)
+        Joint(f"joint{i + 1}", f"link{i + 1}", "revolute", _anywhere(rng), Placement.identity())
+        for i in range(n)
     )
     return Chain(
         name=f"generic_{n}r",

@@ -42,7 +42,8 @@ def this_machine() -> Machine:
         system=f"{platform.system()} {platform.release()} {platform.machine()}",
         compiler=_compiler_version(),
         flags=" ".join(NATIVE),
-        governor=_text("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor") or "not stated by this machine",
+        governor=_text("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
+        or "not stated by this machine",
         python=platform.python_version(),
         numpy=np.__version__,
     )

@@ -66,7 +66,9 @@ class CaseResult:
         own = [m for m in self.of(function, layout) if m.rival == rival]
         return min(own, key=lambda m: m.ns) if own else None
 
-    def ratio(self, function: str, layout: str = "state", *, over: str, rival: str = "psdmc factored") -> float | None:
+    def ratio(
+        self, function: str, layout: str = "state", *, over: str, rival: str = "psdmc factored"
+    ) -> float | None:
         """How many times faster `rival` is than `over`'s better way for one state a call."""
         ours, theirs = self.best(rival, function, layout), self.best(over, function)
         return theirs.ns / ours.ns if ours and theirs else None

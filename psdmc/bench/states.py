@@ -48,7 +48,7 @@ class States:
 
     @property
     def n(self) -> int:
-        return self.q.shape[1]
+        return len(self.chain)
 
     @cached_property
     def tau(self) -> Array:
@@ -90,6 +90,6 @@ class States:
     def _torques(self, q: Array, qd: Array, qdd: Array, base: Vector) -> Array:
         bodies = bodies_of(self.chain, self.chain.parameters)
         drives = drive_inertia_of(self.chain.parameters)
-        vectors = (list(values.T) for values in (q, qd, qdd))
-        torques = inverse_dynamics(frames_of(self.chain), bodies, drives, *vectors, base)
+        q_, qd_, qdd_ = (list(values.T) for values in (q, qd, qdd))
+        torques = inverse_dynamics(frames_of(self.chain), bodies, drives, q_, qd_, qdd_, base)
         return np.stack([np.broadcast_to(torque, len(q)) for torque in torques], axis=1)

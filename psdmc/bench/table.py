@@ -14,7 +14,10 @@ def as_text(result: BenchResult) -> str:
 
 def _case_lines(case: CaseResult) -> list[str]:
     idle = "machine idle" if case.idle else "MACHINE BUSY: times are not reliable"
-    lines = ["", f"{case.name}: n {case.n}, p {case.p}, l {case.l}; {case.note}; {case.rounds} trials, {idle}"]
+    lines = [
+        "",
+        f"{case.name}: n {case.n}, p {case.p}, l {case.l}; {case.note}; {case.rounds} trials, {idle}",
+    ]
     for function in dict.fromkeys(m.function for m in case.measurements):
         lines.append(f"  {function}")
         same = [m for m in case.measurements if m.function == function]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from psdmc.bench.build import NATIVE
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable
-from psdmc.bench.rivals import casadi_c, pinocchio_cpp, psdmc_c
+from psdmc.bench.rivals import casadi_c, mujoco_c, pinocchio_cpp, psdmc_c
 
 Entry = Contestant | Unavailable
 
@@ -28,6 +28,9 @@ EVERYONE = (
     Entrant("psdmc factored", lambda case, flags: psdmc_c.contestants(case, "factored", flags)),
     Entrant("psdmc expanded", lambda case, flags: psdmc_c.contestants(case, "expanded", flags)),
     Entrant("Pinocchio", lambda case, flags: pinocchio_cpp.contestants(case, "library", flags)),
-    Entrant("Pinocchio header-only", lambda case, flags: pinocchio_cpp.contestants(case, "header-only", flags)),
+    Entrant(
+        "Pinocchio header-only", lambda case, flags: pinocchio_cpp.contestants(case, "header-only", flags)
+    ),
     Entrant("CasADi", casadi_c.contestants),
+    Entrant("MuJoCo", mujoco_c.contestants),
 )

@@ -10,14 +10,24 @@ from pathlib import Path
 from psdmc.bench.build import NATIVE, built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
-from psdmc.bench.rivals.pinocchio_cpp import DEFINES, SYMBOLS, includes, pinocchio_prefix, standard_parameters
+from psdmc.bench.rivals.pinocchio_cpp import (
+    DEFINES,
+    INSTANTIATED,
+    SYMBOLS,
+    includes,
+    pinocchio_prefix,
+    standard_parameters,
+)
 from psdmc.bench.versions import version_of
 from psdmc.errors import ToolchainError
 from psdmc.toolchain.compiler_command import find_compiler
 
 RIVAL = "CasADi"
 
-WAYS = {**{name: (name,) for name in SYMBOLS}, "forward_dynamics": ("forward_dynamics_aba", "forward_dynamics_ldl")}
+WAYS = {
+    **{name: (name,) for name in SYMBOLS},
+    "forward_dynamics": ("forward_dynamics_aba", "forward_dynamics_ldl"),
+}
 """Its functions; forward dynamics by articulated bodies, or from M and h by L D L^T."""
 
 
@@ -36,7 +46,9 @@ def contestants(case: Case, flags: tuple[str, ...] = NATIVE) -> list[Contestant 
     return found
 
 
-def _entered(case: Case, library: Path, by_lane: bool, counts: dict[str, tuple[int, int]]) -> list[Contestant]:
+def _entered(
+    case: Case, library: Path, by_lane: bool, counts: dict[str, tuple[int, int]]
+) -> list[Contestant]:
     n = case.n
     outputs = {"mass_matrix": n * n, "regressor": 10 * n * n}
     return [
@@ -70,7 +82,7 @@ def _writer() -> Path:
     """The program that writes C; it is compiled once for all robots, unoptimised: it runs for a tenth of a second."""
     prefix, casadi = pinocchio_prefix(), _casadi()
     names = ("casadi_writer.cpp", "pinocchio_model.hpp")
-    command = [cxx(), "-std=c++17", "-O0", "-DNDEBUG", *DEFINES, *includes(prefix)]
+    command = [cxx(), "-std=c++17", "-O0", "-DNDEBUG", INSTANTIATED, *DEFINES, *includes(prefix)]
     command += ["-isystem", str(casadi / "include"), "casadi_writer.cpp", "-o", "casadi_writer"]
     command += [f"-L{prefix / 'lib'}", f"-L{casadi}", "-lcasadi", "-lpinocchio_default"]
     command += [f"-Wl,-rpath,{prefix / 'lib'}", f"-Wl,-rpath,{casadi}", f"-Wl,-rpath-link,{prefix / 'lib'}"]
@@ -100,16 +112,35 @@ def _scalar(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
         f"const double *in[] = {{q, qd, x}}; {way}(in, &out, nullptr, nullptr, 0); }})"
         for way in _all_ways()
     ]
-    sources = {"generated.c": generated, "glue.cpp": "\n".join(lines) + "\n", "loops.hpp": source("loops.hpp")}
-    command = [*find_compiler().command, *flags, "-shared", "generated.c", "glue.cpp", "-o", "casadi.so", "-lm"]
+    sources = {
+        "generated.c": generated,
+        "glue.cpp": "\n".join(lines) + "\n",
+        "loops.hpp": source("loops.hpp"),
+    }
+    command = [
+        *find_compiler().command,
+        *flags,
+        "-shared",
+        "generated.c",
+        "glue.cpp",
+        "-o",
+        "casadi.so",
+        "-lm",
+    ]
     return built("casadi.so", command, sources)
 
 
 def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
     """The same C as C++, where its number is a vector."""
-    size = {way: case.n for way in _all_ways()} | {"mass_matrix": case.n**2, "regressor": 10 * case.n**2}
-    lines = ['#include "loops.hpp"', '#include "casadi_lanes.hpp"', "namespace casadi_c {", '#include "generated.c"', "}"]
-    lines += ['PSDMC_EXPORT int lanes() { return PSDMC_LANES; }']
+    size = dict.fromkeys(_all_ways(), case.n) | {"mass_matrix": case.n**2, "regressor": 10 * case.n**2}
+    lines = [
+        '#include "loops.hpp"',
+        '#include "casadi_lanes.hpp"',
+        "namespace casadi_c {",
+        '#include "generated.c"',
+        "}",
+    ]
+    lines += ["PSDMC_EXPORT int lanes() { return PSDMC_LANES; }"]
     lines += [
         f"PSDMC_BATCH_CONTESTANT({way}, [](std::size_t count, const double *q, const double *qd, const double *x, "
         f"double *out) {{ for (std::size_t i = 0; i < count; i += PSDMC_LANES) {{ "
@@ -119,8 +150,21 @@ def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
         for way in _all_ways()
     ]
     names = ("loops.hpp", "casadi_lanes.hpp")
-    sources = {"generated.c": generated, "glue.cpp": "\n".join(lines) + "\n"} | {name: source(name) for name in names}
-    command = [cxx(), "-std=c++17", "-w", *flags, "-shared", "glue.cpp", "-o", "casadi_lanes.so", "-lmvec", "-lm"]
+    sources = {"generated.c": generated, "glue.cpp": "\n".join(lines) + "\n"} | {
+        name: source(name) for name in names
+    }
+    command = [
+        cxx(),
+        "-std=c++17",
+        "-w",
+        *flags,
+        "-shared",
+        "glue.cpp",
+        "-o",
+        "casadi_lanes.so",
+        "-lmvec",
+        "-lm",
+    ]
     return built("casadi_lanes.so", command, sources)
 
 

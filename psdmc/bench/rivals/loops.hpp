@@ -89,17 +89,17 @@ void batch(const Work &w, std::size_t block, double *seconds, Call call) {
 
 }  // namespace bench
 
-#define PSDMC_CONTESTANT(symbol, call)                                                            \
+#define PSDMC_CONTESTANT(symbol, ...)                                                              \
   PSDMC_EXPORT void symbol##_throughput(const bench::Work *w, std::size_t block, double *seconds) { \
-    bench::throughput(*w, block, seconds, call);                                                  \
-  }                                                                                               \
-  PSDMC_EXPORT void symbol##_latency(const bench::Work *w, std::size_t block, double *seconds) {  \
-    bench::latency(*w, block, seconds, call);                                                     \
+    bench::throughput(*w, block, seconds, __VA_ARGS__);                                            \
+  }                                                                                                \
+  PSDMC_EXPORT void symbol##_latency(const bench::Work *w, std::size_t block, double *seconds) {   \
+    bench::latency(*w, block, seconds, __VA_ARGS__);                                               \
   }
 
-#define PSDMC_BATCH_CONTESTANT(symbol, call)                                                      \
+#define PSDMC_BATCH_CONTESTANT(symbol, ...)                                                        \
   PSDMC_EXPORT void symbol##_throughput(const bench::Work *w, std::size_t block, double *seconds) { \
-    bench::batch(*w, block, seconds, call);                                                       \
+    bench::batch(*w, block, seconds, __VA_ARGS__);                                                 \
   }
 
 /// What reading the clock costs: an empty block.

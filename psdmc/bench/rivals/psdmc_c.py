@@ -78,7 +78,16 @@ def compiled(package: PackageView, flags: tuple[str, ...]) -> Path:
 
 def _library(files: dict[str, str], sources: tuple[str, ...], robot: str, flags: tuple[str, ...]) -> Path:
     """Folder of the package's own library, compiled file by file as toolchain/compile.py does."""
-    command = (*find_compiler().command, "-std=c99", *flags, "-shared", "-Iinclude", *sources, "-o", "library.so")
+    command = (
+        *find_compiler().command,
+        "-std=c99",
+        *flags,
+        "-shared",
+        "-Iinclude",
+        *sources,
+        "-o",
+        "library.so",
+    )
 
     def build(folder: Path) -> None:
         for path, text in files.items():
@@ -109,4 +118,3 @@ def glue(package: PackageView) -> str:
 
 def _arguments(function: Function) -> str:
     return ", ".join((*(("q", "qd", "x")[: len(function.inputs)]), "out"))
-

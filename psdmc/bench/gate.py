@@ -1,0 +1,131 @@
+"""python -m psdmc.bench.gate compare|save: counts against the committed baseline.
+
+Counts gate, times report: a count that grew fails until the baseline is changed in the same commit. Operation counts are
+compared everywhere, instruction counts where the baseline's own compiler is at work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from psdmc.bench.cases import standard_cases
+from psdmc.bench.counts import Baseline, count
+from psdmc.errors import PsdmcError
+
+BASELINE = Path("benchmarks") / "baseline.json"
+
+SLACK = 0.002
+"""Relative growth of instructions that passes: the few that depend on where libraries happen to lie."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One count that differs from the baseline; None where a side lacks it."""
+
+    robot: str
+    function: str
+    what: str
+    before: float | None
+    after: float | None
+
+    @property
+    def fails(self) -> bool:
+        if self.before is None or self.after is None:
+            return True
+        slack = SLACK if self.what.startswith("instructions") else 0.0
+        return self.after > self.before * (1.0 + slack)
+
+    def __str__(self) -> str:
+        verdict = "GREW" if self.fails else "fell"
+        if self.before is None:
+            verdict = "NEW: not in the baseline"
+        if self.after is None:
+            verdict = "GONE: only in the baseline"
+        return f"{self.robot} {self.function}: {self.what} {_shown(self.before)} -> {_shown(self.after)}  {verdict}"
+
+
+def changes(before: Baseline, after: Baseline) -> Iterator[Change]:
+    """Every difference, robots in the baseline's order; instructions only where both sides can be compared."""
+    comparable = before.compiler == after.compiler and after.without is None
+    for robot in after.counts:
+        old_robot, new_robot = before.counts.get(robot, {}), after.counts[robot]
+        for function in {**old_robot, **new_robot}:
+            old, new = old_robot.get(function, {}), new_robot.get(function, {})
+            for what in {**old, **new}:
+                if what.startswith("instructions") and not comparable:
+                    continue
+                if old.get(what) != new.get(what):
+                    yield Change(robot, function, what, old.get(what), new.get(what))
+
+
+def compare(before: Baseline, after: Baseline) -> tuple[str, bool]:
+    """What to say, and whether the gate is passed."""
+    found = list(changes(before, after))
+    lines = [str(change) for change in found]
+    if after.without is not None:
+        lines.append(f"instructions were not counted: {after.without}")
+    elif before.compiler != after.compiler:
+        lines.append(
+            f"instructions were not compared: the baseline is of {before.compiler}, this is {after.compiler}"
+        )
+    failed = [change for change in found if change.fails]
+    if failed:
+        lines.append(
+            f"{len(failed)} counts grew. If that is meant: make bench-save, and commit it with the change"
+        )
+    elif found:
+        lines.append("nothing grew; make bench-save keeps what fell")
+    else:
+        lines.append("counts are those of the baseline")
+    return "\n".join(lines), not failed
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m psdmc.bench.gate", description=__doc__)
+    parser.add_argument("action", choices=("compare", "save"))
+    parser.add_argument("names", nargs="*", help="standard robots; all where none is named")
+    parser.add_argument("--baseline", type=Path, default=BASELINE, help="default %(default)s")
+    options = parser.parse_args()
+    try:
+        return _save(options.baseline, options.names) if options.action == "save" else _compare(options)
+    except PsdmcError as error:
+        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
+        return error.exit_status
+
+
+def _compare(options: argparse.Namespace) -> int:
+    before = Baseline.read(options.baseline)
+    text, passed = compare(before, _counted(options.names))
+    print(text)
+    return 0 if passed else 1
+
+
+def _save(path: Path, names: list[str]) -> int:
+    """Named robots replace theirs, the others stay; without instructions nothing is saved over a full baseline."""
+    after = _counted(names)
+    kept = Baseline.read(path).counts if names and path.is_file() else {}
+    if after.without is not None:
+        print(f"warning: instructions were not counted: {after.without}", file=sys.stderr)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(Baseline(after.compiler, {**kept, **after.counts}).to_json())
+    print(f"wrote {path}")
+    return 0
+
+
+def _counted(names: list[str]) -> Baseline:
+    def tell(message: str) -> None:
+        print(message, file=sys.stderr, flush=True)
+
+    return count(list(standard_cases(names or None)), tell)
+
+
+def _shown(value: float | None) -> str:
+    return "-" if value is None else f"{value:g}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

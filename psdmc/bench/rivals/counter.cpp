@@ -1,0 +1,37 @@
+// Runs contestants' loops once each, under callgrind, which counts what happens inside them and nothing else.
+//
+// usage: counter LIBRARY ROBOT.txt JOBS.txt; a job is a line: symbol, n, outputs, states a call, states in all, file of
+// q, qd and x as doubles.
+#include <dlfcn.h>
+
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "loops.hpp"
+
+int main(int, char **arguments) {
+  void *library = dlopen(arguments[1], RTLD_NOW);
+  if (!library) return std::cerr << dlerror() << "\n", 1;
+  std::ifstream robot(arguments[2]);
+  const std::string text{std::istreambuf_iterator<char>(robot), {}};
+  using Setup = int (*)(const char *);
+  if (auto setup = reinterpret_cast<Setup>(dlsym(library, "setup"))) setup(text.c_str());
+
+  std::ifstream jobs(arguments[3]);
+  std::string symbol, states;
+  std::size_t n, outputs, block, count;
+  while (jobs >> symbol >> n >> outputs >> block >> count >> states) {
+    std::vector<double> values(3 * n * count), output(outputs * count), seconds(count);
+    std::ifstream(states, std::ios::binary).read(reinterpret_cast<char *>(values.data()), std::streamsize(values.size() * 8));
+    const double *q = values.data();
+    const bench::Work work{count, n, outputs, count, q, q + n * count, q + 2 * n * count, output.data()};
+    using Loop = void (*)(const bench::Work *, std::size_t, double *);
+    auto loop = reinterpret_cast<Loop>(dlsym(library, (symbol + "_throughput").c_str()));
+    if (!loop) return std::cerr << dlerror() << "\n", 1;
+    loop(&work, block, seconds.data());
+  }
+  return 0;
+}

@@ -1,0 +1,104 @@
+"""MuJoCo's own inverse dynamics in C, from the wheel's library."""
+
+from __future__ import annotations
+
+import ctypes
+from importlib.util import find_spec
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from psdmc.bench.build import NATIVE, built, cxx
+from psdmc.bench.case import DRIVE, Case
+from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.bench.versions import version_of
+from psdmc.dynamics.parameters import inertia_matrix, joint_frame_map
+from psdmc.errors import ToolchainError
+from psdmc.robot.chain import Array, Chain
+
+RIVAL = "MuJoCo"
+FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")
+
+
+def contestants(case: Case, flags: tuple[str, ...] = NATIVE) -> list[Contestant | Unavailable]:
+    """MuJoCo's functions for one robot; armature is no part of its Newton-Euler, so drive inertia is refused."""
+    if np.any(case.chain.parameters[:, DRIVE] != 0.0):
+        return [Unavailable(RIVAL, "its mj_rne leaves drive inertia out")]
+    if np.any(case.chain.parameters[:, 0] <= 0.0):
+        return [Unavailable(RIVAL, "it wants mass on every link")]
+    robot = mjcf(case.chain)
+    try:
+        library = _compiled(flags)
+    except ToolchainError as error:
+        return [Unavailable(RIVAL, error.message)]
+    if ctypes.CDLL(str(library)).setup(robot.encode()) != case.n:
+        return [Unavailable(RIVAL, "it refuses this robot's inertia")]
+    return [Contestant(RIVAL, name, library, name, case.n, robot=robot) for name in FUNCTIONS]
+
+
+def _compiled(flags: tuple[str, ...]) -> Path:
+    folder = _mujoco()
+    library = next(iter(sorted(folder.glob("libmujoco.so*"))), None)
+    if library is None:
+        raise ToolchainError("this MuJoCo came without its C library", "install the wheel 'mujoco'")
+    command = [cxx(), "-std=c++17", *flags, "-shared", "-isystem", str(folder / "include"), "mujoco_c.cpp"]
+    command += [str(library), f"-Wl,-rpath,{folder}", "-o", "mujoco_c.so"]
+    sources = {name: source(name) for name in ("mujoco_c.cpp", "loops.hpp")}
+    return built("mujoco_c.so", command, sources, [version_of("mujoco")])
+
+
+def _mujoco() -> Path:
+    found = find_spec("mujoco")
+    if found is None or found.origin is None:
+        raise ToolchainError("the wheel 'mujoco' is not installed", "pip install mujoco")
+    return Path(found.origin).parent
+
+
+def mjcf(chain: Chain) -> str:
+    """The chain as MuJoCo's XML: one body a joint, its frame psdmc's joint frame, its joint about z."""
+    root = ElementTree.Element("mujoco", model="robot")
+    ElementTree.SubElement(root, "compiler", angle="radian", autolimits="false")
+    ElementTree.SubElement(root, "option", gravity=_text(chain.gravity))
+    parent = ElementTree.SubElement(root, "worldbody")
+    for joint, row in zip(chain.joints, chain.parameters, strict=True):
+        parent = ElementTree.SubElement(
+            parent,
+            "body",
+            pos=_text(joint.placement.translation),
+            quat=_text(quaternion(joint.placement.rotation)),
+        )
+        kind = "hinge" if joint.kind == "revolute" else "slide"
+        ElementTree.SubElement(parent, "joint", type=kind, axis="0 0 1")
+        _add_inertia(parent, joint_frame_map(joint.link_frame) @ row[:DRIVE])
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _add_inertia(body: ElementTree.Element, x: Array) -> None:
+    """MuJoCo wants the inertia about the centre of mass."""
+    mass, com = float(x[0]), x[1:4] / x[0]
+    about_com = inertia_matrix(x) - mass * (com @ com * np.eye(3) - np.outer(com, com))
+    full = about_com[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    ElementTree.SubElement(body, "inertial", pos=_text(com), mass=repr(mass), fullinertia=_text(full))
+
+
+def quaternion(rotation: Array) -> Array:
+    """(4,) unit quaternion w x y z of a rotation, from the largest of its four squares (Shepperd 1978)."""
+    m = rotation
+    squares = np.array([np.trace(m), m[0, 0], m[1, 1], m[2, 2]])
+    k = int(np.argmax(squares))
+    if k == 0:
+        q = np.array([1.0 + np.trace(m), m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
+    else:
+        i = k - 1
+        j, l = (i + 1) % 3, (i + 2) % 3
+        q = np.zeros(4)
+        q[0] = m[l, j] - m[j, l]
+        q[1 + i] = 1.0 + m[i, i] - m[j, j] - m[l, l]
+        q[1 + j], q[1 + l] = m[j, i] + m[i, j], m[l, i] + m[i, l]
+    unit: Array = q / np.linalg.norm(q)
+    return unit
+
+
+def _text(values: Array) -> str:
+    return " ".join(repr(value) for value in np.ravel(values).tolist())
