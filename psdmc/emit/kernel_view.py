@@ -80,10 +80,14 @@ class KernelView:
 
 @dataclass(frozen=True, slots=True)
 class FunctionView:
-    """A function with its kernels, baked first: one C file."""
+    """A function with its kernels, baked first: one C file.
+
+    shape  of the output, in words
+    """
 
     name: str
     meaning: str
+    shape: str
     kernels: tuple[KernelView, ...]
 
     @property
@@ -104,7 +108,7 @@ def function_views(
         own = [kernels[name] for name in (function.name, f"{function.name}_theta") if name in kernels]
         if own:
             shown = tuple(kernel_view(kernel, n, l, robot, options) for kernel in own)
-            views.append(FunctionView(function.name, function.meaning, shown))
+            views.append(FunctionView(function.name, function.meaning, _shape(function, n, l), shown))
     return tuple(views)
 
 
@@ -128,6 +132,13 @@ def kernel_view(kernel: Kernel, n: int, l: int, robot: str, options: EmitOptions
         cost=cost(kernel.single),
         lowering=kernel.lowering,
     )
+
+
+def _shape(function: Function, n: int, l: int) -> str:
+    lengths = {"n": n, "l": l, "6": 6, "1": 1}
+    rows, columns = lengths[function.rows], lengths[function.columns]
+    size = str(rows) if function.columns == "1" else f"{rows} x {columns}, row-major"
+    return f"{function.output} is {size}"
 
 
 def _body(kernel: Kernel, program: Program, n: int, l: int, options: EmitOptions) -> Body:

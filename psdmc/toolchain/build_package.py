@@ -18,19 +18,19 @@ def build_package(directory: str | Path) -> str:
     root = Path(directory)
     if not (root / "manifest.json").is_file() or not (root / "CMakeLists.txt").is_file():
         raise InputError(f"{root}: no emitted package (no manifest.json)", "make one with psdmc emit-c")
-    compiler = find_compiler()
+    compiler = find_compiler().command
     if shutil.which("cmake"):
-        return _with_cmake(root, compiler.command)
+        return _with_cmake(root)
     if shutil.which("make"):
-        return _with_make(root, compiler.command)
+        return _with_make(root, compiler)
     raise ToolchainError("neither cmake nor make was found", "install one (Debian: apt install cmake)")
 
 
-def _with_cmake(root: Path, compiler: tuple[str, ...]) -> str:
+def _with_cmake(root: Path) -> str:
+    """CMake honours CC on its own."""
     build = str(root / "build")
-    command = f"-DCMAKE_C_COMPILER={shutil.which(compiler[0])}"
     steps = [
-        ["cmake", "-S", str(root), "-B", build, "-DCMAKE_BUILD_TYPE=Release", command],
+        ["cmake", "-S", str(root), "-B", build, "-DCMAKE_BUILD_TYPE=Release"],
         ["cmake", "--build", build, "--parallel"],
         ["ctest", "--test-dir", build, "--output-on-failure", "--verbose"],
     ]

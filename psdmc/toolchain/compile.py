@@ -8,7 +8,7 @@ from pathlib import Path
 
 from psdmc.emit.package import PackageView, library_files
 from psdmc.toolchain.cache import cache_key, cached
-from psdmc.toolchain.compiler_command import FLAGS, Compiler, find_compiler, run
+from psdmc.toolchain.compiler_command import Compiler, find_compiler, run
 
 LIBRARY = "library.so"
 
@@ -20,7 +20,13 @@ def compile_library(package: PackageView) -> Path:
     """
     files = library_files(package)
     compiler = find_compiler()
-    parts = (*compiler.command, compiler.version, compiler.target, *FLAGS, package.info.psdmc_version)
+    parts = (
+        *compiler.command,
+        compiler.version,
+        compiler.target,
+        *compiler.flags,
+        package.info.psdmc_version,
+    )
     folder = cached(cache_key(files, parts), lambda own: _build(package, files, compiler, own))
     return folder / LIBRARY
 
@@ -40,7 +46,7 @@ def _build(package: PackageView, files: dict[str, str], compiler: Compiler, fold
 
 
 def _compile_command(compiler: Compiler, source: str) -> list[str]:
-    return [*compiler.command, "-std=c99", *FLAGS, "-Iinclude", "-c", source, "-o", _object(source)]
+    return [*compiler.command, "-std=c99", *compiler.flags, "-Iinclude", "-c", source, "-o", _object(source)]
 
 
 def _object(source: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shlex
 import shutil
@@ -13,7 +14,9 @@ from functools import cache
 from psdmc.errors import ToolchainError
 
 CANDIDATES = ("cc", "gcc", "clang")
-FLAGS = ("-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fPIC")
+FLAGS = ("-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fPIC")
+NATIVE_FLAGS = ("-march=native", "-mcpu=native")
+"""How compilers are told to use this CPU's instructions; the first that works is taken."""
 SECONDS = 600
 """Longest that one run of the compiler may take."""
 
@@ -24,11 +27,13 @@ class Compiler:
 
     command  the words that start it
     version  what it says of itself, for cache keys
-    target   macros that it predefines under FLAGS: they name the CPU features that -march=native found
+    flags    FLAGS, and the one for this machine's CPU
+    target   macros that it predefines under its flags: they name the CPU features that it found
     """
 
     command: tuple[str, ...]
     version: str
+    flags: tuple[str, ...]
     target: str
 
 
@@ -57,8 +62,20 @@ def _command(wanted: str) -> tuple[str, ...]:
 @cache
 def _described(command: tuple[str, ...]) -> Compiler:
     version = run([*command, "--version"], "C compiler")
-    macros = run([*command, *FLAGS, "-dM", "-E", "-x", "c", os.devnull], "C compiler")
-    return Compiler(command, version, "\n".join(sorted(macros.splitlines())))
+    flags, macros = _native(command)
+    return Compiler(command, version, flags, "\n".join(sorted(macros.splitlines())))
+
+
+def _native(command: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
+    """Flags that the compiler takes, this CPU's if it can, and the macros that it predefines under them."""
+    for native in NATIVE_FLAGS:
+        with contextlib.suppress(ToolchainError):
+            return (*FLAGS, native), _macros(command, (*FLAGS, native))
+    return FLAGS, _macros(command, FLAGS)
+
+
+def _macros(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
+    return run([*command, *flags, "-dM", "-E", "-x", "c", os.devnull], "C compiler")
 
 
 def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:

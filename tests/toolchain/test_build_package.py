@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -47,12 +46,12 @@ def emitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def installed(emitted: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def installed(emitted: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     _need("cmake")
     prefix = tmp_path_factory.mktemp("prefix")
     build_package(emitted)
     _run(["cmake", "--install", str(emitted / "build"), "--prefix", str(prefix)])
-    yield prefix
+    return prefix
 
 
 def test_build_runs_the_self_test_with_cmake(emitted: Path) -> None:

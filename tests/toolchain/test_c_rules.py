@@ -12,8 +12,17 @@ from traced import arm_package
 
 from psdmc.emit.options import EmitOptions
 
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Werror".split()
-EXTRA = "-Wstrict-prototypes -Wmissing-prototypes -Wundef -Wvla".split()
+STRICT = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wconversion",
+    "-Wshadow",
+    "-Wdouble-promotion",
+    "-Werror",
+]
+EXTRA = ["-Wstrict-prototypes", "-Wmissing-prototypes", "-Wundef", "-Wvla"]
 COMPILERS = ["gcc", "clang"]
 NAMES = ["inverse_dynamics", "forward_dynamics", "jacobian"]
 """One of each kind: torques with parameters, pivots, a matrix without parameters."""

@@ -57,7 +57,7 @@ def test_a_failing_build_leaves_nothing_behind(fresh_cache: Path) -> None:
         (folder / "half").write_text("")
         raise ToolchainError("no")
 
-    with pytest.raises(ToolchainError, match="^no$"):
+    with pytest.raises(ToolchainError, match=r"^no$"):
         cached("k" * 64, fail)
     assert list(fresh_cache.iterdir()) == []
 
@@ -105,7 +105,7 @@ def test_a_missing_compiler_is_one_clear_error(monkeypatch: pytest.MonkeyPatch, 
 
 def test_a_compiler_that_cc_names_must_exist(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-cc -m64")
-    with pytest.raises(ToolchainError, match="'no-such-cc -m64' \\(from CC\\)"):
+    with pytest.raises(ToolchainError, match=r"'no-such-cc -m64' \(from CC\)"):
         find_compiler()
 
 

@@ -16,6 +16,7 @@ int pendulum_forward_dynamics(const double *q, const double *qd, const double *t
 }
 
 #include "lane_states.h"
+
 static void forward_dynamics_lanes(const real *q, const real *qd, const real *tau, real *qdd, real *pivot)
 {
 #include "forward_dynamics.inc"
@@ -48,6 +49,7 @@ size_t pendulum_forward_dynamics_batch(size_t count, const double *q, const doub
     }
     return failed < count ? failed + 1 : 0;
 }
+
 size_t pendulum_forward_dynamics_batch_soa(size_t count, const double *q, const double *qd, const double *tau, double *qdd)
 {
     const size_t blocks = count / LANES + (count % LANES != 0);

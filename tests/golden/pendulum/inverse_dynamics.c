@@ -15,6 +15,7 @@ void pendulum_inverse_dynamics_theta(const double *q, const double *qd, const do
 }
 
 #include "lane_states.h"
+
 static void inverse_dynamics_lanes(const real *q, const real *qd, const real *qdd, real *tau)
 {
 #include "inverse_dynamics.inc"
@@ -40,6 +41,7 @@ void pendulum_inverse_dynamics_batch(size_t count, const double *q, const double
         store_rows(1, rows, tau_block, tau + first * 1);
     }
 }
+
 void pendulum_inverse_dynamics_batch_soa(size_t count, const double *q, const double *qd, const double *qdd, double *tau)
 {
     const size_t blocks = count / LANES + (count % LANES != 0);
@@ -54,6 +56,7 @@ void pendulum_inverse_dynamics_batch_soa(size_t count, const double *q, const do
         }
     }
 }
+
 static void inverse_dynamics_theta_lanes(const real *q, const real *qd, const real *qdd, const real *theta_b, real *tau)
 {
 #include "inverse_dynamics_theta.inc"
