@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from psdmc.derive.terms import Terms
 
@@ -76,12 +77,12 @@ def _dense_rows(terms: Terms, columns: int) -> Iterable[Array]:
         yield rows
 
 
-def reduced(factor: Array) -> Reduction:
-    """Reduced row echelon form, the next column in order a pivot where its residual says so.
+def reduced(rows: Array) -> Reduction:
+    """Reduced row echelon form of rows (m, k), the next column in order a pivot where its residual says so.
 
     Never "the largest first": between equal residuals rounding would choose.
     """
-    work = np.array(factor)
+    work = np.array(rows, order="C")
     norms = np.linalg.norm(work, axis=0)
     work[:, norms <= PIVOT_TOLERANCE * norms.max(initial=0.0)] = 0.0
     pivots: list[int] = []
@@ -95,17 +96,20 @@ def reduced(factor: Array) -> Reduction:
 
 
 def _reflect(rows: Array, column: int, length: float) -> None:
-    """Turn the rows, in place, so that the column keeps its first entry only (Householder)."""
+    """Turn the rows, in place, so that the column keeps its first entry only (Householder).
+
+    einsum and no BLAS: its sums do not hang on the number of threads.
+    """
     mirror = rows[:, column].copy()
     mirror[0] += np.copysign(length, mirror[0])
     mirror /= np.linalg.norm(mirror)
-    rows -= 2.0 * np.outer(mirror, mirror @ rows)
+    rows -= np.outer(mirror, 2.0 * np.einsum("i,ij->j", mirror, rows))
 
 
 def _back_substituted(rows: Array, pivots: NDArray[np.int64]) -> Reduction:
     echelon = np.zeros(rows.shape)
     if len(pivots):
-        echelon[:] = np.linalg.solve(np.triu(rows[:, pivots]), rows)
+        echelon[:] = solve_triangular(rows[:, pivots], rows)
     largest = np.abs(echelon).max(axis=1, keepdims=True, initial=0.0)
     echelon[np.abs(echelon) < ECHELON_TOLERANCE * largest] = 0.0
     echelon[:, pivots] = np.eye(len(pivots))

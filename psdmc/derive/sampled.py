@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from psdmc.derive.reduce import Reduction, reduced, triangular
+from psdmc.derive.reduce import Reduction, reduced
 from psdmc.derive.units import Scaled
 from psdmc.dynamics.regressor import regressor
 from psdmc.robot.chain import PARAMETERS_PER_LINK
@@ -24,7 +25,7 @@ def sampled_reduction(scaled: Scaled) -> Reduction:
     """The same base parameters as the expanded path finds, within the span's columns."""
     n = len(scaled.kinds)
     rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
-    return reduced(triangular(rows @ scaled.span))
+    return reduced((sparse.csr_array(scaled.span.T) @ rows.T).T)
 
 
 def sampled_regressor(scaled: Scaled, count: int) -> Array:

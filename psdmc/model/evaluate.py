@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 from psdmc.dynamics.composite_body import mass_matrix as composite_mass_matrix
 from psdmc.dynamics.frames import base_acceleration, frames_of
@@ -59,7 +60,7 @@ def function_values(model: DynamicsModel, q: Array, qd: Array, qdd: Array) -> Ar
     return values
 
 
-def expanded(model: DynamicsModel) -> tuple[NDArray[np.uint8], tuple[Array, ...]]:
+def expanded(model: DynamicsModel) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
     """E and P; InputError where the model has none."""
     if model.E is None or model.P is None:
         raise InputError("this model was derived without E and P", "derive it again without --no-expand")
@@ -86,7 +87,7 @@ def torques_for(model: DynamicsModel, theta: Array, q: ArrayLike, qd: ArrayLike,
     shape, arrays = states(model, q=q, qd=qd, qdd=qdd)
     if model.P is None:
         return _by_newton_euler(model, theta, arrays).reshape(*shape, model.n)
-    weights = np.stack([matrix @ theta for matrix in model.P])
+    weights = _weights(model.P, theta)
     return _by_chunks(model, arrays, lambda y: (weights @ y).T).reshape(*shape, model.n)
 
 
@@ -119,15 +120,22 @@ def mass_matrix(model: DynamicsModel, q: ArrayLike) -> Array:
     shape, (angles,) = states(model, q=q)
     if model.P is None:
         return _by_composite_bodies(model, angles).reshape(*shape, model.n, model.n)
-    exponents = expanded(model)[0]
-    weights = np.stack([matrix @ theta for matrix in model.P])
-    columns = [exponents[4 * model.n + j] == 1 for j in range(model.n)]
+    exponents, matrices = expanded(model)
+    weights = _weights(matrices, theta)
+    columns = [np.flatnonzero(exponents[4 * model.n + j]) for j in range(model.n)]
+    parts = [weights[:, own] for own in columns]
 
     def columns_of(y: Array) -> Array:
-        return np.stack([weights[:, own] @ y[own] for own in columns]).transpose(2, 1, 0)
+        return np.stack([part @ y[own] for part, own in zip(parts, columns, strict=True)]).transpose(2, 1, 0)
 
     rest, unit = np.zeros_like(angles), np.ones_like(angles)
     return _by_chunks(model, [angles, rest, unit], columns_of).reshape(*shape, model.n, model.n)
+
+
+def _weights(matrices: Sequence[sparse.csr_array], theta: Array) -> sparse.csr_array:
+    """(n, p) what each function weighs in each torque; sparse, whose sums do not hang on the number of
+    threads."""
+    return sparse.csr_array(np.stack([matrix @ theta for matrix in matrices]))
 
 
 def _by_chunks(model: DynamicsModel, arrays: list[Array], result: Callable[[Array], Array]) -> Array:

@@ -11,7 +11,9 @@ import hashlib
 import io
 import json
 import os
+import struct
 import tempfile
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -36,6 +38,21 @@ _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
 
 _NO_DATE = (1980, 1, 1, 0, 0, 0)
 """Zip's earliest date: a file's bytes must not tell when it was written."""
+
+_BROKEN_ARCHIVE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    EOFError,
+    KeyError,
+    NotImplementedError,
+    RuntimeError,
+    OverflowError,
+    MemoryError,
+    SyntaxError,
+    tokenize.TokenError,
+)
+"""What zipfile and NumPy's header parser raise on altered bytes; found by altering every byte of a file."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -159,7 +176,7 @@ def _read(source: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         raise InputError(f"{source}: no such file", "psdmc derive ROBOT -o MODEL.npz makes one") from error
     except OSError as error:
         raise InputError(f"{source}: cannot be read: {error.strerror or error}") from error
-    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError) as error:
+    except _BROKEN_ARCHIVE as error:
         raise _damaged(source, "it is truncated or altered") from error
     except (ValueError, TypeError, AttributeError) as error:
         raise _foreign(source) from error
