@@ -13,7 +13,8 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
-from psdmc.emit.trig import NUMBERS, Far, Real, scalar_trig, trig_preamble, vector_trig
+from psdmc.emit.trig import Far, scalar_trig, trig_preamble, vector_trig
+from psdmc.emit.trig_numbers import NUMBERS, Real
 
 TEMPLATES = Path(__file__).parents[2] / "templates"
 STRICT = ("-std=c99", *(f"-W{kind}" for kind in ("all", "extra", "pedantic", "conversion", "shadow")))
@@ -46,7 +47,9 @@ _ALL = (
     Build("v3_separate", "gcc", 32, "nan", "-O3 -march=x86-64-v3 -ffp-contract=off"),
     Build("v3_fast_math", "gcc", 32, "libm", "-O3 -march=x86-64-v3 -ffast-math"),
     Build("v3_wide_fast_math", "gcc", 64, "libm", "-O3 -march=x86-64-v3 -ffast-math"),
-    Build("v3_associative", "gcc", 32, "nan", "-O3 -fassociative-math -fno-signed-zeros -fno-trapping-math"),
+    Build(
+        "wide_associative", "gcc", 32, "nan", "-O3 -fassociative-math -fno-signed-zeros -fno-trapping-math"
+    ),
     Build("baseline", "gcc", 16, "libm", "-O3"),
     Build("baseline_unoptimised", "gcc", 16, "nan", "-O0"),
     Build("scalar", "gcc", 0, "libm", "-O2"),
@@ -65,8 +68,18 @@ def builds() -> tuple[Build, ...]:
     return tuple(build for build in _ALL if shutil.which(build.compiler))
 
 
-def render(build: Build, real: Real) -> str:
-    """C source of `void <build name>(count, x, s, c)` around the sincos."""
+@dataclass(frozen=True, slots=True)
+class Function:
+    """C source that defines `symbol`, on pointers to `vec`, which holds `lanes` numbers."""
+
+    source: str
+    symbol: str
+    vec: str
+    lanes: int
+
+
+def render_function(build: Build, real: Real) -> Function:
+    """The sincos alone, as a generated package includes it."""
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -74,24 +87,25 @@ def render(build: Build, real: Real) -> str:
     def fill(template: str, view: object) -> str:
         return environment.get_template(f"trig/{template}.jinja").render(trig=view) + "\n"
 
-    text = "#include <stddef.h>\n#include <string.h>\n" + fill(
-        "preamble", trig_preamble("arm", real, build.far)
-    )
+    preamble = fill("preamble", trig_preamble("arm", real, build.far))
     lanes = build.vector_bytes * 8 // NUMBERS[real].bits
     if lanes == 0:
         scalar = scalar_trig("arm", real, build.far)
-        return text + fill("sincos_scalar", scalar) + _loop(build.name, real, scalar.vec, scalar.symbol, 1)
+        return Function(preamble + fill("sincos_scalar", scalar), scalar.symbol, scalar.vec, 1)
     vector = vector_trig("arm", real, lanes, build.far)
-    text += fill("types", vector) + fill("sincos_vector", vector)
-    return text + _loop(build.name, real, vector.vec, vector.symbol, lanes)
+    source = preamble + fill("types", vector) + fill("sincos_vector", vector)
+    return Function(source, vector.symbol, vector.vec, lanes)
 
 
-def _loop(name: str, real: Real, vec: str, symbol: str, lanes: int) -> str:
-    signature = f"void {name}(size_t count, const {real} *x, {real} *s, {real} *c)"
+def render(build: Build, real: Real) -> str:
+    """C source of `void <build name>(count, x, s, c)` around the sincos."""
+    function = render_function(build, real)
+    signature = f"void {build.name}(size_t count, const {real} *x, {real} *s, {real} *c)"
     return (
-        f"{signature};\n{signature}\n{{\n    for (size_t i = 0; i < count; i += {lanes}) {{\n"
-        f"        {vec} angle, sine, cosine;\n        memcpy(&angle, x + i, sizeof angle);\n"
-        f"        {symbol}(&angle, &sine, &cosine);\n        memcpy(s + i, &sine, sizeof sine);\n"
+        f"#include <stddef.h>\n#include <string.h>\n{function.source}"
+        f"{signature};\n{signature}\n{{\n    for (size_t i = 0; i < count; i += {function.lanes}) {{\n"
+        f"        {function.vec} angle, sine, cosine;\n        memcpy(&angle, x + i, sizeof angle);\n"
+        f"        {function.symbol}(&angle, &sine, &cosine);\n        memcpy(s + i, &sine, sizeof sine);\n"
         "        memcpy(c + i, &cosine, sizeof cosine);\n    }\n}\n"
     )
 

@@ -1,0 +1,167 @@
+"""The numbers of the inline sincos, and their C text; derived by tests/trig/minimax.py, and held to it by a test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Real = Literal["double", "float"]
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """One precision's numbers; up to limit [rad], k times each part of pi/2 but the last is exact."""
+
+    two_over_pi: float
+    half_pi: tuple[float, ...]
+    sin_terms: tuple[float, ...]
+    cos_terms: tuple[float, ...]
+    limit: float
+    digits: int
+    bits: int
+
+
+NUMBERS: dict[Real, Numbers] = {
+    "double": Numbers(
+        two_over_pi=float.fromhex("0x1.45f306dc9c883p-1"),
+        half_pi=(
+            float.fromhex("0x1.921fb5444p+0"),
+            float.fromhex("0x1.68c234c4cp-39"),
+            float.fromhex("0x1.98a2e03707345p-77"),
+        ),
+        sin_terms=(
+            float.fromhex("0x1.5555555555548p-3"),
+            float.fromhex("-0x1.111111110f750p-7"),
+            float.fromhex("0x1.a01a019bef683p-13"),
+            float.fromhex("-0x1.71de355bf0914p-19"),
+            float.fromhex("0x1.ae5e5196ad133p-26"),
+            float.fromhex("-0x1.5d8d45baae607p-33"),
+        ),
+        cos_terms=(
+            float.fromhex("0x1.555555555554bp-5"),
+            float.fromhex("-0x1.6c16c16c15005p-10"),
+            float.fromhex("0x1.a01a019c8c7ebp-16"),
+            float.fromhex("-0x1.27e4f7ef0fb2cp-22"),
+            float.fromhex("0x1.1ee9d9c92ad75p-29"),
+            float.fromhex("-0x1.8fa5556f03cf5p-37"),
+        ),
+        limit=1e5,
+        digits=53,
+        bits=64,
+    ),
+    "float": Numbers(
+        two_over_pi=float.fromhex("0x1.45f306p-1"),
+        half_pi=(
+            float.fromhex("0x1.9218p+0"),
+            float.fromhex("0x1.ed5p-14"),
+            float.fromhex("0x1.10bp-30"),
+            float.fromhex("0x1.184698p-44"),
+        ),
+        sin_terms=(
+            float.fromhex("0x1.555546p-3"),
+            float.fromhex("-0x1.110774p-7"),
+            float.fromhex("0x1.9951fep-13"),
+        ),
+        cos_terms=(
+            float.fromhex("0x1.55554ap-5"),
+            float.fromhex("-0x1.6c0c28p-10"),
+            float.fromhex("0x1.99e81ap-16"),
+        ),
+        limit=1e3,
+        digits=24,
+        bits=32,
+    ),
+}
+
+
+def c_number(value: float, real: Real) -> str:
+    """A C99 literal that reads back exactly: hexadecimal, without trailing zeros."""
+    mantissa, _, exponent = value.hex().partition("p")
+    head, _, digits = mantissa.partition(".")
+    digits = digits.rstrip("0")
+    text = f"{head}.{digits}p{exponent}" if digits else f"{head}p{exponent}"
+    return text + ("f" if real == "float" else "")
+
+
+def polynomial(coefficients: tuple[float, ...], real: Real) -> str:
+    """C expression in z and z2 = z^2, constant term first: pairs (Estrin), half as deep as Horner's form."""
+    c = [c_number(value, real) for value in coefficients]
+    pairs = [f"({' + z * '.join(c[i : i + 2])})" for i in range(0, len(c), 2)]
+    text = pairs[-1]
+    for pair in reversed(pairs[:-1]):
+        text = f"({pair} + z2 * {text})"
+    return text
+
+
+def plain_number(value: float, real: Real) -> str:
+    """A decimal C literal, for the few short ones."""
+    return repr(value) + ("f" if real == "float" else "")
+
+
+@dataclass(frozen=True, slots=True)
+class ReductionStep:
+    """C names of one subtraction `to = of - turn`, turn = k part; what it rounds away goes to `lost`."""
+
+    to: str
+    of: str
+    part: str
+    turn: str
+    lost: str
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """C text of one precision's numbers, for the templates; integers act on the bits of a real."""
+
+    two_over_pi: str
+    magic: str
+    half_pi_first: str
+    half_pi_next: tuple[ReductionStep, ...]
+    half_pi_rest: str
+    all_lost: str
+    r: str
+    sin_polynomial: str
+    cos_polynomial: str
+    zero: str
+    half: str
+    one: str
+    limit: str
+    sign_place: int
+    sign_shift: int
+    libm_sin: str
+    libm_cos: str
+
+
+def constants(real: Real) -> Constants:
+    """NUMBERS[real] as C text."""
+    numbers = NUMBERS[real]
+    places = numbers.digits - 1
+    steps = _reduction_steps(real)
+    return Constants(
+        two_over_pi=c_number(numbers.two_over_pi, real),
+        magic=c_number(1.5 * 2.0**places, real),
+        half_pi_first=c_number(numbers.half_pi[0], real),
+        half_pi_next=steps,
+        half_pi_rest=c_number(numbers.half_pi[-1], real),
+        all_lost=" + ".join(step.lost for step in steps),
+        r=steps[-1].to,
+        sin_polynomial=polynomial(numbers.sin_terms, real),
+        cos_polynomial=polynomial(numbers.cos_terms, real),
+        zero=plain_number(0.0, real),
+        half=plain_number(0.5, real),
+        one=plain_number(1.0, real),
+        limit=plain_number(numbers.limit, real),
+        sign_place=numbers.bits - 1,
+        sign_shift=numbers.bits - 2,
+        libm_sin="sin" if real == "double" else "sinf",
+        libm_cos="cos" if real == "double" else "cosf",
+    )
+
+
+def _reduction_steps(real: Real) -> tuple[ReductionStep, ...]:
+    """One for each exact part of pi/2 after the first."""
+    parts = NUMBERS[real].half_pi[1:-1]
+    return tuple(
+        ReductionStep(f"r{i}", f"r{i - 1}", c_number(part, real), f"turn{i}", f"lost{i}")
+        for i, part in enumerate(parts, start=2)
+    )
