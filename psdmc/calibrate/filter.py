@@ -1,0 +1,145 @@
+"""From a log's rows to evenly spaced, smooth states: resampling, zero-phase low-pass, central differences, split."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import interpolate, signal
+
+from psdmc.calibrate.log import Array, Log
+from psdmc.calibrate.log_checks import CheckOptions, still_joints
+from psdmc.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class FilterOptions:
+    """Low-pass filtering as in Denso-2022 3.1: forwards and backwards, so that no phase is lost.
+
+    cutoff   Hz; the paper's: motor and gravity 4, friction 40, inertial 15
+    order    of the Butterworth filter that runs once each way
+    settle   cut-off periods dropped at either end, where the filter starts up
+    """
+
+    cutoff: float = 15.0
+    order: int = 8
+    settle: float = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class SplitOptions:
+    """Which samples are held out for validation.
+
+    held_out   share of the samples; the paper's 85/15
+    blocks     0: the last part of the log; else the log is cut into this many blocks, and a share of them, evenly
+               spread, is held out
+    """
+
+    held_out: float = 0.15
+    blocks: int = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class States:
+    """A filtered log on an even time grid. N samples, n joints.
+
+    time, period      s
+    q, qd, qdd        (N, n)  rad, rad/s, rad/s^2 (m for sliding joints)
+    effort            (N, n)  as logged, filtered like q
+    use               (N,)    False where the filter starts up
+    low_pass          the filter, for predictions to be compared with `effort`
+    """
+
+    time: Array
+    period: float
+    q: Array
+    qd: Array
+    qdd: Array
+    effort: Array
+    use: NDArray[np.bool_]
+    low_pass: LowPass
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LowPass:
+    """A zero-phase Butterworth filter along axis 0, for one sample period."""
+
+    sections: Array
+
+    @staticmethod
+    def design(options: FilterOptions, period: float) -> LowPass:
+        nyquist = 0.5 / period
+        if options.cutoff >= nyquist:
+            raise InputError(
+                f"cut-off {options.cutoff:g} Hz is not below half the sampling rate, {nyquist:g} Hz"
+            )
+        return LowPass(signal.butter(options.order, options.cutoff, fs=1.0 / period, output="sos"))
+
+    def __call__(self, values: Array) -> Array:
+        pad = min(len(values) - 1, 3 * (2 * len(self.sections) + 1) * 8)
+        filtered: Array = signal.sosfiltfilt(self.sections, values, axis=0, padlen=pad)
+        return filtered
+
+
+def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None) -> States:
+    """States of a checked log; a joint that stands still gets exactly zero rates, so that it excites nothing."""
+    time, position, effort = evenly_spaced(log)
+    period = float(time[1] - time[0])
+    low_pass = LowPass.design(options, period)
+    still = np.array(still_joints(log, check))
+    position = np.where(still, np.mean(position, axis=0), position)
+    q = np.where(still, position, low_pass(position))
+    qd, qdd = central_differences(q, period)
+    margin = int(np.ceil(options.settle / options.cutoff / period))
+    use = np.zeros(len(time), dtype=bool)
+    use[margin : len(time) - margin] = True
+    if not use.any():
+        raise InputError(
+            f"{log.name}: too short: {log.duration:.3g} s leave nothing after the {options.cutoff:g} Hz filter settled"
+        )
+    return States(time, period, q, qd, qdd, low_pass(effort), use, low_pass)
+
+
+def evenly_spaced(log: Log) -> tuple[Array, Array, Array]:
+    """Time, position and effort on an even grid of the log's median period; rows that are even already stay as they are."""
+    time = log.time - log.time[0]
+    count = round(log.duration / log.period) + 1
+    even = np.linspace(0.0, log.duration, count)
+    if count == len(log) and np.abs(even - time).max() < 1e-6 * log.period:
+        return even, log.position, log.effort
+    return (
+        even,
+        np.asarray(interpolate.PchipInterpolator(time, log.position)(even)),
+        np.asarray(interpolate.PchipInterpolator(time, log.effort)(even)),
+    )
+
+
+def central_differences(q: Array, period: float) -> tuple[Array, Array]:
+    """Speed and acceleration without phase: (q[k+1] - q[k-1]) / 2T and (q[k+1] - 2 q[k] + q[k-1]) / T^2."""
+    qd, qdd = np.zeros_like(q), np.zeros_like(q)
+    qd[1:-1] = (q[2:] - q[:-2]) / (2.0 * period)
+    qdd[1:-1] = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / period**2
+    qd[0], qd[-1] = qd[1], qd[-2]
+    return qd, qdd
+
+
+def held_out(count: int, options: SplitOptions) -> NDArray[np.bool_]:
+    """(count,) True where a sample is kept for validation."""
+    if options.blocks == 0:
+        return np.arange(count) >= round((1.0 - options.held_out) * count)
+    block = np.arange(count) * options.blocks // max(count, 1)
+    # block b is held out when the running share of held-out blocks falls behind the wanted one
+    share = np.floor((np.arange(options.blocks) + 1) * options.held_out + 0.5)
+    is_out = np.diff(share, prepend=np.floor(0.5)) > 0
+    return np.asarray(is_out[block])
+
+
+def thinned(states: States, options: FilterOptions) -> NDArray[np.intp]:
+    """Indices of usable samples one cut-off's independence apart, 1/(2 f_c).
+
+    Neighbouring filtered samples share their noise; counting each as new information would shrink standard
+    deviations by the square root of the oversampling.
+    """
+    step = max(1, int(np.floor(0.5 / (options.cutoff * states.period))))
+    return np.flatnonzero(states.use)[::step]

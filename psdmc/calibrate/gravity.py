@@ -1,0 +1,192 @@
+"""Step two: the gravity parameters from slow motion forwards and backwards, (18)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibrate.filter import States, filtered, held_out
+from psdmc.calibrate.least_squares import Consider, Estimate, estimate
+from psdmc.calibrate.log import Array
+from psdmc.calibrate.log_checks import checked
+from psdmc.calibrate.motor_model import Motors
+from psdmc.calibrate.predictor import Regressor, gravity_regressor, payload_torque
+from psdmc.calibrate.quality import quality
+from psdmc.calibrate.steps import GravityRun, JointQuality, Sample, StepOptions, StepQuality
+from psdmc.errors import InputError
+from psdmc.robot.chain import Chain
+
+SAME_PLACE = 5e-3
+"""rad or m: how near the way back must pass to the way there."""
+STEADY_ACCELERATION = 0.1
+"""rad/s^2: below it a joint counts as moving at constant speed."""
+MOVING = 0.02
+"""rad/s: below it a joint counts as standing, where static friction hides gravity."""
+DEPENDENT = 1e-8
+"""A gravity column counts as new where this share of it is left beside the columns before it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GravitySplit:
+    """Which combinations of theta_b gravity can see, in the model's own order.
+
+    l base parameters, r gravity parameters phi.
+
+    pivots      (r,)    theta_b entries that phi stands for, beside others
+    rest        (l-r,)  the other entries, psi
+    dependence  (r, l-r) phi = theta_b[pivots] + dependence @ theta_b[rest]
+    """
+
+    pivots: NDArray[np.intp]
+    rest: NDArray[np.intp]
+    dependence: Array
+
+    def from_phi(self) -> Array:
+        """(l, r) d theta_b / d phi with psi held."""
+        matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.pivots)))
+        matrix[self.pivots] = np.eye(len(self.pivots))
+        return matrix
+
+    def from_psi(self) -> Array:
+        """(l, l-r) d theta_b / d psi with phi held."""
+        matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.rest)))
+        matrix[self.rest] = np.eye(len(self.rest))
+        matrix[self.pivots] = -self.dependence
+        return matrix
+
+    def phi(self, theta_b: Array) -> Array:
+        return np.asarray(theta_b[self.pivots] + self.dependence @ theta_b[self.rest])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GravityResult:
+    """phi with its uncertainty; `considered` is d phi per relative change of each torque constant, (r, n)."""
+
+    split: GravitySplit
+    estimate: Estimate
+    quality: StepQuality
+    warnings: tuple[str, ...]
+
+
+def gravity_split(chain: Chain, model: Regressor, l: int, seed: int = 0) -> GravitySplit:
+    """The observable subset: gravity columns in order, each a pivot where it is new."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-np.pi, np.pi, (max(4 * l, 40), len(chain)))
+    columns = gravity_regressor(model, q).reshape(-1, l)
+    pivots: list[int] = []
+    basis = np.zeros((len(columns), 0))
+    for j in range(l):
+        column = columns[:, j]
+        left = column - basis @ (basis.T @ column)
+        left = left - basis @ (basis.T @ left)
+        size = float(np.linalg.norm(column))
+        if size > 1e-12 and np.linalg.norm(left) > DEPENDENT * size:
+            basis = np.column_stack([basis, left / np.linalg.norm(left)])
+            pivots.append(j)
+    rest = [j for j in range(l) if j not in pivots]
+    dependence = np.asarray(
+        np.linalg.lstsq(columns[:, pivots], columns[:, rest], rcond=None)[0], dtype=np.float64
+    )
+    dependence[np.abs(dependence) < DEPENDENT] = 0.0
+    return GravitySplit(np.array(pivots, dtype=np.intp), np.array(rest, dtype=np.intp), dependence)
+
+
+def calibrate_gravity(
+    chain: Chain,
+    model: Regressor,
+    split: GravitySplit,
+    motors: Motors,
+    runs: Sequence[GravityRun],
+    options: StepOptions,
+    theta_b: Array | None = None,
+) -> GravityResult:
+    """phi by linear least squares over samples averaged over both directions.
+
+    theta_b   from an earlier pass: its velocity and acceleration torques are subtracted
+    """
+    parts = [_even_part(chain, model, motors, run, options, theta_b) for run in runs]
+    q, target, use = (np.concatenate(x) for x in zip(*(part[:3] for part in parts), strict=True))
+    currents = np.concatenate([part[3] for part in parts])
+    columns = gravity_regressor(model, q)[:, :, split.pivots]
+    out = held_out(len(q), options.split)
+    kept = use & ~out[:, None]
+    consider = Consider(-currents[:, :, None] * np.eye(len(chain)), np.diag(motors.relative_std**2))
+    solved = estimate(columns, target, options.fit, consider, kept)
+    predicted = columns @ solved.values
+    qualities, samples = _judged(chain, target, predicted, use, out)
+    warnings = _warnings(solved, split)
+    return GravityResult(split, solved, StepQuality("Gravity", qualities, samples), warnings)
+
+
+def _warnings(solved: Estimate, split: GravitySplit) -> tuple[str, ...]:
+    unseen = [int(split.pivots[k]) + 1 for k in np.flatnonzero(~solved.identifiable)]
+    if not unseen:
+        return ()
+    names = ", ".join(f"theta_{k}" for k in unseen)
+    return (f"gravity: {names} unidentifiable: rank {solved.rank} of {len(split.pivots)}",)
+
+
+def _even_part(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    run: GravityRun,
+    options: StepOptions,
+    theta_b: Array | None,
+) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+    """Mean position, torque without friction, usable entries and total motor torque, one row per independent sample."""
+    states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
+    there, back = _pairs(states, options)
+    torque = motors.torque(states.effort)
+    target = torque.copy()
+    if theta_b is not None:
+        full = model.regressor(
+            states.q[[*there, *back]], states.qd[[*there, *back]], states.qdd[[*there, *back]]
+        )
+        still = gravity_regressor(model, states.q[[*there, *back]])
+        target[[*there, *back]] -= (full - still) @ theta_b
+    if run.tool is not None:
+        target -= payload_torque(chain, states.q, run.tool.mass, run.tool.com)
+    steady = np.all(np.abs(states.qdd) < STEADY_ACCELERATION, axis=1)
+    moves = np.abs(states.qd) > MOVING
+    near = np.all(np.abs(states.q[there] - states.q[back]) < SAME_PLACE, axis=1)
+    use = (near & steady[there] & steady[back])[:, None] & moves[there] & moves[back]
+    if use.sum() < 10 * len(chain):
+        raise InputError(
+            f"{run.log.name}: the way back does not retrace the way there at constant speed",
+            "gravity needs each path run forwards and backwards, slowly: `psdmc excite --gravity`",
+        )
+    return (
+        0.5 * (states.q[there] + states.q[back]),
+        0.5 * (target[there] + target[back]),
+        use,
+        0.5 * (torque[there] + torque[back]),
+    )
+
+
+def _pairs(states: States, options: StepOptions) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows of the way there and the rows of the way back at the same place, one cut-off's independence apart."""
+    last = len(states.time) - 1
+    step = max(1, int(np.floor(0.5 / (options.filter.cutoff * states.period))))
+    there = np.flatnonzero(states.use[: last // 2 + 1])[::step]
+    return there, last - there
+
+
+def _judged(
+    chain: Chain, target: Array, predicted: Array, use: NDArray[np.bool_], out: NDArray[np.bool_]
+) -> tuple[dict[str, JointQuality], tuple[Sample, ...]]:
+    qualities: dict[str, JointQuality] = {}
+    samples: list[Sample] = []
+    for k, name in enumerate(chain.joint_names):
+        rows = np.flatnonzero(use[:, k])
+        fit, held = rows[~out[rows]], rows[out[rows]]
+        qualities[name] = JointQuality(
+            quality(target[fit, k], predicted[fit, k]), quality(target[held, k], predicted[held, k])
+        )
+        samples.append(
+            Sample(name, "sample", rows.astype(float), target[rows, k], predicted[rows, k], out[rows])
+        )
+    return qualities, tuple(samples)
