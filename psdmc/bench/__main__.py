@@ -9,6 +9,7 @@ from pathlib import Path
 from psdmc.bench.cases import standard_cases
 from psdmc.bench.rivals import EVERYONE
 from psdmc.bench.run import ROUNDS, Settings, run
+from psdmc.bench.scaling import scaling_cases
 from psdmc.bench.table import as_text
 from psdmc.errors import PsdmcError
 
@@ -20,11 +21,16 @@ def main() -> int:
     parser.add_argument(
         "--rivals", nargs="+", choices=[entrant.name for entrant in EVERYONE], help="whom to measure"
     )
+    parser.add_argument("--quick", action="store_true", help="no instruction counts, no threads, no scaling")
     parser.add_argument("--json", type=Path, help="write everything measured there")
     options = parser.parse_args()
-    settings = Settings(rounds=options.rounds, rivals=tuple(options.rivals) if options.rivals else None)
+    rivals = tuple(options.rivals) if options.rivals else None
+    full = not options.quick
+    settings = Settings(rounds=options.rounds, rivals=rivals, count=full, threads=full)
     try:
-        result = run(list(standard_cases(options.names or None)), settings, _tell)
+        cases = list(standard_cases(options.names or None, progress=_tell))
+        scaling = list(scaling_cases(progress=_tell)) if full and not options.names else []
+        result = run(cases, settings, _tell, scaling)
     except PsdmcError as error:
         print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
         return error.exit_status

@@ -22,13 +22,15 @@ class Case:
     name            in tables
     model           with theta_b known; its chain has no unknown inertia
     note            where its numbers come from
-    derive_seconds  how long the derivation took, None where the model was given
+    derive_seconds  how long a warm derivation took, None where the model was given
+    derive_bytes    peak memory of a process that did nothing else, None where unknown
     """
 
     name: str
     model: DynamicsModel
     note: str = ""
     derive_seconds: float | None = None
+    derive_bytes: int | None = None
 
     def __post_init__(self) -> None:
         if self.model.theta_b is None or np.isnan(self.chain.parameters).any():

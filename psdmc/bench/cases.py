@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.bench.case import FLOOR_MOUNT, Case, generic_chain
-from psdmc.derive.derive import derive_model
+from psdmc.bench.fresh import derive_fresh
 from psdmc.errors import InputError
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Placement
 from psdmc.robot.load import load_robot
@@ -39,22 +38,23 @@ def standard_chains(seed: int = SEED) -> dict[str, Callable[[], Chain]]:
     return makers
 
 
-def standard_cases(names: Sequence[str] | None = None, seed: int = SEED) -> Iterator[Case]:
-    """The standard robots, derived one by one; InputError where a robot's file is not installed or a name unknown."""
+def standard_cases(
+    names: Sequence[str] | None = None,
+    seed: int = SEED,
+    progress: Callable[[str], None] = lambda message: None,
+) -> Iterator[Case]:
+    """The standard robots, each derived in a process of its own.
+
+    InputError where a robot's file is not installed or a name unknown.
+    """
     makers = standard_chains(seed)
     for name in makers if names is None else names:
         if name not in makers:
             raise InputError(f"there is no standard robot {name!r}", f"choose from {', '.join(makers)}")
-        yield derived(
-            name, makers[name](), f"generic physical inertias, floor mount, no drive inertia, seed {seed}"
-        )
-
-
-def derived(name: str, chain: Chain, note: str, expand: bool = True) -> Case:
-    """A case with its MODEL, and how long deriving it took."""
-    start = time.perf_counter()
-    model = derive_model(chain, expand=expand)
-    return Case(name, model, note, time.perf_counter() - start)
+        progress(f"{name}: deriving")
+        found = derive_fresh(makers[name]())
+        note = f"generic physical inertias, floor mount, no drive inertia, seed {seed}"
+        yield Case(name, found.model, note, found.seconds, found.peak_bytes)
 
 
 def oblique_chain(n: int, seed: int) -> Chain:
@@ -95,9 +95,14 @@ def first_joints(chain: Chain, n: int) -> Chain:
     )
 
 
+def bundled_chain(name: str) -> Chain:
+    """A robot of examples/robots."""
+    return load_robot(EXAMPLES / BUNDLED[name]).chain
+
+
 def _known(name: str) -> Chain:
     if name in BUNDLED:
-        return load_robot(EXAMPLES / BUNDLED[name]).chain
+        return bundled_chain(name)
     path, tip = POPULAR[name]
     return load_robot(_robot_data() / path, tip=tip).chain
 

@@ -39,15 +39,16 @@ class Unavailable:
 class Contestant:
     """One function of one library.
 
-    rival       who: 'psdmc factored', 'Pinocchio' ...
-    variant     which of its ways, '' where there is one
-    function    name in psdmc/program/functions.py
-    layout      how states are handed over; `lanes` states per block where lane by lane
-    library     shared library that exports `symbol`_throughput and so on
-    robot       text for its `setup`, None where the library knows its robot
-    outputs     numbers per state that it puts out
-    weights     where functions differ in what they put out (regressors): output rows times these are torques
-    operations  (multiplications, additions), None where unknown
+    rival         who: 'psdmc factored', 'Pinocchio' ...
+    function      name in psdmc/program/functions.py
+    library       shared library that exports `symbol`_throughput and so on
+    outputs       numbers per state that it puts out
+    variant       which of its ways, '' where there is one
+    layout        how states are handed over; `lanes` states per block where lane by lane
+    robot         text for its `setup`, None where the library knows its robot
+    weights       where functions differ in what they put out (regressors): output rows times these are torques
+    operations    (multiplications, additions), None where unknown
+    instructions  per state on x86-64-v3, None where not counted
     """
 
     rival: str
@@ -61,6 +62,7 @@ class Contestant:
     robot: str | None = None
     weights: Array | None = None
     operations: tuple[int, int] | None = None
+    instructions: float | None = None
 
     @property
     def label(self) -> str:

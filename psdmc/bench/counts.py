@@ -57,7 +57,7 @@ def count(cases: Sequence[Case], progress: Callable[[str], None] = lambda messag
     without: str | None = None
     for case in cases:
         progress(f"{case.name}: counting")
-        contestants = _contestants(case)
+        contestants = psdmc_c.factored(case, COUNTED)
         counts[case.name] = _operations(contestants)
         try:
             for (_, symbol), value in instructions(contestants, case.chain).items():
@@ -66,14 +66,6 @@ def count(cases: Sequence[Case], progress: Callable[[str], None] = lambda messag
         except ToolchainError as error:
             without = error.message
     return Baseline(find_compiler().version.splitlines()[0], counts, without)
-
-
-def _contestants(case: Case) -> list[Contestant]:
-    found = psdmc_c.contestants(case, "factored", COUNTED)
-    for one in found:
-        if not isinstance(one, Contestant):
-            raise ToolchainError(f"{case.name}: {one.rival}: {one.reason}")
-    return [one for one in found if isinstance(one, Contestant)]
 
 
 def _operations(contestants: Sequence[Contestant]) -> dict[str, dict[str, float]]:

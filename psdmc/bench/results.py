@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from psdmc.bench.contestant import Unavailable
 from psdmc.bench.machine import Machine
 from psdmc.bench.measure import Times
+from psdmc.bench.threads import ThreadTime
 
 SCHEMA = 1
 
@@ -51,11 +52,13 @@ class CaseResult:
     p: int | None
     l: int
     derive_seconds: float | None
+    derive_bytes: int | None
     measurements: tuple[Measurement, ...]
     unavailable: tuple[Unavailable, ...]
     wrong: tuple[Unavailable, ...]
     rounds: int
     idle: bool
+    threads: tuple[ThreadTime, ...] = ()
 
     def of(self, function: str, layout: str = "state") -> Iterator[Measurement]:
         """Measurements of one function, in the contestants' order."""
@@ -83,6 +86,7 @@ class BenchResult:
     seed: int
     states: int
     cases: tuple[CaseResult, ...]
+    scaling: tuple[CaseResult, ...] = ()
 
     @property
     def wrong(self) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from psdmc.bench.agree import CHECKED, disagreement, tolerance
+from psdmc.bench.assemble import Assembled, assemble
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Runner, Unavailable
 from psdmc.bench.machine import this_machine
@@ -13,11 +14,16 @@ from psdmc.bench.measure import measure
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.rivals import EVERYONE, Entrant
 from psdmc.bench.states import COUNT, States
+from psdmc.bench.threads import measure_threads
 from psdmc.bench.versions import versions
 
 SEED = 20_260
-ROUNDS = 12
+ROUNDS = 10
 """Trials that count; with 1,024 blocks each the 99.99th percentile rests on more than 10,000 blocks."""
+
+SCALED = ("inverse_dynamics", "forward_dynamics")
+SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")
+"""What is shown against the number of joints."""
 
 Progress = Callable[[str], None]
 
@@ -26,16 +32,22 @@ Progress = Callable[[str], None]
 class Settings:
     """How to measure.
 
-    rounds    trials of each contestant that count
-    states    fresh random states per trial
-    seed      of states
-    rivals    names of EVERYONE to run; None: all
+    rounds     trials of each contestant that count
+    states     fresh random states per trial
+    seed       of states
+    rivals     names of EVERYONE to run; None: all
+    functions  names to measure; None: all
+    count      whether to count instructions under callgrind
+    threads    whether to time batch calls on one and two threads
     """
 
     rounds: int = ROUNDS
     states: int = COUNT
     seed: int = SEED
     rivals: tuple[str, ...] | None = None
+    functions: tuple[str, ...] | None = None
+    count: bool = False
+    threads: bool = False
 
     def entrants(self) -> tuple[Entrant, ...]:
         return tuple(e for e in EVERYONE if self.rivals is None or e.name in self.rivals)
@@ -45,37 +57,56 @@ def _silent(message: str) -> None:
     del message
 
 
-def run(cases: Sequence[Case], settings: Settings = Settings(), progress: Progress = _silent) -> BenchResult:
-    """Measure every case; rivals that cannot be built are listed with the reason, wrong ones are not timed."""
-    results = tuple(run_case(case, settings, progress) for case in cases)
-    return BenchResult(this_machine(), versions(), settings.seed, settings.states, results)
+def run(
+    cases: Sequence[Case],
+    settings: Settings = Settings(),
+    progress: Progress = _silent,
+    scaling: Sequence[Case] = (),
+) -> BenchResult:
+    """Measure every case; rivals that cannot be built are listed with the reason, wrong ones are not timed.
+
+    scaling  the same robot with more and more joints, for which less is measured
+    """
+    results = run_cases(cases, settings, progress)
+    scaled = Settings(settings.rounds, settings.states, settings.seed, SCALED_RIVALS, SCALED)
+    grown = run_cases(scaling, scaled, progress)
+    return BenchResult(this_machine(), versions(), settings.seed, settings.states, results, grown)
 
 
-def run_case(case: Case, settings: Settings = Settings(), progress: Progress = _silent) -> CaseResult:
+def run_cases(cases: Sequence[Case], settings: Settings, progress: Progress) -> tuple[CaseResult, ...]:
+    """Build for all cases, then measure case by case."""
+    if not cases:
+        return ()
+    everyone = assemble(cases, settings.entrants(), settings.functions, settings.count, progress)
+    return tuple(run_case(assembled, settings, progress) for assembled in everyone)
+
+
+def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> CaseResult:
     """Measure one robot."""
-    contestants: list[Contestant] = []
-    unavailable: list[Unavailable] = []
-    for entrant in settings.entrants():
-        progress(f"{case.name}: building {entrant.name}")
-        for one in entrant.contestants(case):
-            if isinstance(one, Contestant):
-                contestants.append(one)
-            else:
-                unavailable.append(one)
+    case = assembled.case
     progress(f"{case.name}: checking")
-    right, errors, wrong = checked(case, contestants, settings.seed + 1)
+    right, errors, wrong = checked(case, assembled.contestants, settings.seed + 1)
     states = States.random(case.chain, settings.states, settings.seed)
     runners = [Runner(contestant, states) for contestant in right]
     measured = measure(runners, settings.rounds, lambda message: progress(f"{case.name}: {message}"))
-    measurements = tuple(
-        Measurement(c.rival, c.variant, c.function, c.layout, error, times, c.operations)
-        for c, error, times in zip(right, errors, measured.times, strict=True)
-    )
-    model = case.model
     return CaseResult(
-        case.name, case.note, case.n, model.p, model.l, case.derive_seconds,
-        measurements, tuple(unavailable), wrong, measured.rounds, measured.idle,
-    )  # fmt: skip
+        name=case.name,
+        note=case.note,
+        n=case.n,
+        p=case.model.p,
+        l=case.model.l,
+        derive_seconds=case.derive_seconds,
+        derive_bytes=case.derive_bytes,
+        measurements=tuple(
+            Measurement(c.rival, c.variant, c.function, c.layout, error, times, c.operations, c.instructions)
+            for c, error, times in zip(right, errors, measured.times, strict=True)
+        ),
+        unavailable=assembled.unavailable,
+        wrong=wrong,
+        rounds=measured.rounds,
+        idle=measured.idle,
+        threads=measure_threads(right, states) if settings.threads else (),
+    )
 
 
 def checked(

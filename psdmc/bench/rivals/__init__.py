@@ -2,35 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from psdmc.bench.build import NATIVE
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable
 from psdmc.bench.rivals import casadi_c, mujoco_c, pinocchio_cpp, psdmc_c
+from psdmc.errors import PsdmcError
 
-Entry = Contestant | Unavailable
+
+class Builder(Protocol):
+    """Builds one rival's contestants for a case under given compiler flags."""
+
+    def __call__(self, case: Case, flags: tuple[str, ...]) -> Sequence[Contestant | Unavailable]: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A rival: its name, and what builds its contestants for a case under given compiler flags."""
+    """A rival. counted: whether its instructions are worth counting."""
 
     name: str
-    build: Callable[[Case, tuple[str, ...]], Sequence[Entry]]
+    build: Builder
+    counted: bool = False
 
-    def contestants(self, case: Case, flags: tuple[str, ...] = NATIVE) -> Sequence[Entry]:
-        return self.build(case, flags)
+    def contestants(self, case: Case, flags: tuple[str, ...] = NATIVE) -> Sequence[Contestant | Unavailable]:
+        """Its contestants, or why there are none."""
+        try:
+            return self.build(case, flags)
+        except (PsdmcError, OSError) as error:
+            return [Unavailable(self.name, str(error))]
 
 
 EVERYONE = (
-    Entrant("psdmc factored", lambda case, flags: psdmc_c.contestants(case, "factored", flags)),
-    Entrant("psdmc expanded", lambda case, flags: psdmc_c.contestants(case, "expanded", flags)),
-    Entrant("Pinocchio", lambda case, flags: pinocchio_cpp.contestants(case, "library", flags)),
-    Entrant(
-        "Pinocchio header-only", lambda case, flags: pinocchio_cpp.contestants(case, "header-only", flags)
-    ),
-    Entrant("CasADi", casadi_c.contestants),
+    Entrant("psdmc factored", psdmc_c.factored, counted=True),
+    Entrant("psdmc expanded", psdmc_c.expanded),
+    Entrant("Pinocchio", pinocchio_cpp.library, counted=True),
+    Entrant("Pinocchio header-only", pinocchio_cpp.header_only),
+    Entrant("CasADi", casadi_c.contestants, counted=True),
     Entrant("MuJoCo", mujoco_c.contestants),
 )

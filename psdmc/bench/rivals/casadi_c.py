@@ -33,10 +33,7 @@ WAYS = {
 
 def contestants(case: Case, flags: tuple[str, ...] = NATIVE) -> list[Contestant | Unavailable]:
     """CasADi's functions for one robot."""
-    try:
-        generated, counts = written(case)
-    except ToolchainError as error:
-        return [Unavailable(RIVAL, error.message)]
+    generated, counts = written(case)
     found: list[Contestant | Unavailable] = []
     for layout, build in (("state", _scalar), ("lanes", _by_lane)):
         try:

@@ -1,6 +1,8 @@
 // CasADi's generated C with one state per SIMD lane: its number becomes a vector, its sin and cos glibc's vector ones.
 #pragma once
 
+#include <math.h>  // before the generated C includes it inside a namespace
+
 #if defined(__AVX512F__)
 #define PSDMC_LANES 8
 #define PSDMC_VECTOR_FUNCTION(name) _ZGVeN8v_##name

@@ -28,10 +28,7 @@ def contestants(case: Case, flags: tuple[str, ...] = NATIVE) -> list[Contestant 
     if np.any(case.chain.parameters[:, 0] <= 0.0):
         return [Unavailable(RIVAL, "it wants mass on every link")]
     robot = mjcf(case.chain)
-    try:
-        library = _compiled(flags)
-    except ToolchainError as error:
-        return [Unavailable(RIVAL, error.message)]
+    library = _compiled(flags)
     if ctypes.CDLL(str(library)).setup(robot.encode()) != case.n:
         return [Unavailable(RIVAL, "it refuses this robot's inertia")]
     return [Contestant(RIVAL, name, library, name, case.n, robot=robot) for name in FUNCTIONS]

@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from psdmc.bench.build import NATIVE, built, cxx
+from psdmc.bench.build import built, cxx
 from psdmc.bench.case import DRIVE, Case, robot_as_numbers
-from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.bench.contestant import Contestant, source
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError
@@ -41,13 +41,18 @@ INSTANTIATED = "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION"
 """Take the library's own instantiations, as its users do: compiles in seconds, runs as shipped."""
 
 
-def contestants(case: Case, way: Way, flags: tuple[str, ...] = NATIVE) -> list[Contestant | Unavailable]:
+def library(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
+    """Pinocchio as its users get it: the wheel's own library."""
+    return contestants(case, "Pinocchio", compiled("library", flags))
+
+
+def header_only(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
+    """Pinocchio compiled whole with this machine's instructions, as far as it goes."""
+    return contestants(case, "Pinocchio header-only", compiled("header-only", flags))
+
+
+def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contestant]:
     """Pinocchio's algorithms for one robot."""
-    rival = "Pinocchio" if way == "library" else "Pinocchio header-only"
-    try:
-        library = compiled(way, flags)
-    except ToolchainError as error:
-        return [Unavailable(rival, error.message)]
     robot = robot_as_numbers(case.chain)
     n = case.n
     outputs = {"mass_matrix": n * n, "regressor": 10 * n * n}
@@ -55,7 +60,7 @@ def contestants(case: Case, way: Way, flags: tuple[str, ...] = NATIVE) -> list[C
         Contestant(
             rival,
             function,
-            library,
+            compiled_library,
             symbol,
             outputs.get(function, n),
             variant=symbol.removeprefix(function).strip("_").upper(),

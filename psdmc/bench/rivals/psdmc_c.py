@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 from psdmc.bench.build import NATIVE, built, cxx, produced
@@ -10,8 +12,8 @@ from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, library_files, package_view
-from psdmc.errors import PsdmcError
 from psdmc.lower.kernels import Lowering, lower
+from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.functions import BY_NAME, Function
 from psdmc.program.kernel import Kernel
@@ -31,19 +33,33 @@ EXPANDED = ("inverse_dynamics", "forward_dynamics")
 """What PSDM-2021 and Denso-2022 published times of."""
 
 
+def factored(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
+    """The factored lowering, what users get."""
+    return contestants(case, "factored", FUNCTIONS, flags)
+
+
+def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
+    """The expanded lowering, PSDM-2021's form."""
+    if case.model.p is None:
+        return [Unavailable("psdmc expanded", "this model was derived without E and P")]
+    return [*contestants(case, "expanded", EXPANDED, flags)]
+
+
 def contestants(
-    case: Case, lowering: Lowering, flags: tuple[str, ...] = NATIVE
-) -> list[Contestant | Unavailable]:
+    case: Case, lowering: Lowering, functions: Sequence[str], flags: tuple[str, ...] = NATIVE
+) -> list[Contestant]:
     """psdmc's functions for one robot: one state a call, rows, and lane by lane."""
-    rival = f"psdmc {lowering}"
-    try:
-        functions = EXPANDED if lowering == "expanded" else FUNCTIONS
-        kernels = {name: k for name, k in lower(case.model, lowering, functions).items() if not k.theta}
-        package = package_view(package_info(case.model, name="bench"), kernels, EmitOptions())
-        library = compiled(package, flags)
-    except PsdmcError as error:
-        return [Unavailable(rival, error.message)]
-    return [one for kernel in kernels.values() for one in _ways(case, rival, kernel, library, package.lanes)]
+    kernels = _kernels(case.model, lowering, tuple(functions))
+    package = package_view(package_info(case.model, name="bench"), kernels, EmitOptions())
+    library = compiled(package, flags)
+    ways = (_ways(case, f"psdmc {lowering}", k, library, package.lanes) for k in kernels.values())
+    return [way for group in ways for way in group]
+
+
+@lru_cache(maxsize=2)
+def _kernels(model: DynamicsModel, lowering: Lowering, functions: tuple[str, ...]) -> dict[str, Kernel]:
+    """Lowered once for all flags: searching for the cheapest arrangement takes longer than compiling."""
+    return {name: k for name, k in lower(model, lowering, functions).items() if not k.theta}
 
 
 def _ways(case: Case, rival: str, kernel: Kernel, library: Path, lanes: int) -> list[Contestant]:

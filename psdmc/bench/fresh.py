@@ -1,0 +1,52 @@
+"""Derivation in a process of its own, so that its time and memory are its own too."""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+
+from psdmc.derive.derive import derive_model
+from psdmc.errors import DerivationError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.chain import Chain
+
+if sys.platform != "win32":
+    import resource
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Derivation:
+    """A MODEL and what it took. peak_bytes: of the whole process, None where the system does not say."""
+
+    model: DynamicsModel
+    seconds: float
+    peak_bytes: int | None
+
+
+def derive_fresh(chain: Chain) -> Derivation:
+    """Derive in a new process; without E and P where they do not fit into memory."""
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=spawn) as pool:
+        return pool.submit(measured_derivation, chain).result()
+
+
+def measured_derivation(chain: Chain) -> Derivation:
+    """Time a warm derivation here and now, and this process's peak of memory."""
+    derive_model(chain, expand=False)  # imports and first calls are not what is measured
+    start = time.perf_counter()
+    try:
+        model = derive_model(chain)
+    except DerivationError:
+        start = time.perf_counter()
+        model = derive_model(chain, expand=False)
+    return Derivation(model, time.perf_counter() - start, _peak_bytes())
+
+
+def _peak_bytes() -> int | None:
+    if sys.platform == "win32":
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
