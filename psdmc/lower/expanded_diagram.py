@@ -163,7 +163,8 @@ def with_constants(diagram: Diagram, values: Mapping[int, float]) -> Diagram:
     number = np.array([0.0, 1.0])
     for level in inner:
         powers = values[level.row] ** np.arange(3)
-        number = np.concatenate([number, (number[level.child] * level.ratio) @ powers])
+        sums = np.sum(number[level.child] * level.ratio * powers, axis=1)
+        number = np.concatenate([number, sums])
     levels: list[Level] = []
     for level in outer:
         child, ratio = _numbers_as_factors(level.child, level.ratio, number)

@@ -22,6 +22,7 @@ def merged(values: list[float], uncertainty: list[float]) -> list[float]:
 
 def test_values_closer_than_their_uncertainty_become_the_most_certain_one():
     assert merged([3.0, -3.0 - 1e-12, 3.1], [1e-14, 1e-12, 1e-12]) == [3.0, -3.0, 3.1]
+    assert merged([3.0, 3.0 + 1e-12], [9e-13, 2e-13]) == [3.0 + 1e-12, 3.0 + 1e-12]
 
 
 def test_certain_values_stay_apart_whatever_lies_between():

@@ -222,7 +222,7 @@ def test_a_factor_that_stands_alone_in_the_sum_is_not_taken_out():
     assert lines(after)[4:6] == ["t4 = add t1 t2", "t5 = mul t0 t4"]
 
 
-def test_a_sum_of_negative_terms_only_keeps_its_sign(outputs: Outputs):
+def test_products_that_are_subtracted_keep_their_sign(outputs: Outputs):
     before = parse(LOADS + "x = mul a b\ny = mul a c\nz = sub d x\nw = sub z y\nout tau[0] = w")
 
     after = factor_common(before)

@@ -40,8 +40,7 @@ def factor_common(program: Program) -> Program:
 
     Needs:  every argument precedes its use.
     Keeps:  outputs up to rounding (it reorders floating point); output names and order.
-    Gives:  fewer multiplications, as many additions, at most a negation more a sum; every instruction is
-            needed.
+    Gives:  fewer multiplications, as many additions; every instruction is needed.
     """
     uses = program.uses()
     inside = _parts_of_larger_sums(program, uses)
@@ -131,15 +130,12 @@ class _Builder:
         return len(self.body) - 1
 
     def total(self, terms: tuple[_Term, ...]) -> int:
-        """The sum of some terms; starts with one that has a plus, if there is any."""
-        plus = next((term for term in terms if term.sign > 0), None)
-        first = terms[0] if plus is None else plus
-        value = self._product(first)
-        for term in terms:
-            if term is not first:
-                op = Op.ADD if term.sign == first.sign else Op.SUB
-                value = self.append(Instr(op, (value, self._product(term))))
-        return value if plus is not None else self.append(Instr(Op.NEG, (value,)))
+        """The sum of some terms; the first one has a plus, as in every chain of sums and every bracket."""
+        value = self._product(terms[0])
+        for term in terms[1:]:
+            op = Op.ADD if term.sign > 0 else Op.SUB
+            value = self.append(Instr(op, (value, self._product(term))))
+        return value
 
     def _product(self, term: _Term) -> int:
         values = [self.new_index[f] if isinstance(f, int) else self.total(f.terms) for f in term.factors]
