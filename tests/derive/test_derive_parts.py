@@ -122,6 +122,12 @@ def test_values_that_differ_by_rounding_become_the_simple_one() -> None:
     assert found.tolist() == [0.005625, -0.005625, 1.0, 1 / 3, 2.0]
 
 
+def test_values_that_are_no_decimals_become_one_too() -> None:
+    found = merged(np.array([1 / 3, 1 / 3 + 1e-15, -1 / 3 + 1e-15]), np.full(3, 1e-14))
+    assert len(set(np.abs(found).tolist())) == 1
+    assert np.signbit(found).tolist() == [False, False, True]
+
+
 def test_values_further_apart_than_rounding_stay() -> None:
     values = np.array([0.1, 0.1 + 1e-11, np.pi, -np.pi * (1 + 1e-10)])
     assert np.array_equal(merged(values, np.full(4, 1e-14)), values)

@@ -11,7 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_chains import Oracle, random_chain, relative_error, states
 
+from psdmc.derive.certify import certificate
 from psdmc.derive.derive import derive_model
+from psdmc.errors import InternalError
 from psdmc.robot.chain import Chain
 from psdmc.robot.reference import reference
 
@@ -119,10 +121,25 @@ def test_unknown_inertias_leave_theta_open_and_certify_all_the_same() -> None:
     model = derive_model(replace(chain, parameters=parameters))
     assert model.theta_b is None
     assert model.certificate.max() < ACCURACY
-    parameters = chain.parameters.copy()
-    unfelt = np.flatnonzero(~model.B.any(axis=0) & model.chain.parameter_span.any(axis=1))
+
+
+def test_unknown_parameters_that_no_joint_feels_do_not_matter() -> None:
+    model = bundled_model("two_link_full")
+    parameters = model.chain.parameters.copy()
+    unfelt = np.flatnonzero(~model.B.any(axis=0))
+    assert len(unfelt) > 10
     parameters.reshape(-1)[unfelt] = np.nan
-    assert derive_model(replace(chain, parameters=parameters)).theta_b is not None
+    found = derive_model(replace(model.chain, parameters=parameters))
+    assert np.array_equal(found.theta_b, model.theta_b)
+    assert found.certificate.max() < ACCURACY
+
+
+def test_the_certificate_refuses_a_wrong_model() -> None:
+    model = bundled_model("scara")
+    matrices = [matrix.copy() for matrix in model.P]
+    matrices[1].data[0] *= 1 + 1e-6
+    with pytest.raises(InternalError, match=r"joint '.*': the derived model is off Newton-Euler"):
+        certificate(replace(model, P=tuple(matrices)))
 
 
 def test_representative_lifts_base_parameters_into_the_span() -> None:

@@ -80,6 +80,11 @@ def test_numpy_reads_the_file_alone(tmp_path: Path) -> None:
         assert np.array_equal(file["E"], model.E)
 
 
+def test_a_file_does_not_tell_when_it_was_written() -> None:
+    with zipfile.ZipFile(io.BytesIO(file_bytes(bundled_model("two_link")))) as archive:
+        assert {member.date_time for member in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+
+
 def test_the_hash_covers_values_and_names() -> None:
     model = derive_model(random_chain(0, "RR"))
     other = derive_model(random_chain(0, "RR"), provenance={"source_name": "x"})
