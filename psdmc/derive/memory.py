@@ -13,11 +13,14 @@ from psdmc.derive.velocity import slope_count
 from psdmc.errors import DerivationError
 from psdmc.robot.chain import JointKind
 
-BYTES_PER_TERM = 110
-"""Peak of collecting, sorting and summing one velocity term (measured: 100)."""
+BYTES_PER_TERM = 250
+"""Peak of the whole expansion per velocity term: 123 to collect, sort and sum it, some 200 with the matrices
+made of them (measured on six and seven joints with oblique axes)."""
 
 _GRID_COPIES = 5
-"""Grids of ten features held at once: twists, products, two steps of the interpolation, magnitudes."""
+"""Grids of ten features held at once: twists, products, two steps of the interpolation, magnitudes. A first,
+optimistic check: with oblique axes the mass matrix keeps up to six times the largest grid (measured on seven
+joints), and only then is the number of velocity terms known."""
 
 
 def largest_function_count(kinds: Sequence[JointKind]) -> int:
