@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.emit.package import PackageView
 from psdmc.errors import InputError
-from psdmc.program.functions import BY_NAME, Function
+from psdmc.program.functions import BY_NAME
 
 Array = NDArray[Any]
 
@@ -32,8 +34,8 @@ class CompiledRobot:
         self._robot = package.robot
         self._n, self._l = package.n, package.l
         self._dtype = np.dtype(package.options.real)
-        self._pointer = f"{package.real} *"
-        self._kernels = package.kernel_names
+        self._pointer = self._ffi.typeof(f"{package.real} *")
+        self._kernels = {name: _bound(package, self._library, name) for name in package.kernel_names}
         self.joint_names = tuple(joint.name for joint in package.info.joints)
         self.library = library
 
@@ -78,47 +80,45 @@ class CompiledRobot:
         return self._call("jacobian", (q,))
 
     def _call(self, name: str, inputs: Sequence[ArrayLike], theta_b: ArrayLike | None = None) -> Array:
-        function = BY_NAME[name]
-        kernel = name if theta_b is None else f"{name}_theta"
-        if kernel not in self._kernels:
-            raise InputError(
-                f"{self._robot}: {kernel} was not compiled", f"compiled are {', '.join(self._kernels)}"
-            )
-        shape, rows = self._rows(function, inputs)
+        kernel = self._kernel(name if theta_b is None else f"{name}_theta")
+        arrays = [self._states(name, v, x) for v, x in zip(kernel.inputs, inputs, strict=True)]
+        shape, rows = self._rows(kernel, arrays)
         if theta_b is not None:
             rows.append(self._parameters(name, theta_b))
-        out = np.empty((*shape, *self._tail(function)), self._dtype)
-        call = getattr(self._library, f"{self._robot}_{kernel}_batch")
-        call(out.size // function.size(self._n, self._l), *map(self._address, (*rows, out)))
+        out = np.empty(shape[:-1] + kernel.tail, self._dtype)
+        kernel.batch(math.prod(shape[:-1]), *map(self._address, rows), self._address(out))
         return out
 
-    def _rows(self, function: Function, inputs: Sequence[ArrayLike]) -> tuple[tuple[int, ...], list[Array]]:
-        """Inputs as contiguous rows of one common leading shape."""
-        arrays = [
-            self._states(function.name, vector, values)
-            for vector, values in zip(function.inputs, inputs, strict=True)
-        ]
+    def _kernel(self, name: str) -> _Kernel:
         try:
-            shape = np.broadcast_shapes(*(array.shape for array in arrays))
-        except ValueError:
-            shapes = ", ".join(
-                f"{vector} {array.shape}" for vector, array in zip(function.inputs, arrays, strict=True)
-            )
-            raise InputError(f"{function.name}: shapes do not broadcast: {shapes}") from None
-        rows = [
-            array if array.shape == shape else np.ascontiguousarray(np.broadcast_to(array, shape))
-            for array in arrays
-        ]
-        return shape[:-1], rows
+            return self._kernels[name]
+        except KeyError:
+            compiled = ", ".join(self._kernels)
+            raise InputError(f"{self._robot}: {name} was not compiled", f"compiled are {compiled}") from None
 
     def _states(self, name: str, vector: str, values: ArrayLike) -> Array:
-        array = np.ascontiguousarray(values, self._dtype)
-        if np.ndim(values) == 0 or array.shape[-1] != self._n:
+        array = np.asarray(values, self._dtype)
+        if array.ndim == 0 or array.shape[-1] != self._n:
             raise InputError(
-                f"{name}: {vector} has shape {np.shape(values)}, expected (..., {self._n})",
+                f"{name}: {vector} has shape {array.shape}, expected (..., {self._n})",
                 f"the robot has {self._n} joints: {', '.join(self.joint_names)}",
             )
         return array
+
+    def _rows(self, kernel: _Kernel, arrays: list[Array]) -> tuple[tuple[int, ...], list[Array]]:
+        """The common shape, and the arrays as contiguous rows of it."""
+        shape = arrays[0].shape
+        if any(array.shape != shape for array in arrays):
+            shape = self._common_shape(kernel, arrays)
+            arrays = [np.broadcast_to(array, shape) for array in arrays]
+        return shape, [np.ascontiguousarray(array) for array in arrays]
+
+    def _common_shape(self, kernel: _Kernel, arrays: list[Array]) -> tuple[int, ...]:
+        try:
+            return np.broadcast_shapes(*(array.shape for array in arrays))
+        except ValueError:
+            shapes = ", ".join(f"{v} {array.shape}" for v, array in zip(kernel.inputs, arrays, strict=True))
+            raise InputError(f"{kernel.name}: shapes do not broadcast: {shapes}") from None
 
     def _parameters(self, name: str, theta_b: ArrayLike) -> Array:
         array = np.ascontiguousarray(theta_b, self._dtype)
@@ -126,10 +126,23 @@ class CompiledRobot:
             raise InputError(f"{name}: theta_b has shape {array.shape}, expected ({self._l},)")
         return array
 
-    def _tail(self, function: Function) -> tuple[int, ...]:
-        """Trailing axes of a result."""
-        lengths = {"n": self._n, "l": self._l, "6": 6}
-        return tuple(lengths[axis] for axis in (function.rows, function.columns) if axis != "1")
-
     def _address(self, array: Array) -> Any:
         return self._ffi.from_buffer(self._pointer, array)
+
+
+@dataclass(frozen=True, slots=True)
+class _Kernel:
+    """One compiled kernel: its batch function in C, its inputs and the trailing axes of its result."""
+
+    name: str
+    inputs: tuple[str, ...]
+    tail: tuple[int, ...]
+    batch: Callable[..., int | None]
+
+
+def _bound(package: PackageView, library: Any, name: str) -> _Kernel:
+    base = name.removesuffix("_theta")
+    function = BY_NAME[base]
+    lengths = {"n": package.n, "l": package.l, "6": 6}
+    tail = tuple(lengths[axis] for axis in (function.rows, function.columns) if axis != "1")
+    return _Kernel(name, function.inputs, tail, getattr(library, f"{package.robot}_{name}_batch"))

@@ -114,14 +114,20 @@ def test_the_output_may_be_an_input(compiled: Direct) -> None:
         assert error(rows[shared], reference) < TOLERANCE[real]
 
 
-def test_a_matrix_may_overwrite_the_state_it_is_of(compiled: Direct) -> None:
-    given, reference = _given(compiled, KERNELS["coriolis_matrix"], 1)
-    buffer = np.zeros(reference.shape[1], compiled.package.options.real)
-    buffer[:N], buffer[N : 2 * N] = given["q"][0], given["qd"][0]
+@pytest.mark.parametrize("name", ["coriolis_matrix", "regressor"])
+def test_a_matrix_may_overwrite_the_state_it_is_of(compiled: Direct, name: str) -> None:
+    """Wherever in the output the inputs lie: a store before the last load would spoil some of them."""
+    given, reference = _given(compiled, KERNELS[name], 1)
+    size = reference.shape[1]
+    for shift in range(0, size - len(given) * N + 1, 3):
+        buffer = np.zeros(size, compiled.package.options.real)
+        views = [buffer[start : start + N] for start in range(shift, shift + len(given) * N, N)]
+        for view, values in zip(views, given.values(), strict=True):
+            view[:] = values[0]
 
-    compiled("coriolis_matrix", buffer, buffer[N : 2 * N], buffer)
+        compiled(name, *views, buffer)
 
-    assert error(buffer, reference[0]) < TOLERANCE[compiled.package.options.real]
+        assert error(buffer, reference[0]) < TOLERANCE[compiled.package.options.real]
 
 
 def _theta_with_no_inertia(joint: int) -> np.ndarray:
