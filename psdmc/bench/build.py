@@ -11,13 +11,15 @@ from psdmc.errors import ToolchainError
 from psdmc.toolchain.cache import cache_key, cached
 from psdmc.toolchain.compiler_command import FLAGS, find_compiler, run
 
-NATIVE = FLAGS
-"""psdmc's own flags, for every contestant that is compiled here."""
-
-COUNTED = tuple("-march=x86-64-v3" if flag == "-march=native" else flag for flag in FLAGS)
-"""The same for counting instructions: valgrind knows no AVX-512, and every x86-64 runner counts alike."""
+COUNTED = (*FLAGS, "-march=x86-64-v3")
+"""psdmc's own flags for counting instructions: valgrind knows no AVX-512, and every x86-64 runner counts alike."""
 
 CXX_CANDIDATES = ("c++", "g++", "clang++")
+
+
+def native_flags() -> tuple[str, ...]:
+    """psdmc's own flags on this machine, for every contestant that is compiled here."""
+    return find_compiler().flags
 
 
 def built(
@@ -44,9 +46,10 @@ def built(
 
 
 def produced(build: Callable[[Path], None], sources: Mapping[str, str], parts: Sequence[str]) -> Path:
-    """The folder that `build` fills, from the cache or filled now."""
+    """The folder that `build` fills, from the cache or filled now; `parts` are what decides beside sources."""
     compiler = find_compiler()
-    return cached(cache_key(sources, (compiler.version, compiler.target, *parts)), build)
+    target = [compiler.target] if any("native" in part for part in parts) else []
+    return cached(cache_key(sources, (compiler.version, *target, *parts)), build)
 
 
 def cxx() -> str:

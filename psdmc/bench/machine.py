@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.bench.build import NATIVE
+from psdmc.bench.build import native_flags
 from psdmc.errors import ToolchainError
 from psdmc.toolchain.compiler_command import find_compiler
 
@@ -41,7 +41,7 @@ def this_machine() -> Machine:
         cores=os.cpu_count() or 1,
         system=f"{platform.system()} {platform.release()} {platform.machine()}",
         compiler=_compiler_version(),
-        flags=" ".join(NATIVE),
+        flags=_compiler_flags(),
         governor=_text("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
         or "not stated by this machine",
         python=platform.python_version(),
@@ -78,6 +78,13 @@ def _compiler_version() -> str:
         return find_compiler().version.splitlines()[0]
     except (ToolchainError, IndexError):
         return "none found"
+
+
+def _compiler_flags() -> str:
+    try:
+        return " ".join(native_flags())
+    except ToolchainError:
+        return ""
 
 
 def _cpu_line(key: str) -> str:

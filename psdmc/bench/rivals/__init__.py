@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from psdmc.bench.build import NATIVE
+from psdmc.bench.build import native_flags
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable
 from psdmc.bench.rivals import casadi_c, mujoco_c, pinocchio_cpp, psdmc_c
@@ -27,10 +27,12 @@ class Entrant:
     build: Builder
     counted: bool = False
 
-    def contestants(self, case: Case, flags: tuple[str, ...] = NATIVE) -> Sequence[Contestant | Unavailable]:
-        """Its contestants, or why there are none."""
+    def contestants(
+        self, case: Case, flags: tuple[str, ...] | None = None
+    ) -> Sequence[Contestant | Unavailable]:
+        """Its contestants for this machine, or under other flags; or why there are none."""
         try:
-            return self.build(case, flags)
+            return self.build(case, flags or native_flags())
         except (PsdmcError, OSError) as error:
             return [Unavailable(self.name, str(error))]
 

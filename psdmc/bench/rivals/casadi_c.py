@@ -7,7 +7,7 @@ from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from psdmc.bench.build import NATIVE, built, cxx
+from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.rivals.pinocchio_cpp import (
@@ -31,7 +31,7 @@ WAYS = {
 """Its functions; forward dynamics by articulated bodies, or from M and h by L D L^T."""
 
 
-def contestants(case: Case, flags: tuple[str, ...] = NATIVE) -> list[Contestant | Unavailable]:
+def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
     """CasADi's functions for one robot."""
     generated, counts = written(case)
     found: list[Contestant | Unavailable] = []

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from psdmc.bench.build import NATIVE, built, cxx
+from psdmc.bench.build import built, cxx
 from psdmc.bench.case import DRIVE, Case
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.versions import version_of
@@ -21,7 +21,7 @@ RIVAL = "MuJoCo"
 FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")
 
 
-def contestants(case: Case, flags: tuple[str, ...] = NATIVE) -> list[Contestant | Unavailable]:
+def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
     """MuJoCo's functions for one robot; armature is no part of its Newton-Euler, so drive inertia is refused."""
     if np.any(case.chain.parameters[:, DRIVE] != 0.0):
         return [Unavailable(RIVAL, "its mj_rne leaves drive inertia out")]

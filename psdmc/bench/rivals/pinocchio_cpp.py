@@ -77,7 +77,7 @@ def compiled(way: Way, flags: tuple[str, ...]) -> Path:
     prefix = pinocchio_prefix()
     link = _library_flags(prefix) if way == "library" else ()
     # The shipped library is plain x86-64, and Eigen's alignment follows the instruction set: the two never mix.
-    used = tuple(flag for flag in flags if way == "header-only" or not flag.startswith("-march"))
+    used = tuple(flag for flag in flags if way == "header-only" or not flag.startswith(("-march", "-mcpu")))
     product = f"pinocchio_{way.replace('-', '_')}.so"
     names = ("pinocchio_cpp.cpp", "pinocchio_model.hpp", "loops.hpp")
     command = [cxx(), "-std=c++17", *used, "-fPIC", "-shared", *DEFINES, *includes(prefix)]

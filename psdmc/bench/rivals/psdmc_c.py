@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from psdmc.bench.build import NATIVE, built, cxx, produced
+from psdmc.bench.build import built, cxx, produced
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.emit.info import package_info
@@ -46,7 +46,7 @@ def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailabl
 
 
 def contestants(
-    case: Case, lowering: Lowering, functions: Sequence[str], flags: tuple[str, ...] = NATIVE
+    case: Case, lowering: Lowering, functions: Sequence[str], flags: tuple[str, ...]
 ) -> list[Contestant]:
     """psdmc's functions for one robot: one state a call, rows, and lane by lane."""
     kernels = _kernels(case.model, lowering, tuple(functions))
