@@ -14,8 +14,24 @@
 namespace {
 
 using casadi::SX;
-using Model = pinocchio::ModelTpl<SX>;
-using Data = pinocchio::DataTpl<SX>;
+
+/// The two kinds of joint that psdmc knows, instead of Pinocchio's twenty: compiles in a quarter of the time.
+template <class Scalar_, int Options_>
+struct SerialJoints {
+  using Scalar = Scalar_;
+  static constexpr int Options = Options_;
+  using JointModelRZ = pinocchio::JointModelRevoluteTpl<Scalar, Options, 2>;
+  using JointModelPZ = pinocchio::JointModelPrismaticTpl<Scalar, Options, 2>;
+  using Mimic = pinocchio::JointModelMimicTpl<Scalar, Options, SerialJoints>;  // Pinocchio asks for it by name
+  using MimicData = pinocchio::JointDataMimicTpl<Scalar, Options, SerialJoints>;
+  using JointModelVariant = boost::variant<JointModelRZ, JointModelPZ, boost::recursive_wrapper<Mimic>>;
+  using JointDataRZ = pinocchio::JointDataRevoluteTpl<Scalar, Options, 2>;
+  using JointDataPZ = pinocchio::JointDataPrismaticTpl<Scalar, Options, 2>;
+  using JointDataVariant = boost::variant<JointDataRZ, JointDataPZ, boost::recursive_wrapper<MimicData>>;
+};
+
+using Model = pinocchio::ModelTpl<SX, 0, SerialJoints>;
+using Data = pinocchio::DataTpl<SX, 0, SerialJoints>;
 using Vector = Eigen::Matrix<SX, Eigen::Dynamic, 1>;
 using Matrix = Eigen::Matrix<SX, Eigen::Dynamic, Eigen::Dynamic>;
 
@@ -83,8 +99,9 @@ struct Writer {
   SX q, qd, x;
   Vector q_, qd_, x_;
 
-  explicit Writer(const pinocchio::Model &numbers) : model(numbers.cast<SX>()) {
-    const auto n = numbers.nv;
+  explicit Writer(std::istream &robot) {
+    read_model(robot, model);
+    const auto n = model.nv;
     q = SX::sym("q", n), qd = SX::sym("qd", n), x = SX::sym("x", n);
     q_.resize(n), qd_.resize(n), x_.resize(n);
     for (int i = 0; i < n; ++i) q_(i) = q(i), qd_(i) = qd(i), x_(i) = x(i);
@@ -127,8 +144,6 @@ struct Writer {
 int main(int count, char **arguments) {
   if (count != 3) return 2;
   std::ifstream text(arguments[1]);
-  pinocchio::Model numbers;
-  read_model(text, numbers);
-  Writer(numbers).write(arguments[2]);
+  Writer(text).write(arguments[2]);
   return 0;
 }

@@ -7,7 +7,11 @@
 #include <pinocchio/multibody.hpp>
 
 /// Fills an empty model from the text of psdmc/bench/rivals/numbers.py: n, gravity, then per joint its kind, placement, body and drive inertia.
-inline void read_model(std::istream &text, pinocchio::Model &model) {
+template <class Model>
+void read_model(std::istream &text, Model &model) {
+  using Scalar = typename Model::Scalar;
+  using Joints = typename Model::JointCollection;
+  using Placement = typename Model::SE3;
   std::size_t n = 0;
   Eigen::Vector3d gravity;
   text >> n >> gravity.x() >> gravity.y() >> gravity.z();
@@ -23,14 +27,14 @@ inline void read_model(std::istream &text, pinocchio::Model &model) {
     for (int row = 0; row < 3; ++row) text >> translation(row);
     for (int row = 0; row < 10; ++row) text >> body(row);
     text >> drive(i);
-    const pinocchio::SE3 placement(rotation, translation);
+    const Placement placement(rotation.cast<Scalar>(), translation.cast<Scalar>());
     const std::string name = "joint" + std::to_string(i);
-    const auto joint = kind == "revolute" ? model.addJoint(i, pinocchio::JointModelRZ(), placement, name)
-                                          : model.addJoint(i, pinocchio::JointModelPZ(), placement, name);
+    const auto joint = kind == "revolute" ? model.addJoint(i, typename Joints::JointModelRZ(), placement, name)
+                                          : model.addJoint(i, typename Joints::JointModelPZ(), placement, name);
     // A link without a body: FromDynamicParameters would divide by its mass.
     const bool is_empty = body.isZero(0.0);
-    model.inertias[joint] = is_empty ? pinocchio::Inertia::Zero() : pinocchio::Inertia::FromDynamicParameters(body);
+    model.inertias[joint] = is_empty ? Model::Inertia::Zero() : Model::Inertia::FromDynamicParameters(body.cast<Scalar>());
   }
-  model.armature = drive;
-  model.gravity.linear(gravity);
+  model.armature = drive.cast<Scalar>();
+  model.gravity.linear(gravity.cast<Scalar>());
 }
