@@ -91,7 +91,10 @@ class Reference:
         aligned = pinocchio.LOCAL_WORLD_ALIGNED
 
         def of_tip(model: pinocchio.Model, data: pinocchio.Data, q: Array) -> Array:
-            jacobian: Array = pinocchio.computeFrameJacobian(model, data, q, frame, aligned)
+            # Pinocchio hands a single column over as a vector.
+            jacobian: Array = np.reshape(
+                pinocchio.computeFrameJacobian(model, data, q, frame, aligned), (6, model.nv)
+            )
             return jacobian
 
         return self._each(of_tip, q)

@@ -1,0 +1,76 @@
+"""The robots that accuracy is promised on: bundled, other people's, and generic ones; each with Pinocchio's own model."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pytest
+from bundled import ROBOTS, robot_path
+from random_chains import Oracle, random_chain
+
+from psdmc.compiler import provenance
+from psdmc.derive.derive import derive_model
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.load import LoadedRobot, load_robot
+from psdmc.robot.reference import Reference, reference
+
+FOREIGN = {
+    "UR5": ("ur5_robot.urdf", None),
+    "UR10": ("ur10_robot.urdf", None),
+    "Panda": ("panda.urdf", "panda_link7"),
+    "Kinova": ("kinova.urdf", "j2s6s200_link_6"),
+    "Z1": ("z1.urdf", "link06"),
+}
+"""File in the example-robot-data wheel, and the tip that leaves grippers out (None: the end of the chain)."""
+
+GENERIC = {"generic 6R": (61, "RRRRRR"), "generic 7R": (71, "RRRRRRR")}
+"""Seed and joints of chains with oblique axes."""
+
+BUNDLED = tuple(sorted(path.stem for path in ROBOTS.iterdir()))
+NAMES = (*BUNDLED, *FOREIGN, *GENERIC)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subject:
+    """A robot under test.
+
+    label      its name, and the seed where it was drawn
+    pinocchio  answers from Pinocchio alone, for the same snapped robot
+    """
+
+    label: str
+    model: DynamicsModel
+    pinocchio: Reference
+
+
+def loaded(name: str) -> LoadedRobot:
+    if name in FOREIGN:
+        file, tip = FOREIGN[name]
+        return load_robot(_in_wheel(file), tip=tip)
+    return load_robot(robot_path(name))
+
+
+@cache
+def subject(name: str) -> Subject:
+    if name in GENERIC:
+        return drawn(*GENERIC[name])
+    robot = loaded(name)
+    return Subject(name, derive_model(robot.chain, provenance=provenance(robot)), reference(robot))
+
+
+def drawn(seed: int, kinds: str, *, tidy: bool = False) -> Subject:
+    """A random chain with one joint per letter of `kinds`."""
+    chain = random_chain(seed, kinds, tidy=tidy, gravity=(1.0, -2.0, -9.0))
+    label = f"{kinds}, seed {seed}{', tidy' if tidy else ''}"
+    return Subject(label, derive_model(chain), Reference(Oracle(chain).model, "tip"))
+
+
+def _in_wheel(file: str) -> Path:
+    try:
+        wheel = importlib.metadata.distribution("example-robot-data")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("example-robot-data is not installed")
+    return Path(str(wheel.locate_file(next(path for path in wheel.files or () if path.name == file))))

@@ -1,0 +1,53 @@
+"""The accuracy that the README promises, on every robot at hand: E, P and theta_b in NumPy, the interpreted PROGRAM and the
+compiled C against Pinocchio.
+
+`pytest tests/end_to_end/test_accuracy_table.py -rP` prints the largest error of each function on each robot.
+"""
+
+from __future__ import annotations
+
+import pytest
+from answers import Questions, compiled_answers, errors, numpy_answers, program_answers, too_large
+from robots_at_hand import BUNDLED, FOREIGN, NAMES, loaded, subject
+
+from psdmc.compiler import compile, provenance
+from psdmc.lower.kernels import lower
+
+
+def told(label: str, found: dict[str, float]) -> dict[str, float]:
+    print(label, *(f"{name:<36} {error:.1e}" for name, error in found.items()), sep="\n  ")
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_model_in_numpy(name: str):
+    robot = subject(name)
+    questions = Questions(robot)
+
+    found = told(robot.label, errors(questions, numpy_answers(robot.model, questions)))
+
+    assert not too_large(found)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_program_and_its_c(name: str):
+    robot = subject(name)
+    questions = Questions(robot)
+
+    found = errors(questions, program_answers(lower(robot.model), robot.model, questions))
+    found |= errors(questions, compiled_answers(compile(robot.model), robot.model, questions))
+
+    assert not too_large(told(robot.label, found))
+    assert len(found) == 2 * 15 + 15, "every function in every form"
+
+
+@pytest.mark.parametrize("name", [*BUNDLED, *FOREIGN])
+def test_snapping_is_stated_and_small(name: str):
+    robot = loaded(name)
+    stated = provenance(robot)
+
+    assert bool(stated["snapped"]) == bool(robot.snap_report) == (stated["snap_torque_change"] is not None)
+    if robot.snap_report:
+        largest = max(stated["snap_torque_change"])
+        print(f"{name}: snapping changed torques by at most {largest:.1e} N m")
+        assert 0.0 < largest < 0.1

@@ -1,0 +1,70 @@
+"""Two hundred chains of one to five joints, turning and sliding about any axes: MODEL and PROGRAM on all, C on ten."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import pytest
+from answers import Questions, compiled_answers, errors, numpy_answers, program_answers, too_large
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from robots_at_hand import drawn
+
+from psdmc.compiler import compile
+from psdmc.lower import kernels, search
+from psdmc.lower.kernels import ALL_FUNCTIONS, lower
+from psdmc.toolchain import compile as toolchain
+from psdmc.toolchain.compiler_command import find_compiler
+
+CHAINS_PER_LENGTH = 40
+STATES = 30
+BUDGET = 12
+"""Programs that the search for cheap arrangements may trace: whichever it takes must be right, and full searches take
+seconds a chain."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def short_search():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "Search", partial(search.Search, budget=BUDGET))
+        yield
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 4, 5])
+def test_model_and_program(length: int):
+    @given(
+        seed=st.integers(0, 10**6),
+        kinds=st.text("RP", min_size=length, max_size=length),
+        tidy=st.booleans(),
+        function=st.sampled_from(ALL_FUNCTIONS[1:]),
+    )
+    @settings(max_examples=CHAINS_PER_LENGTH, deadline=None, derandomize=True)
+    def check(seed: int, kinds: str, tidy: bool, function: str):
+        robot = drawn(seed, kinds, tidy=tidy)
+        questions = Questions(robot, STATES)
+        lowered = lower(robot.model, "auto", [ALL_FUNCTIONS[0], function])
+
+        assert not too_large(errors(questions, numpy_answers(robot.model, questions)))
+        assert not too_large(errors(questions, program_answers(lowered, robot.model, questions)))
+
+    check()
+
+
+@pytest.mark.parametrize(
+    ("seed", "kinds"),
+    list(enumerate(["R", "P", "RR", "PR", "RP", "RPR", "PRR", "RRPR", "RRRP", "RPRRP"], start=100)),
+)
+def test_compiled_without_optimisation(
+    seed: int, kinds: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    unoptimised = replace(find_compiler(), flags=("-O0", "-fPIC"))
+    monkeypatch.setattr(toolchain, "find_compiler", lambda: unoptimised)
+    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
+    robot = drawn(seed, kinds)
+    questions = Questions(robot, STATES)
+
+    found = errors(questions, compiled_answers(compile(robot.model), robot.model, questions))
+
+    assert not too_large(found)
