@@ -12,7 +12,6 @@ from psdmc.derive.interpolate import LINEAR_SIZE
 from psdmc.derive.terms import Array, Terms, joined, summed
 from psdmc.derive.velocity import derivative
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.newton_euler import Forward
 from psdmc.dynamics.regressor import carried, twist_in
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Placement
@@ -45,7 +44,7 @@ def gravity_terms(
 def _carried(joint: Moving, direction: Vector, height: Array) -> tuple[Vector, Array]:
     before, count = column(direction), len(height)
     raised: Scalar = height[:, None] + dot(before, joint.state.offset)
-    turned, _ = carried(joint.frame, Forward((joint.state,), (), (), False), 0, (before, ZERO))
+    turned, _ = carried(joint.frame, joint.state, (before, ZERO))
     return expanded(turned, count, joint.kind), coefficients(raised, count, joint.kind)
 
 

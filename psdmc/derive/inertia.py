@@ -18,7 +18,7 @@ from psdmc.derive.functions import Functions
 from psdmc.derive.interpolate import LINEAR_SIZE, QUADRATIC_SIZE, along_axes, evaluation, interpolation
 from psdmc.derive.terms import Terms, joined
 from psdmc.dynamics.frames import Frame, joint_angle, joint_offset
-from psdmc.dynamics.newton_euler import Forward, JointState
+from psdmc.dynamics.motion import JointState
 from psdmc.dynamics.regressor import DRIVE, Twist, carried, own_twist, twist_in
 from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
 from psdmc.robot.chain import PARAMETERS_PER_LINK, JointKind, Placement
@@ -68,8 +68,7 @@ def expanded(v: Vector, count: int, kind: JointKind) -> Vector:
 def carried_twist(joint: Moving, twist: Twist) -> Twist:
     """A twist's coefficients, carried across one more joint."""
     linear, angular = twist
-    forward = Forward((joint.state,), (), (), False)
-    moved = carried(joint.frame, forward, 0, (column(linear), column(angular)))
+    moved = carried(joint.frame, joint.state, (column(linear), column(angular)))
     count = len(linear[0])
     return expanded(moved[0], count, joint.kind), expanded(moved[1], count, joint.kind)
 

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.frames import (
-    Body,
-    Frame,
-    inward,
-    joint_angle,
-    joint_offset,
-    to_previous,
-)
-from psdmc.dynamics.newton_euler import PLAIN, Choices, turned_body
-from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, cross, multiply, transpose
+from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
+from psdmc.dynamics.frames import Frame, inward, joint_angle, joint_offset, to_previous
+from psdmc.dynamics.motion import PLAIN, Choices
+from psdmc.dynamics.scalar import Scalar, Vector, add, cross
 
 
 def mass_matrix(
@@ -43,7 +37,7 @@ def mass_matrix(
                 moment = add(moment, cross(offsets[j], force))
         if i > 0:
             double = (angles[i] + angles[i]).turn() if choices.fold_double_angle else None
-            before = turned_body(composite, turns[i], double)
+            before = turned(composite, turns[i], double)
             composite = joined(bodies[i - 1], shifted(in_previous(frames[i], before), offsets[i]))
     return tuple(tuple(row) for row in rows)
 
@@ -55,38 +49,3 @@ def unit_rate_momentum(frame: Frame, body: Body) -> tuple[Vector, Vector]:
         return (0.0, 0.0, body.mass), (hy, -hx, 0.0)
     xx, yy, _, _, xz, yz = body.second
     return (-hy, hx, 0.0), (-xz, -yz, xx + yy)
-
-
-def in_previous(frame: Frame, body: Body) -> Body:
-    """A body about frame i before its turn, along the axes of frame i-1 (origin unmoved)."""
-    if frame.is_parallel:
-        return body
-    xx, yy, zz, xy, xz, yz = body.second
-    second: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    s = multiply(multiply(frame.rotation, second), transpose(frame.rotation))
-    return Body(
-        body.mass, to_previous(frame, body.moment), (s[0][0], s[1][1], s[2][2], s[0][1], s[0][2], s[1][2])
-    )
-
-
-def shifted(body: Body, offset: Vector) -> Body:
-    """A body about a point that lies at `offset`, about the origin instead: h + m p, S + h p^T + p h^T + m p p^T."""
-    px, py, pz = offset
-    hx, hy, hz = body.moment
-    xx, yy, zz, xy, xz, yz = body.second
-    gx, gy, gz = hx + body.mass * px, hy + body.mass * py, hz + body.mass * pz
-    second = (
-        xx + px * (hx + gx),
-        yy + py * (hy + gy),
-        zz + pz * (hz + gz),
-        xy + hx * py + px * gy,
-        xz + hx * pz + px * gz,
-        yz + hy * pz + py * gz,
-    )
-    return Body(body.mass, (gx, gy, gz), second)
-
-
-def joined(a: Body, b: Body) -> Body:
-    """Two bodies about one frame as one."""
-    second = tuple(x + y for x, y in zip(a.second, b.second, strict=True))
-    return Body(a.mass + b.mass, add(a.moment, b.moment), second)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.frames import Body, Frame
+from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.dynamics.scalar import Scalar, Vector, add, dot, transform
 

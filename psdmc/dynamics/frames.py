@@ -81,25 +81,6 @@ class Turn(NamedTuple):
         return (c * v[0] - s * v[1], s * v[0] + c * v[1], v[2])
 
 
-class Body(NamedTuple):
-    """A rigid body about some frame as its pseudo-inertia: integrals of 1, r and r r^T over its mass.
-
-    mass    kg
-    moment  kg m, (hx, hy, hz) = mass times centre of mass
-    second  kg m^2, (xx, yy, zz, xy, xz, yz); the inertia is Ixx = yy + zz, Ixy = -xy and so on
-
-    In this form a body moved, turned or added to another costs fewest operations (Wensing, Kim, Slotine 2018 call the
-    4 x 4 matrix of all ten the pseudo-inertia).
-    """
-
-    mass: Scalar
-    moment: Vector
-    second: tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
-
-
-NO_BODY = Body(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-
-
 def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
     """Plain-float copy of a 3 x 3 array."""
     rows = tuple(tuple(float(x) for x in row) for row in values)
@@ -158,10 +139,3 @@ def to_previous(frame: Frame, v: Vector) -> Vector:
 
 def from_previous(frame: Frame, v: Vector) -> Vector:
     return v if frame.is_parallel else transform(transpose(frame.rotation), v)
-
-
-def body_from_parameters(x: Sequence[Scalar]) -> Body:
-    """Ten standard parameters (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about any frame, as a Body about it."""
-    m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = x[:10]
-    half_trace = 0.5 * (ixx + iyy + izz)
-    return Body(m, (hx, hy, hz), (half_trace - ixx, half_trace - iyy, half_trace - izz, -ixy, -ixz, -iyz))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.frames import Body, body_from_parameters
+from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement
 
 Array = NDArray[np.float64]

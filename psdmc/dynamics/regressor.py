@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from psdmc.dynamics.frames import Frame, from_previous, outward
-from psdmc.dynamics.newton_euler import PLAIN, Forward, LinkMotion, Spin, sweep_outward
+from psdmc.dynamics.motion import PLAIN, JointState, LinkMotion, Rates, spin_of, sweep_outward
 from psdmc.dynamics.scalar import (
     ZERO,
     Matrix,
@@ -17,7 +17,6 @@ from psdmc.dynamics.scalar import (
     Vector,
     add,
     cross,
-    multiply,
     transform,
     transpose,
 )
@@ -50,9 +49,9 @@ def regressor(
     rows: tuple[dict[int, Scalar], ...] = tuple({} for _ in range(n))
     twists: list[Twist] = []
     for k, frame in enumerate(frames):
-        twists = [carried(frame, forward, k, twist) for twist in twists]
+        twists = [carried(frame, forward.states[k], twist) for twist in twists]
         twists.append(own_twist(frame))
-        motion = seen_from(link_frames[k], forward.motions[k])
+        motion = seen_from(link_frames[k], forward.motions[k], forward.rates[k])
         seen = [twist_in(link_frames[k], twist) for twist in twists]
         for name in range(DRIVE):
             column = PARAMETERS_PER_LINK * k + name
@@ -82,10 +81,9 @@ def own_twist(frame: Frame) -> Twist:
     return (ZERO, axis) if frame.kind == "revolute" else (axis, ZERO)
 
 
-def carried(frame: Frame, forward: Forward, k: int, twist: Twist) -> Twist:
-    """A twist of frame k-1 at the origin and along the axes of frame k."""
+def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
+    """A twist of the frame before, at the origin and along the axes of this one."""
     linear, angular = twist
-    state = forward.states[k]
     moved = add(linear, cross(angular, state.offset))
     return (
         outward(state.turn, from_previous(frame, moved)),
@@ -102,16 +100,14 @@ def twist_in(place: Placement, twist: Twist) -> Twist:
     return transform(rows, moved), transform(rows, angular)
 
 
-def seen_from(place: Placement, motion: LinkMotion) -> LinkMotion:
+def seen_from(place: Placement, motion: LinkMotion, rates: Rates) -> LinkMotion:
     """A joint frame's motion as that of a frame placed in it."""
     rotation, translation = _plain(place)
     rows = transpose(rotation)
-    field = multiply(multiply(rows, motion.spin.field), rotation)
     acceleration = add(motion.acceleration, transform(motion.spin.field, translation))
-    differences = (field[2][2] - field[1][1], field[0][0] - field[2][2], field[1][1] - field[0][0])
-    if place.rotation.tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]:
-        differences = motion.spin.differences
-    return LinkMotion(transform(rows, acceleration), Spin(field, differences))
+    w, w_r, dw_r = (transform(rows, v) for v in rates)
+    same = rates.w is rates.w_r
+    return LinkMotion(transform(rows, acceleration), spin_of(Rates(w, w if same else w_r, dw_r)))
 
 
 def _plain(place: Placement) -> tuple[Matrix, Vector]:

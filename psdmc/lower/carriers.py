@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.dynamics.frames import Body
+from psdmc.dynamics.body import Body
 from psdmc.dynamics.parameters import BODY_PARAMETERS, joint_frame_map
 from psdmc.dynamics.regressor import DRIVE, regressor
 from psdmc.dynamics.scalar import Scalar

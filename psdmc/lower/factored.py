@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.frames import Body
 from psdmc.dynamics.kinematics import jacobian
-from psdmc.dynamics.newton_euler import Choices, inverse_dynamics
+from psdmc.dynamics.motion import Choices
+from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
 from psdmc.lower.carriers import bodies_from_carriers

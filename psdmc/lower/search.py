@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from psdmc.dynamics.newton_euler import Choices
+from psdmc.dynamics.motion import Choices
 from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace, carrier_space
 from psdmc.lower.factored import Arrangement, trace_dynamics
 from psdmc.lower.reframe import Foot, Reframed, reframe

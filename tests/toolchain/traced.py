@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.frames import Body, Frame, frame_at
+from psdmc.dynamics.frames import Frame, frame_at
 from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
