@@ -6,7 +6,8 @@
 
 #include <pinocchio/multibody.hpp>
 
-/// Fills an empty model from the text of psdmc/bench/rivals/numbers.py: n, gravity, then per joint its kind, placement, body and drive inertia.
+/// Fills an empty model from the text of robot_as_numbers (psdmc/bench/case.py): n, gravity, then per joint its kind,
+/// placement, body about the joint frame and drive inertia.
 template <class Model>
 void read_model(std::istream &text, Model &model) {
   using Scalar = typename Model::Scalar;

@@ -1,0 +1,43 @@
+"""Times that the method's authors published, quoted beside ours: other machines, other inertias, so no ratios to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """One robot's published times, ns per call; derivation in s; None where not given."""
+
+    robot: str
+    source: str
+    inverse: float
+    forward: float
+    derivation: float | None
+
+
+PSDM_2021 = "Lloyd, Irani, Ahmadi, Mech. Mach. Theory 156 (2021) 104149"
+DENSO_2022 = "Denso-2022, table 5, Intel i5-8259U"
+
+PUBLISHED = {
+    "Denso": Published("Denso", DENSO_2022, 400.0, 630.0, 3.0),
+    "KR6": Published("KR6", PSDM_2021, 2110.0, 2270.0, 5.3),
+    "LBR7": Published("LBR7", PSDM_2021, 6490.0, 7280.0, 88.0),
+}
+"""By the benchmark's name of the robot."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableRow:
+    """A line of Denso-2022's table 5: ns per call."""
+
+    method: str
+    inverse: float
+    forward: float
+
+
+DENSO_TABLE_5 = (
+    TableRow("PSDM", 400.0, 630.0),
+    TableRow("RNE", 6000.0, 19900.0),
+    TableRow("RNE, regressive form", 17200.0, 112000.0),
+)

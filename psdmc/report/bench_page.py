@@ -1,0 +1,99 @@
+"""The benchmark's report: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+from psdmc.bench.results import BenchResult
+from psdmc.errors import InputError
+from psdmc.report import bench_plots
+from psdmc.report.bench_view import (
+    FunctionTable,
+    function_tables,
+    headlines,
+    own_table,
+    published_rows,
+    quoted_table,
+    scaling_rows,
+    thread_rows,
+)
+
+COMMAND = "make bench"
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSection:
+    """One robot's part of the page."""
+
+    name: str
+    anchor: str
+    facts: str
+    plots: tuple[str, ...]
+    tables: tuple[FunctionTable, ...]
+    missing: tuple[tuple[str, str], ...]
+
+
+def write_page(result: BenchResult, path: Path, command: str = COMMAND) -> None:
+    """The page at `path`; InputError where it cannot be written."""
+    try:
+        path.write_text(page(result, command), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}", "choose another place") from error
+
+
+def page(result: BenchResult, command: str = COMMAND) -> str:
+    """The page's text; `command` is what made it."""
+    view = {
+        "result": result,
+        "command": command,
+        "headlines": headlines(result),
+        "robots": [_section(result, index) for index in range(len(result.cases))],
+        "quoted": quoted_table(),
+        "own": own_table(result),
+        "published": published_rows(result),
+        "scaling": scaling_rows(result),
+        "scaling_plots": _scaling_plots(result),
+        "threads": thread_rows(result),
+        "busy": [case.name for case in (*result.cases, *result.scaling) if not case.idle],
+    }
+    return _environment().get_template("report/bench.html.jinja").render(**view)
+
+
+def _section(result: BenchResult, index: int) -> RobotSection:
+    case = result.cases[index]
+    p = "not expanded" if case.p is None else f"p = {case.p}"
+    missing = tuple((m.rival, m.reason) for m in (*case.unavailable, *case.wrong))
+    return RobotSection(
+        case.name,
+        f"robot{index}",
+        f"{case.n} joints, {p}, l = {case.l}; {case.note}; {case.rounds} trials",
+        bench_plots.case_plots(case),
+        function_tables(case),
+        missing,
+    )
+
+
+def _scaling_plots(result: BenchResult) -> tuple[str, ...]:
+    if not result.scaling:
+        return ()
+    return tuple(bench_plots.scaling(result, f) for f in ("inverse_dynamics", "forward_dynamics"))
+
+
+def _environment() -> Environment:
+    """HTML: whatever comes from a robot's file is escaped."""
+
+    def source(name: str) -> str | None:
+        file = resources.files("psdmc.templates").joinpath(name)
+        return file.read_text(encoding="utf-8") if file.is_file() else None
+
+    return Environment(
+        loader=FunctionLoader(source),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+    )

@@ -1,0 +1,102 @@
+"""The benchmark's plots as inline SVG: no network, text stays text, colours that follow the page's light or dark."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from psdmc.bench.results import BenchResult, CaseResult, Measurement
+from psdmc.report.bench_view import FUNCTION_TITLES, OURS, PINOCCHIO
+
+INK = "#010203"
+"""Stands for the page's own text colour, which it becomes after drawing."""
+
+COLOURS = {"psdmc": "#2a9d8f", "Pinocchio": "#e07a3f", "CasADi": "#5b7db1", "MuJoCo": "#9a78b0"}
+
+STYLE = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "psdmc",
+    "font.family": "sans-serif",
+    "font.size": 10.0,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
+
+
+def bars(case: CaseResult, function: str) -> str:
+    """Everyone's time for one function of one robot, one state a call; logarithmic."""
+    shown = sorted(case.of(function), key=lambda m: m.ns)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        places = range(len(shown))
+        axes.barh(places, [m.ns for m in shown], color=[_colour(m) for m in shown], height=0.7)
+        axes.set_yticks(places, [m.label for m in shown])
+        axes.invert_yaxis()
+        axes.set_xscale("log")
+        axes.set_xlim(right=max(m.ns for m in shown) * 2.2)
+        for place, m in zip(places, shown, strict=True):
+            axes.text(m.ns * 1.06, place, f"{m.ns:.0f} ns", va="center")
+        axes.set_title(f"{FUNCTION_TITLES[function]}, {case.name}", loc="left", fontsize=11)
+        axes.set_xlabel("ns per call, logarithmic")
+
+    return svg(draw, (7.0, 0.8 + 0.34 * len(shown)))
+
+
+def scaling(result: BenchResult, function: str) -> str:
+    """Time against the number of joints: factored, expanded, Pinocchio."""
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for rival, style in ((OURS, "-o"), ("psdmc expanded", "--s"), (PINOCCHIO, "-^")):
+            points = [(case.n, best.ns) for case in result.scaling if (best := case.best(rival, function))]
+            if points:
+                colour = COLOURS["psdmc" if rival.startswith("psdmc") else rival]
+                axes.plot(*zip(*points, strict=True), style, color=colour, label=rival)
+        axes.set_yscale("log")
+        axes.set_xlabel("joints")
+        axes.set_ylabel("ns per call")
+        axes.set_title(f"{FUNCTION_TITLES[function]} of the LBR7, cut to n joints", loc="left", fontsize=11)
+        axes.legend(frameon=False)
+
+    return svg(draw, (7.0, 3.6))
+
+
+def svg(draw: Callable[[Figure], None], size: tuple[float, float]) -> str:
+    """What `draw` puts on a figure of `size` (inches), as an <svg> element that scales with the page."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        draw(figure)
+        text = io.StringIO()
+        metadata: dict[str, Any] = {"Date": None, "Creator": None}
+        figure.savefig(text, format="svg", transparent=True, metadata=metadata)
+    return _inline(text.getvalue())
+
+
+def _inline(document: str) -> str:
+    """The element alone, without fixed size, in the page's ink."""
+    element = document[document.index("<svg") :]
+    element = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", element, count=1)
+    element = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", element, count=1)
+    return element.replace(INK, "currentColor")
+
+
+def _colour(measurement: Measurement) -> str:
+    return next((c for name, c in COLOURS.items() if measurement.rival.startswith(name)), "#888888")
+
+
+def case_plots(
+    case: CaseResult, functions: Sequence[str] = ("inverse_dynamics", "forward_dynamics")
+) -> tuple[str, ...]:
+    """Bars for the functions that were measured on a robot."""
+    return tuple(bars(case, function) for function in functions if any(case.of(function)))

@@ -1,0 +1,253 @@
+"""What the benchmark's page says, decided before any template sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from psdmc.bench.published import DENSO_TABLE_5, PUBLISHED
+from psdmc.bench.results import BenchResult, CaseResult, Measurement
+
+OURS = "psdmc factored"
+PINOCCHIO = "Pinocchio"
+
+FUNCTION_TITLES = {
+    "inverse_dynamics": "Inverse dynamics",
+    "forward_dynamics": "Forward dynamics",
+    "mass_matrix": "Mass matrix",
+    "nonlinear_effects": "Nonlinear effects",
+    "gravity": "Gravity",
+    "regressor": "Joint-torque regressor",
+}
+
+LAYOUT_TITLES = {"state": "one state a call", "rows": "batch, rows", "lanes": "batch, lane by lane"}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of a robot's table, as text; `ours` marks psdmc's own."""
+
+    who: str
+    how: str
+    operations: str
+    instructions: str
+    ns: str
+    spread: str
+    latency: str
+    worst: str
+    ratio: str
+    error: str
+    ours: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionTable:
+    """One function's rows, fastest first."""
+
+    title: str
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Headline:
+    """One robot's line of the first table: how many times faster than Pinocchio."""
+
+    robot: str
+    inverse_ns: str
+    inverse: str
+    inverse_rows: str
+    inverse_lanes: str
+    forward_ns: str
+    forward: str
+    forward_rows: str
+    forward_lanes: str
+
+
+def headlines(result: BenchResult) -> tuple[Headline, ...]:
+    """Every robot's ratios to Pinocchio linked as its users get it, its better convention."""
+    return tuple(_headline(case) for case in result.cases)
+
+
+def _headline(case: CaseResult) -> Headline:
+    def ratio(function: str, layout: str = "state") -> str:
+        found = case.ratio(function, layout, over=PINOCCHIO, rival=OURS)
+        return f"{found:.1f}" if found else "–"
+
+    def ns(function: str) -> str:
+        found = case.best(OURS, function)
+        return f"{found.ns:.0f}" if found else "–"
+
+    inverse, forward = "inverse_dynamics", "forward_dynamics"
+    return Headline(
+        case.name,
+        ns(inverse), ratio(inverse), ratio(inverse, "rows"), ratio(inverse, "lanes"),
+        ns(forward), ratio(forward), ratio(forward, "rows"), ratio(forward, "lanes"),
+    )  # fmt: skip
+
+
+def function_tables(case: CaseResult) -> tuple[FunctionTable, ...]:
+    """One table per function that was measured on a robot."""
+    functions = dict.fromkeys(m.function for m in case.measurements)
+    return tuple(FunctionTable(FUNCTION_TITLES[f], tuple(_rows(case, f))) for f in functions)
+
+
+def _rows(case: CaseResult, function: str) -> Iterator[Row]:
+    reference = case.best(PINOCCHIO, function)
+    for m in sorted((m for m in case.measurements if m.function == function), key=lambda m: m.ns):
+        yield _row(m, reference.ns if reference else None)
+
+
+def _row(m: Measurement, reference: float | None) -> Row:
+    times = m.times
+    return Row(
+        who=m.label,
+        how=LAYOUT_TITLES[m.layout],
+        operations="{} + {}".format(*m.operations) if m.operations else "",
+        instructions=f"{m.instructions:.0f}" if m.instructions is not None else "",
+        ns=f"{m.ns:.1f}",
+        spread=f"{times.throughput.low:.1f} – {times.throughput.high:.1f}",
+        latency=f"{times.latency.median:.1f}" if times.latency else "",
+        worst=f"{times.tail.percentile_99_99:.0f} / {times.tail.worst:.0f}" if times.tail else "",
+        ratio=f"{reference / m.ns:.1f}×" if reference else "",
+        error=f"{m.error:.0e}",
+        ours=m.rival.startswith("psdmc"),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Quoted:
+    """A line of the paper's table 5 or of ours beside it; times in microseconds, ratios to the first line of its half."""
+
+    method: str
+    inverse: str
+    forward: str
+    inverse_ratio: str
+    forward_ratio: str
+
+
+def quoted_table() -> tuple[Quoted, ...]:
+    """Denso-2022's table 5 as printed."""
+    first = DENSO_TABLE_5[0]
+    return tuple(
+        _quoted(row.method, row.inverse, row.forward, first.inverse, first.forward) for row in DENSO_TABLE_5
+    )
+
+
+def own_table(result: BenchResult) -> tuple[Quoted, ...]:
+    """The same question answered on this machine, for the Denso; empty where it was not measured."""
+    case = next((case for case in result.cases if case.name == "Denso"), None)
+    if case is None:
+        return ()
+    found = []
+    for rival in (OURS, "psdmc expanded", PINOCCHIO, "CasADi"):
+        pair = case.best(rival, "inverse_dynamics"), case.best(rival, "forward_dynamics")
+        if pair[0] and pair[1]:
+            found.append((rival, pair[0].ns, pair[1].ns))
+    return tuple(_quoted(rival, i, f, found[0][1], found[0][2]) for rival, i, f in found)
+
+
+def _quoted(method: str, inverse: float, forward: float, inverse_one: float, forward_one: float) -> Quoted:
+    return Quoted(
+        method,
+        f"{inverse / 1e3:.3g} µs",
+        f"{forward / 1e3:.3g} µs",
+        f"{inverse / inverse_one:.3g}",
+        f"{forward / forward_one:.3g}",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedRow:
+    """The authors' times beside those of their form and ours here."""
+
+    robot: str
+    source: str
+    published: str
+    expanded: str
+    factored: str
+    derivation: str
+
+
+def published_rows(result: BenchResult) -> tuple[PublishedRow, ...]:
+    """Inverse / forward, ns, for the robots that the authors published."""
+    rows = []
+    for case in result.cases:
+        theirs = PUBLISHED.get(case.name)
+        if theirs is None:
+            continue
+        seconds = f"{case.derive_seconds:.1f} s" if case.derive_seconds is not None else "–"
+        rows.append(
+            PublishedRow(
+                case.name,
+                theirs.source,
+                f"{theirs.inverse:.0f} / {theirs.forward:.0f}",
+                _pair(case, "psdmc expanded"),
+                _pair(case, OURS),
+                f"{theirs.derivation:g} s / {seconds}",
+            )
+        )
+    return tuple(rows)
+
+
+def _pair(case: CaseResult, rival: str) -> str:
+    both = (case.best(rival, "inverse_dynamics"), case.best(rival, "forward_dynamics"))
+    return " / ".join(f"{m.ns:.0f}" if m else "–" for m in both)
+
+
+@dataclass(frozen=True, slots=True)
+class ScalingRow:
+    """One number of joints, as text."""
+
+    n: str
+    sizes: str
+    derivation: str
+    memory: str
+    factored: str
+    expanded: str
+    pinocchio: str
+
+
+def scaling_rows(result: BenchResult) -> tuple[ScalingRow, ...]:
+    """Inverse / forward, ns, against the number of joints."""
+    return tuple(
+        ScalingRow(
+            str(case.n),
+            f"{case.p if case.p is not None else 'not expanded'} / {case.l}",
+            f"{case.derive_seconds:.2f} s" if case.derive_seconds is not None else "–",
+            f"{case.derive_bytes / 2**20:.0f} MiB" if case.derive_bytes is not None else "–",
+            f"{_pair(case, OURS)} ({_operations(case, OURS)})",
+            f"{_pair(case, 'psdmc expanded')} ({_operations(case, 'psdmc expanded')})",
+            _pair(case, PINOCCHIO),
+        )
+        for case in result.scaling
+    )
+
+
+def _operations(case: CaseResult, rival: str) -> str:
+    both = (case.best(rival, "inverse_dynamics"), case.best(rival, "forward_dynamics"))
+    return " / ".join(str(sum(m.operations)) if m and m.operations else "–" for m in both)
+
+
+@dataclass(frozen=True, slots=True)
+class ThreadRow:
+    """A batch function on one and more threads."""
+
+    robot: str
+    function: str
+    layout: str
+    ns: tuple[str, ...]
+    speedup: str
+
+
+def thread_rows(result: BenchResult) -> tuple[ThreadRow, ...]:
+    """ns per state by number of threads, and how many times faster the most are than one."""
+    rows = []
+    for case in result.cases:
+        for function, layout in dict.fromkeys((t.function, t.layout) for t in case.threads):
+            own = [t for t in case.threads if (t.function, t.layout) == (function, layout)]
+            times = tuple(f"{t.ns:.1f}" for t in own)
+            speedup = f"{own[0].ns / own[-1].ns:.2f}×"
+            rows.append(
+                ThreadRow(case.name, FUNCTION_TITLES[function], LAYOUT_TITLES[layout], times, speedup)
+            )
+    return tuple(rows)
