@@ -18,7 +18,7 @@ INK = "#010203"
 
 COLOURS = {"psdmc": "#2a9d8f", "Pinocchio": "#e07a3f", "CasADi": "#5b7db1", "MuJoCo": "#9a78b0"}
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "psdmc",
     "font.family": "sans-serif",
