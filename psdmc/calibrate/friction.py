@@ -1,53 +1,22 @@
-"""Step three: seven LuGre parameters per joint in the paper's two steps, (12) to (14), (19), (20), and a last polish.
-
-First the fast samples, where bristles do not matter: F_c, F_v, d_v by trust-region least squares. Then the rest by
-Nelder-Mead over a simulation of (12). Last, all of them together by trust region, from which the standard deviations
-come. Beside the seven, each run has unknowns of its own: the joint's inertia in that pose (the paper neglects it), a
-constant torque, and the time between position and current.
-"""
+"""Step three: LuGre friction of every joint, from runs of one joint at a time, (12) to (14), (19), (20)."""
 
 from __future__ import annotations
 
+import multiprocessing
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import optimize
 
-from psdmc.calibrate.filter import LowPass, States, filtered, held_out, thinned
+from psdmc.calibrate.friction_fit import JointFriction, fit_joint, unknowns_of
+from psdmc.calibrate.friction_run import JointRun, prepared
 from psdmc.calibrate.log import Array
-from psdmc.calibrate.log_checks import checked
-from psdmc.calibrate.lugre import PARAMETERS, Lugre, friction_torque
 from psdmc.calibrate.motor_model import Motors
-from psdmc.calibrate.predictor import Regressor, gravity_regressor, payload_torque
+from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.quality import quality
 from psdmc.calibrate.steps import FrictionOptions, FrictionRun, JointQuality, Sample, StepOptions, StepQuality
-from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JointFriction:
-    """One joint's friction as identified.
-
-    covariance  (7, 7)  in the order of lugre.PARAMETERS, of the fit alone
-    unseen      names of parameters that the data do not determine
-    inertia     kg m^2, of the joint in the run's pose;  offset N m;  delay s
-    """
-
-    joint: str
-    friction: Lugre
-    covariance: Array
-    unseen: tuple[str, ...]
-    inertia: float
-    offset: float
-    delay: float
-
-    @property
-    def std(self) -> Array:
-        """(7,)"""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,252 +48,44 @@ def calibrate_friction(
     theta_gravity  (l,)  a theta_b with the identified gravity parameters
     start          an earlier pass, to start from instead of searching
     """
-    found: dict[str, JointFriction] = {}
-    qualities: dict[str, JointQuality] = {}
-    samples: list[Sample] = []
-    warnings: list[str] = []
-    by_joint = {run.joint: run for run in runs}
-    for k, name in enumerate(chain.joint_names):
-        if name not in by_joint:
-            continue
-        data = _prepared(chain, model, motors, theta_gravity, by_joint[name], k, options)
-        first = start.joints.get(name) if start is not None else None
-        found[name] = _fit(name, data, lugre, first)
-        predicted = data.low_pass(data.torque(_unknowns(found[name])))
-        measured = data.measured - data.low_pass(
-            data.rigid(found[name].inertia, found[name].offset, found[name].delay)
-        )
-        modelled = predicted - (data.measured - measured)
-        fit, out = data.fit, data.out
-        qualities[name] = JointQuality(
-            quality(measured[fit], modelled[fit]), quality(measured[out], modelled[out])
-        )
-        is_out = np.isin(data.every, out)
-        samples.append(
-            Sample(
-                name, "time [s]", data.time[data.every], measured[data.every], modelled[data.every], is_out
-            )
-        )
-        if found[name].unseen:
-            warnings.append(
-                f"joint {name}: friction parameter(s) not seen in the data: {', '.join(found[name].unseen)}"
-            )
-    return FrictionResult(found, StepQuality("Friction", qualities, tuple(samples)), tuple(warnings))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Data:
-    """One joint's run, ready to be compared with predictions."""
-
-    time: Array
-    period: float
-    qd: Array
-    qdd: Array
-    gravity: Array
-    measured: Array
-    low_pass: LowPass
-    every: NDArray[np.intp]
-    fit: NDArray[np.intp]
-    out: NDArray[np.intp]
-
-    def rigid(self, inertia: float, offset: float, delay: float) -> Array:
-        return self.delayed(self.gravity + inertia * self.qdd + offset, delay)
-
-    def torque(self, p: Array) -> Array:
-        """Motor torque for the unknowns, before the low-pass."""
-        friction = friction_torque(_lugre(p), self.qd, self.period)
-        return self.delayed(friction + self.gravity + p[7] * self.qdd + p[8], p[9])
-
-    def delayed(self, torque: Array, delay: float) -> Array:
-        """What is written at t is what happened at t + delay."""
-        return torque if delay == 0 else np.interp(self.time + delay, self.time, torque)
-
-    def residual(self, p: Array, rows: NDArray[np.intp]) -> Array:
-        return np.asarray((self.low_pass(self.torque(p)) - self.measured)[rows])
-
-
-def _prepared(
-    chain: Chain,
-    model: Regressor,
-    motors: Motors,
-    theta_gravity: Array,
-    run: FrictionRun,
-    k: int,
-    options: StepOptions,
-) -> _Data:
-    states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
-    _require_alone(run, chain, k, states)
-    gravity = (gravity_regressor(model, states.q) @ theta_gravity)[:, k]
-    if run.tool is not None:
-        gravity = gravity + payload_torque(chain, states.q, run.tool.mass, run.tool.com)[:, k]
-    rows = thinned(states, options.filter)
-    out = held_out(len(rows), options.split)
-    return _Data(
-        time=states.time,
-        period=states.period,
-        qd=states.qd[:, k],
-        qdd=states.qdd[:, k],
-        gravity=gravity,
-        measured=motors.torque(states.effort)[:, k],
-        low_pass=states.low_pass,
-        every=rows,
-        fit=rows[~out],
-        out=rows[out],
+    places = {name: k for k, name in enumerate(chain.joint_names)}
+    own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
+    data = {
+        run.joint: prepared(chain, model, motors, theta_gravity, run, places[run.joint], options)
+        for run in own
+    }
+    earlier = start.joints if start is not None else {}
+    tasks = [(name, data[name], lugre, earlier.get(name)) for name in data]
+    found = {joint.joint: joint for joint in _fitted(tasks, lugre.workers)}
+    qualities, samples = {}, []
+    for name, joint in found.items():
+        qualities[name], sample = _judged(name, data[name], joint)
+        samples.append(sample)
+    warnings = tuple(
+        f"joint {name}: friction parameter(s) not seen in the data: {', '.join(joint.unseen)}"
+        for name, joint in found.items()
+        if joint.unseen
     )
+    return FrictionResult(found, StepQuality("Friction", qualities, tuple(samples)), warnings)
 
 
-def _require_alone(run: FrictionRun, chain: Chain, k: int, states: States) -> None:
-    rms = np.sqrt(np.mean(states.qd**2, axis=0))
-    if rms[k] == 0:
-        raise InputError(f"{run.log.name}: joint {run.joint} stands still: its friction cannot be seen")
-    others = [name for j, name in enumerate(chain.joint_names) if j != k and rms[j] > 0.05 * rms[k]]
-    if others:
-        raise InputError(
-            f"{run.log.name}: joint(s) {', '.join(others)} move in the friction run of joint {run.joint}",
-            "friction needs one joint at a time: `psdmc excite --friction`",
-        )
+_Task = tuple[str, JointRun, FrictionOptions, JointFriction | None]
 
 
-def _lugre(p: Array) -> Lugre:
-    """Seven parameters from unknowns: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1."""
-    return Lugre(p[0], p[0] + p[1], float(np.exp(p[2])), p[3], p[4], float(np.exp(p[5])), p[6])
+def _fitted(tasks: list[_Task], workers: int) -> list[JointFriction]:
+    """Joints are independent: one process each, where more than one is allowed."""
+    if workers <= 1 or len(tasks) <= 1:
+        return [fit_joint(*task) for task in tasks]
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        return list(pool.map(fit_joint, *zip(*tasks, strict=True)))
 
 
-def _unknowns(found: JointFriction) -> Array:
-    f = found.friction
-    peak, log_speed, log_stiffness = f.static - f.coulomb, np.log(f.stribeck_velocity), np.log(f.stiffness)
-    seven = (f.coulomb, peak, log_speed, f.viscous, f.viscous_exponent, log_stiffness, f.damping)
-    return np.array([*seven, found.inertia, found.offset, found.delay])
-
-
-def _fit(name: str, data: _Data, options: FrictionOptions, start: JointFriction | None) -> JointFriction:
-    p = _unknowns(start) if start is not None else _presliding(data, _fast(data, options), options)
-    return _polished(name, data, p, options)
-
-
-def _fast(data: _Data, options: FrictionOptions) -> Array:
-    """(20): F_c, F_v, d_v with the run's inertia and offset, from samples well beyond the Stribeck velocity."""
-    speed = np.abs(data.qd)
-    rows = data.fit[speed[data.fit] > options.fast * speed.max()]
-    qd, qdd = data.qd[rows], data.qdd[rows]
-    target = (data.measured - data.gravity)[rows]
-
-    def residual(p: Array) -> Array:
-        friction = (p[0] + p[1] * np.abs(qd) ** p[2]) * np.sign(qd)
-        return np.asarray(friction + p[3] * qdd + p[4] - target)
-
-    size = float(np.sqrt(np.mean(target**2)))
-    low = [1e-6 * size, 0.0, 0.1, -np.inf, -np.inf]
-    high = [np.inf, np.inf, 2.5, np.inf, np.inf]
-    fitted = optimize.least_squares(
-        residual, [0.5 * size, 0.3 * size, 0.8, 0.0, 0.0], bounds=(low, high), x_scale="jac"
-    )
-    return np.asarray(fitted.x)
-
-
-def _presliding(data: _Data, fast: Array, options: FrictionOptions) -> Array:
-    """F_s, v_s, sigma_0, sigma_1 by Nelder-Mead, from the best of a coarse grid of stiffness and Stribeck velocity."""
-    coulomb, viscous, exponent, inertia, offset = fast
-    top = float(np.abs(data.qd).max())
-
-    def unknowns(x: Array) -> Array:
-        peak, log_speed, log_stiffness, log_time = x
-        damping = np.exp(log_stiffness + log_time)
-        return np.array(
-            [
-                coulomb,
-                abs(peak) * coulomb,
-                log_speed,
-                viscous,
-                exponent,
-                log_stiffness,
-                damping,
-                inertia,
-                offset,
-                0.0,
-            ]
-        )
-
-    def cost(x: Array) -> float:
-        if abs(x[1]) > 20 or abs(x[2]) > 40 or not -20 < x[3] < 0:
-            return 1e300
-        return float(np.sum(data.residual(unknowns(x), data.fit) ** 2))
-
-    grid = [
-        np.array([0.15, np.log(speed), np.log(coulomb / bend), np.log(1e-3)])
-        for bend in np.geomspace(1e-5, 1e-2, 7)
-        for speed in (0.005 * top, 0.03 * top)
-    ]
-    best = min(grid, key=cost)
-    simplex = np.vstack([best, best + np.diag([0.15, 1.0, 0.7, 1.0])])
-    limits = {"maxfev": options.simplex_steps, "initial_simplex": simplex, "xatol": 3e-2, "fatol": 0.0}
-    found = optimize.minimize(cost, best, method="Nelder-Mead", options=limits)
-    return unknowns(found.x)
-
-
-def _polished(name: str, data: _Data, p: Array, options: FrictionOptions) -> JointFriction:
-    """All unknowns together by trust region, bounds kept; standard deviations from its Jacobian."""
-    reach = options.largest_delay if options.estimate_delay else 1e-12
-    low = np.array([1e-9, 0.0, np.log(1e-5), 0.0, 0.05, np.log(1.0), 0.0, -np.inf, -np.inf, -reach])
-    high = np.array([np.inf, np.inf, np.log(1e2), np.inf, 3.0, np.log(1e9), np.inf, np.inf, np.inf, reach])
-    scale = np.array(
-        [
-            p[0],
-            0.2 * p[0],
-            1.0,
-            max(p[3], 0.1 * p[0]),
-            0.5,
-            1.0,
-            max(p[6], 1e-4 * np.exp(p[5])),
-            1.0,
-            p[0],
-            1e-3,
-        ]
-    )
-    inner = np.clip(p, low + 1e-6 * scale, np.where(np.isfinite(high), high - 1e-6 * scale, np.inf))
-    steps = 1e-4 * scale
-
-    def jacobian(x: Array) -> Array:
-        base = data.residual(x, data.fit)
-        columns = []
-        for j, step in enumerate(steps):
-            moved = x.copy()
-            moved[j] += step if x[j] + step <= high[j] else -step
-            columns.append((data.residual(moved, data.fit) - base) / (moved[j] - x[j]))
-        return np.stack(columns, axis=1)
-
-    def residual(x: Array) -> Array:
-        return data.residual(x, data.fit)
-
-    fitted = optimize.least_squares(
-        residual,
-        inner,
-        jac=jacobian,
-        bounds=(low, high),
-        x_scale=scale,
-        xtol=1e-7,
-        ftol=1e-9,
-        gtol=1e-12,
-        max_nfev=25,
-    )
-    return _with_uncertainty(name, fitted.x, fitted.jac, fitted.fun, scale, options)
-
-
-def _with_uncertainty(
-    name: str, p: Array, jac: Array, residual: Array, scale: Array, options: FrictionOptions
-) -> JointFriction:
-    variance = float(residual @ residual) / max(len(residual) - len(p), 1)
-    normal = (jac * scale).T @ (jac * scale)
-    spread = variance * np.linalg.pinv(normal, rcond=1e-14, hermitian=True) * np.outer(scale, scale)
-    friction = _lugre(p)
-    to_seven = np.eye(7, 10)
-    to_seven[1, 0] = 1.0
-    to_seven[2, 2] = friction.stribeck_velocity
-    to_seven[5, 5] = friction.stiffness
-    covariance = to_seven @ spread @ to_seven.T
-    relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction.as_array()), 1e-12)
-    unseen = [PARAMETERS[j] for j in range(7) if not relative[j] < options.unseen]
-    peak_std = float(np.sqrt(spread[1, 1]))
-    if p[1] < 3.0 * peak_std and "stribeck_velocity" not in unseen:  # F_s = F_c: nothing hangs on v_s
-        unseen.append("stribeck_velocity")
-    return JointFriction(name, friction, covariance, tuple(unseen), float(p[7]), float(p[8]), float(p[9]))
+def _judged(name: str, data: JointRun, joint: JointFriction) -> tuple[JointQuality, Sample]:
+    """Friction alone: what gravity, inertia and offset explain is taken from both sides."""
+    rigid = data.low_pass(data.rigid(joint.inertia, joint.offset, joint.delay))
+    measured = data.measured - rigid
+    modelled = data.low_pass(data.torque(unknowns_of(joint))) - rigid
+    fit, out, every = data.fit, data.out, data.every
+    both = JointQuality(quality(measured[fit], modelled[fit]), quality(measured[out], modelled[out]))
+    is_out = np.isin(every, out)
+    return both, Sample(name, "time [s]", data.time[every], measured[every], modelled[every], is_out)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibrate.filter import States, filtered, held_out
-from psdmc.calibrate.least_squares import Consider, Estimate, estimate
+from psdmc.calibrate.least_squares import Consider, Estimate, estimate, noise_warnings
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.motor_model import Motors
@@ -117,16 +117,17 @@ def calibrate_gravity(
     solved = estimate(columns, target, options.fit, consider, kept)
     predicted = columns @ solved.values
     qualities, samples = _judged(chain, target, predicted, use, out)
-    warnings = _warnings(solved, split)
+    warnings = _warnings(chain, solved, split)
     return GravityResult(split, solved, StepQuality("Gravity", qualities, samples), warnings)
 
 
-def _warnings(solved: Estimate, split: GravitySplit) -> tuple[str, ...]:
+def _warnings(chain: Chain, solved: Estimate, split: GravitySplit) -> tuple[str, ...]:
+    noise = noise_warnings("gravity", chain.joint_names, solved)
     unseen = [int(split.pivots[k]) + 1 for k in np.flatnonzero(~solved.identifiable)]
     if not unseen:
-        return ()
+        return noise
     names = ", ".join(f"theta_{k}" for k in unseen)
-    return (f"gravity: {names} unidentifiable: rank {solved.rank} of {len(split.pivots)}",)
+    return (f"gravity: {names} unidentifiable: rank {solved.rank} of {len(split.pivots)}", *noise)
 
 
 def _even_part(

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibrate.filter import States, filtered, held_out, thinned
-from psdmc.calibrate.friction import FrictionResult, JointFriction
+from psdmc.calibrate.friction import FrictionResult
+from psdmc.calibrate.friction_fit import JointFriction
 from psdmc.calibrate.gravity import GravityResult
-from psdmc.calibrate.least_squares import Consider, Estimate, estimate
+from psdmc.calibrate.least_squares import Consider, Estimate, estimate, noise_warnings
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.lugre import Lugre, friction_torque
@@ -239,13 +240,4 @@ def _warnings(chain: Chain, gravity: GravityResult, solved: Estimate) -> tuple[s
     if len(unseen):
         names = ", ".join(f"theta_{k + 1}" for k in unseen)
         warnings.append(f"inertial: {names} unidentifiable: rank {solved.rank} of {len(gravity.split.rest)}")
-    if solved.optimism > OPTIMISTIC:
-        warnings.append(
-            "inertial: the residual is no noise: standard deviations are too small, by a factor of about "
-            f"{solved.optimism:.1f}"
-        )
-    return tuple(warnings)
-
-
-OPTIMISTIC = 1.7
-"""Robust over white standard deviation above which the latter is called too small."""
+    return (*warnings, *noise_warnings("inertial", chain.joint_names, solved))

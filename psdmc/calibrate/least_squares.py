@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -60,8 +61,8 @@ class Estimate:
     rank              how many of them count
     sigma             (n,)    residual RMS per joint, target's unit
     weights           (N, n)  of the last round, one over unit; zero where a row did not count
-    optimism          robust over white standard deviation, median over parameters: above about 2 the residual is not
-                      noise and the standard deviations are too small
+    correlation       (n,)    of the residual from sample to sample: near zero for noise
+    optimism          robust over white standard deviation, median over parameters: near one for noise
     """
 
     values: Array
@@ -73,6 +74,7 @@ class Estimate:
     rank: int
     sigma: Array
     weights: Array
+    correlation: Array
     optimism: float
 
     @property
@@ -131,6 +133,38 @@ def spread(residual: Array, use: NDArray[np.bool_]) -> Array:
     return np.asarray(np.sqrt(np.sum(np.where(use, residual, 0.0) ** 2, axis=0) / count))
 
 
+def sample_correlation(residual: Array, use: NDArray[np.bool_]) -> Array:
+    """(n,) lag-one autocorrelation of each joint's usable residuals about zero."""
+    both = use[1:] & use[:-1]
+    product = np.sum(np.where(both, residual[1:] * residual[:-1], 0.0), axis=0)
+    power = np.sum(np.where(both, 0.5 * (residual[1:] ** 2 + residual[:-1] ** 2), 0.0), axis=0)
+    return np.asarray(np.divide(product, power, out=np.zeros_like(product), where=power > 0))
+
+
+CORRELATED = 0.5
+"""Correlation of neighbouring residuals above which they are called no noise: filtered white noise gives 0 +- 0.1."""
+
+
+def noise_warnings(step: str, joint_names: Sequence[str], solved: Estimate) -> tuple[str, ...]:
+    """Says so where residuals are no noise, for then the standard deviations are too small, and by how much at least."""
+    found = [
+        (name, rho) for name, rho in zip(joint_names, solved.correlation, strict=True) if rho > CORRELATED
+    ]
+    if not found and solved.optimism < OPTIMISTIC:
+        return ()
+    factors = [np.sqrt((1.0 + rho) / (1.0 - min(rho, 0.999))) for _, rho in found]
+    factor = max([*factors, solved.optimism])
+    where = ", ".join(f"{name} ({rho:.2f})" for name, rho in found) or "all joints together"
+    return (
+        f"{step}: the residual is no noise but correlated from sample to sample, joint(s) {where}: the model lacks an "
+        f"effect there, and standard deviations are too small, by a factor of {factor:.1f} or more",
+    )
+
+
+OPTIMISTIC = 1.7
+"""Robust over white standard deviation above which the latter is called too small."""
+
+
 class _Solved:
     """One weighted solution by truncated SVD of the column-scaled rows."""
 
@@ -187,6 +221,7 @@ class _Solved:
             rank=self.rank,
             sigma=spread(self.residual, self.weights > 0),
             weights=self.weights,
+            correlation=sample_correlation(self.residual, self.weights > 0),
             optimism=self._optimism(np.diag(fit), weighted),
         )
 

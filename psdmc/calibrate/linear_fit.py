@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibrate.filter import FilterOptions, SplitOptions, States, filtered, held_out, thinned
-from psdmc.calibrate.least_squares import Consider, Estimate, FitOptions, estimate
+from psdmc.calibrate.least_squares import Consider, Estimate, FitOptions, estimate, noise_warnings
 from psdmc.calibrate.log import Array, Log
 from psdmc.calibrate.log_checks import CheckOptions, checked
 from psdmc.calibrate.motor_model import Motors
@@ -120,7 +120,7 @@ def calibrate_linear(
         friction_std=solved.std[l:].reshape(shape),
         friction_names=names,
         quality=problem.qualities(solved.values),
-        warnings=(*_notes(checked_logs), *_warnings(solved, l)),
+        warnings=(*_notes(checked_logs), *_warnings(chain, solved, l)),
         problem=problem,
     )
 
@@ -173,7 +173,7 @@ def _notes(logs: Sequence[Log]) -> tuple[str, ...]:
     return tuple(note for log in logs for note in log.notes)
 
 
-def _warnings(solved: Estimate, l: int) -> tuple[str, ...]:
+def _warnings(chain: Chain, solved: Estimate, l: int) -> tuple[str, ...]:
     warnings = []
     unseen = np.flatnonzero(~solved.identifiable[:l])
     if len(unseen):
@@ -181,13 +181,4 @@ def _warnings(solved: Estimate, l: int) -> tuple[str, ...]:
         warnings.append(
             f"{names} unidentifiable from this log: rank {solved.rank} of {len(solved.identifiable)}"
         )
-    if solved.optimism > OPTIMISTIC:
-        warnings.append(
-            "the residual is no noise: standard deviations are too small, by a factor of about "
-            f"{solved.optimism:.1f}"
-        )
-    return tuple(warnings)
-
-
-OPTIMISTIC = 1.7
-"""Robust over white standard deviation above which the latter is called too small."""
+    return (*warnings, *noise_warnings("linear fit", chain.joint_names, solved))

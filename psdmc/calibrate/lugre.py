@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass, fields
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import cffi
-import jinja2
 import numpy as np
 
 from psdmc.calibrate.log import Array
+from psdmc.emit.render import render
 from psdmc.errors import InputError
 from psdmc.toolchain.cache import cache_key, cached
 from psdmc.toolchain.compiler_command import FLAGS, find_compiler, run
@@ -113,23 +112,10 @@ def steady_torque(friction: Lugre, qd: Array) -> Array:
     return np.asarray(np.sign(qd) * magnitude)
 
 
-def render(template: str, **names: object) -> str:
-    """A template of templates/calibrate, filled."""
-    folder = str(resources.files("psdmc.templates"))
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template(f"calibrate/{template}").render(**names)
-
-
 @cache
 def _compiled() -> tuple[Any, Any]:
     """The simulation, compiled once per machine and kept in psdmc's compile cache."""
-    source = render("lugre_simulate.c.jinja", view=LugreView())
+    source = render("calibrate/lugre_simulate.c.jinja", view=LugreView())
     compiler = find_compiler()
     parts = ("lugre", *compiler.command, compiler.version, compiler.target, *FLAGS)
     key = cache_key({"lugre_simulate.c": source}, parts)

@@ -6,7 +6,7 @@ is positive. Then the mass matrix is positive definite everywhere, and forward d
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,9 @@ from psdmc.calibrate.log import Array
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK
+
+SETTLING = 1e-9
+"""Pull beside a squared standard deviation: settles what theta_b leaves open, moves nothing that it fixes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +50,12 @@ def physically_consistent(
     target: Array,
     weights: Array,
     options: PhysicalOptions | None = None,
+    unit_loss: float | None = None,
 ) -> Physical:
     """The weighted least-squares fit among parameters that a real robot could have.
 
-    columns  (N, n, l + extra)  the first l belong to theta_b, the others are free;  target, weights (N, n)
+    columns    (N, n, l + extra)  the first l belong to theta_b, the others are free;  target, weights (N, n)
+    unit_loss  sum of squares that counts as one beside `pull`; None: the target's
     InputError where cvxpy is missing or no solution is found.
     """
     options = options or PhysicalOptions()
@@ -66,7 +71,7 @@ def physically_consistent(
     x = span @ inner
     values = cp.hstack([cp.multiply(unit[:l], model.B @ x), free])
     loss = cp.sum_squares(factor[:, :-1] @ values - factor[:, -1])
-    size = float(np.linalg.norm(factor[:, -1])) ** 2
+    size = float(np.linalg.norm(factor[:, -1])) ** 2 if unit_loss is None else unit_loss
     constraints = [
         c for link in range(len(model.chain)) for c in _link_constraints(cp, model, x, link, options)
     ]
@@ -77,6 +82,19 @@ def physically_consistent(
     found = np.asarray(span @ inner.value)
     theta_b = model.B @ found
     return Physical(found, theta_b, np.concatenate([theta_b, np.asarray(free.value) / unit[l:]]))
+
+
+def nearest_physical(
+    model: DynamicsModel, theta_b: Array, covariance: Array, options: PhysicalOptions | None = None
+) -> Physical:
+    """The physical base parameters nearest to an estimate, in units of its standard deviations (Mahalanobis)."""
+    options = replace(options or PhysicalOptions(), pull=SETTLING)
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    correlation = covariance / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
+    whitened = np.linalg.inv(np.linalg.cholesky(correlation)) / scale
+    return physically_consistent(
+        model, whitened[:, None, :], (whitened @ theta_b)[:, None], np.ones((len(scale), 1)), options, 1.0
+    )
 
 
 def _link_constraints(

@@ -74,6 +74,7 @@ class FrictionOptions:
     estimate_delay  whether the time between position and current is estimated with them
     largest_delay   s
     unseen          relative standard deviation from which a parameter is marked unseen
+    workers         processes; joints are independent
     """
 
     fast: float = 0.25
@@ -81,6 +82,7 @@ class FrictionOptions:
     estimate_delay: bool = True
     largest_delay: float = 5e-3
     unseen: float = 0.5
+    workers: int = 1
 
 
 @dataclass(frozen=True, slots=True)

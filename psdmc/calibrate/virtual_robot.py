@@ -122,6 +122,13 @@ def load_virtual_robot(
     return VirtualRobot(str(robot["name"]), model, tip, joints, sensors, held)
 
 
+def plant_texts(path: str | Path) -> tuple[str, ...]:
+    """The texts that decide a plant: its own file and its robot's."""
+    path = Path(path)
+    robot = path.parent / _toml(path)["robot"]
+    return path.read_text(encoding="utf-8"), robot.read_text(encoding="utf-8")
+
+
 def _harness(path: Path, plant: Mapping[str, Any]) -> Harness:
     if "harness" not in plant:
         raise InputError(f"{path}: no [harness] in this file")

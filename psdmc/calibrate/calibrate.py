@@ -1,0 +1,125 @@
+"""Calibration from files: a campaign's four steps, or one linear fit of plain logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.calibrate.campaign import FILE, read_campaign
+from psdmc.calibrate.four_steps import FourSteps, Runs, calibrate_four_steps
+from psdmc.calibrate.linear_fit import LinearOptions, calibrate_linear
+from psdmc.calibrate.log import Log
+from psdmc.calibrate.log_files import read_log
+from psdmc.calibrate.motor_model import Motors
+from psdmc.calibrate.physical import PhysicalOptions, nearest_physical, physically_consistent
+from psdmc.calibrate.predictor import ChainRegressor, Regressor
+from psdmc.calibrate.record import Calibration, four_step_record, linear_record, with_theta
+from psdmc.calibrate.steps import CalibrationOptions
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrateOptions:
+    """Everything `psdmc calibrate` can be told.
+
+    physical   whether base parameters must be those of a real mass distribution
+    campaign   options of the four steps;  linear  of the linear fit;  consistency  of the physical estimate
+    """
+
+    physical: bool = False
+    campaign: CalibrationOptions = field(default_factory=CalibrationOptions)
+    linear: LinearOptions = field(default_factory=LinearOptions)
+    consistency: PhysicalOptions = field(default_factory=PhysicalOptions)
+
+
+def calibrate(
+    model: DynamicsModel,
+    sources: str | Path | Sequence[str | Path],
+    options: CalibrateOptions | None = None,
+    *,
+    regressor: Regressor | None = None,
+    torque_constants: Mapping[str, float] | None = None,
+    progress: Progress = lambda step: None,
+) -> Calibration:
+    """Calibrate a model from a campaign (its folder or campaign.toml) or from plain logs.
+
+    regressor         the compiled model where there is one; else Newton-Euler on arrays
+    torque_constants  N m/A by joint name, for plain logs that hold currents
+    InputError where a file is missing or a log cannot be used.
+    """
+    options = options or CalibrateOptions()
+    regressor = regressor or ChainRegressor(model)
+    paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
+    if not paths:
+        raise InputError("no log to calibrate from")
+    if len(paths) == 1 and (paths[0].suffix == ".toml" or (paths[0] / FILE).exists()):
+        return calibrate_campaign(model, read_campaign(paths[0]), options, regressor, progress)
+    progress("reading logs")
+    logs = [read_log(path) for path in paths]
+    return calibrate_logs(model, logs, options, regressor, torque_constants, progress)
+
+
+def calibrate_campaign(
+    model: DynamicsModel, runs: Runs, options: CalibrateOptions, regressor: Regressor, progress: Progress
+) -> Calibration:
+    """The four steps, and the nearest physical parameters where they are wanted."""
+    found = calibrate_four_steps(model.chain, regressor, model.l, runs, options.campaign, progress)
+    record = four_step_record(model, found)
+    return _consistent(model, found, record, options) if options.physical else record
+
+
+def _consistent(
+    model: DynamicsModel, found: FourSteps, record: Calibration, options: CalibrateOptions
+) -> Calibration:
+    inertial = found.inertial
+    if not inertial.identifiable.all():
+        raise InputError(
+            "physical consistency needs every base parameter identified", "see the warnings without it"
+        )
+    near = nearest_physical(model, inertial.theta_b, inertial.covariance, options.consistency)
+    distance = float(np.max(np.abs(near.theta_b - inertial.theta_b) / inertial.std))
+    return with_theta(
+        record, near.theta_b, (f"physical consistency moved a parameter by {distance:.2g} of its std",)
+    )
+
+
+def calibrate_logs(
+    model: DynamicsModel,
+    logs: Sequence[Log],
+    options: CalibrateOptions,
+    regressor: Regressor,
+    torque_constants: Mapping[str, float] | None,
+    progress: Progress,
+) -> Calibration:
+    """Everything linear at once."""
+    motors = _motors(model, logs, torque_constants)
+    progress("linear fit")
+    found = calibrate_linear(model.chain, regressor, model.l, logs, options.linear, motors)
+    if not options.physical:
+        return linear_record(model, found)
+    progress("physical consistency")
+    problem = found.problem
+    physical = physically_consistent(
+        model, problem.columns, problem.torque, found.estimate.weights, options.consistency
+    )
+    return linear_record(model, found, physical.theta_b, problem.qualities(physical.values))
+
+
+def _motors(model: DynamicsModel, logs: Sequence[Log], constants: Mapping[str, float] | None) -> Motors:
+    if all(log.quantity != "current" for log in logs):
+        return Motors.torques(model.n)
+    if constants is None:
+        raise InputError(
+            f"{logs[0].name}: holds currents, and no torque constants are known",
+            "give --torque-constants, or run a campaign with a motor step",
+        )
+    missing = [name for name in model.joint_names if name not in constants]
+    if missing:
+        raise InputError(f"no torque constant for joint(s) {', '.join(missing)}")
+    return Motors(np.array([constants[name] for name in model.joint_names]), np.zeros(model.n))

@@ -1,0 +1,110 @@
+"""`make calibrate-demo`: the virtual Denso from excitation to report, and what was found against what is true."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
+from psdmc.calibrate.campaign import CampaignOptions, excitation_json, plan_campaign, write_campaign
+from psdmc.calibrate.record import Calibration
+from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibrate.truth import Comparison, compare
+from psdmc.calibrate.virtual_robot import load_virtual_robot
+from psdmc.compiler import compile as compile_model
+from psdmc.compiler import derive
+from psdmc.model.store import save
+from psdmc.report.calibrate_report import write_report
+
+EXAMPLES = Path("examples")
+ROBOT = EXAMPLES / "robots" / "denso_wall.toml"
+PLANT = EXAMPLES / "plants" / "denso_virtual.toml"
+
+Variant = tuple[str, bool, bool]
+VARIANTS: tuple[Variant, ...] = (("ideal", True, False), ("sensors", False, False), ("harness", False, True))
+"""Name, whether sensors are ideal, whether there is a cable harness."""
+
+
+def run_demo(
+    folder: Path,
+    variants: tuple[str, ...] = ("sensors",),
+    workers: int = 2,
+    say: Callable[[str], None] = print,
+) -> dict[str, Comparison]:
+    """Plan, simulate, calibrate and report each variant; returns how its result compares with the truth."""
+    begin = time.monotonic()
+
+    def step(text: str) -> None:
+        say(f"[{time.monotonic() - begin:6.1f} s] {text}")
+
+    model = derive(ROBOT, drive_inertia=True)
+    unknown = replace(model, theta_b=None)
+    robot = compile_model(model, functions=["regressor"])
+    step("searching an exciting motion")
+    runs, found = plan_campaign(model.chain, robot, model.l, CampaignOptions(table="npz"))
+    step(
+        f"condition {found.condition:.2f}, best random one {found.random_conditions[0]:.2f}: {found.gain:.2f} times"
+    )
+    results: dict[str, Comparison] = {}
+    for name, ideal, harness in VARIANTS:
+        if name not in variants:
+            continue
+        campaign = write_campaign(folder / name, runs, found, "npz")
+        options = SimulateOptions(ideal_sensors=ideal, harness=harness, workers=workers)
+        count = simulate_campaign(PLANT, campaign, options)
+        step(f"{name}: {count} logs simulated, {len(runs) - count} were there")
+        record = calibrate(
+            unknown,
+            campaign,
+            _options(workers),
+            regressor=robot,
+            progress=step,
+        )
+        save(record.model, folder / f"denso_{name}.npz")
+        page, _ = write_report(record, folder / f"calibration_{name}.html", found)
+        results[name] = compare(
+            record, model, load_virtual_robot(PLANT, ideal_sensors=ideal, harness=harness)
+        )
+        for line in (*_accuracy(record), *results[name].lines()):
+            say(line)
+        step(f"{name}: report in {page}")
+    summary = {name: result.as_json() for name, result in results.items()}
+    text = json.dumps({"excitation": excitation_json(found), "truth": summary}, indent=1)
+    (folder / "truth.json").write_text(text + "\n", encoding="utf-8")
+    return results
+
+
+def _options(workers: int) -> CalibrateOptions:
+    plain = CalibrateOptions()
+    return replace(
+        plain, campaign=replace(plain.campaign, lugre=replace(plain.campaign.lugre, workers=workers))
+    )
+
+
+def _accuracy(record: Calibration) -> list[str]:
+    lines = []
+    for step in record.steps:
+        values = " ".join(f"{np.round(both.held_out.r2, 4):8.4f}" for both in step.joints.values())
+        lines.append(f"  R² held out, {step.step:<9}{values}")
+    return [*lines, *(f"  warning: {warning}" for warning in record.warnings)]
+
+
+def main() -> None:
+    """Arguments: the output folder and the variants."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("generated") / "calibrate_demo")
+    parser.add_argument("--variants", nargs="+", default=["sensors"], choices=[name for name, *_ in VARIANTS])
+    parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1))
+    given = parser.parse_args()
+    run_demo(given.folder, tuple(given.variants), given.workers)
+
+
+if __name__ == "__main__":
+    main()

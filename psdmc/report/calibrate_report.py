@@ -1,0 +1,184 @@
+"""A calibration's report: one HTML page that needs nothing else, and the same numbers as JSON."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from psdmc.calibrate.excite import Excitation
+from psdmc.calibrate.quality import Quality
+from psdmc.calibrate.record import Calibration, NumberRow
+from psdmc.emit.render import environment
+from psdmc.report.calibrate_plots import excitation_figure, step_figure
+
+CAPTIONS = {
+    "Motor": "Torque of the known load, and what the calibrated motors say of the current that it adds (figure 2).",
+    "Gravity": "Torque averaged over both directions, against the gravity model (figure 3).",
+    "Friction": "Friction of each joint alone, against LuGre (figure 4).",
+    "Inertial": "What gravity and friction leave of the fast motion's torque, against the inertial model (figure 5).",
+    "All": "The whole torque of the fast motion.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FigureView:
+    """One picture with its words."""
+
+    title: str
+    svg: Markup
+    caption: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReportView:
+    """What the page's template fills in; tables are finished markup, all other text is escaped there."""
+
+    robot: str
+    summary: str
+    warnings: tuple[str, ...]
+    accuracy_table: Markup
+    parameter_table: Markup
+    joint_table: Markup
+    fact_table: Markup
+    figures: tuple[FigureView, ...]
+
+
+def write_report(record: Calibration, path: str | Path, found: Excitation | None = None) -> tuple[Path, Path]:
+    """Write the page and, beside it, its numbers as JSON; returns both paths."""
+    page = Path(path)
+    page.parent.mkdir(parents=True, exist_ok=True)
+    page.write_text(report_html(record, found), encoding="utf-8")
+    numbers = page.with_suffix(".json")
+    numbers.write_text(json.dumps(record.as_json(), indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    return page, numbers
+
+
+def report_html(record: Calibration, found: Excitation | None = None) -> str:
+    """The page as text."""
+    figures = [
+        FigureView(step.step, Markup(step_figure(step)), CAPTIONS.get(step.step, ""))
+        for step in record.steps
+        if step.samples
+    ]
+    if found is not None:
+        caption = (
+            f"Condition number {found.condition:.2f}; the best of {len(found.random_conditions)} random motions "
+            f"scaled to the limits has {found.random_conditions[0]:.2f}."
+        )
+        figures.append(
+            FigureView("Exciting motion", Markup(excitation_figure(found, record.joint_names)), caption)
+        )
+    view = ReportView(
+        robot=record.robot,
+        summary=_summary(record),
+        warnings=record.warnings,
+        accuracy_table=accuracy_table(record),
+        parameter_table=parameter_table(record),
+        joint_table=joint_table(record),
+        fact_table=fact_table(record),
+        figures=tuple(figures),
+    )
+    template = environment().overlay(autoescape=True).get_template("report/calibration.html.jinja")
+    return template.render(view=view)
+
+
+def _summary(record: Calibration) -> str:
+    seen = sum(row.identifiable for row in record.parameters)
+    return (
+        f"Method: {record.method}. {seen} of {len(record.parameters)} base parameters identified, "
+        f"{len(record.joint_names)} joints."
+    )
+
+
+def accuracy_table(record: Calibration) -> Markup:
+    """Table 3: RMSE and R^2 per joint and step."""
+    head = ["Joint", *(f"{step.step}: {what}" for step in record.steps for what in ("RMSE", "R²"))]
+    rows = []
+    for joint in record.joint_names:
+        row = [joint]
+        for step in record.steps:
+            both = step.joints.get(joint)
+            row += ["–", "–"] if both is None else _both(both.held_out, both.fit)
+        rows.append(row)
+    return table(head, rows)
+
+
+def _both(held_out: Quality, fit: Quality) -> list[str]:
+    return [
+        f"{held_out.rmse:.3g} ({fit.rmse:.3g})",
+        f"{_r2(held_out.r2)} ({_r2(fit.r2)})",
+    ]
+
+
+def _r2(value: float) -> str:
+    return "–" if math.isnan(value) else f"{value:.4f}"
+
+
+def parameter_table(record: Calibration) -> Markup:
+    """Table 4: base parameter, value, uncertainty, equation."""
+    head = ["Parameter", "Value", "±", "Relative", "Unit", "Group", "Equation"]
+    rows = []
+    for row in record.parameters:
+        if row.identifiable:
+            numbers = [f"{row.value:.6g}", f"{row.std:.2g}", f"{row.relative:.2%}" if row.value else "–"]
+        else:
+            numbers = ["not identifiable", "–", "–"]
+        rows.append([row.name, *numbers, row.unit, row.group, row.equation])
+    return table(head, rows, text_columns=(6,))
+
+
+def joint_table(record: Calibration) -> Markup:
+    """Table 2: torque constants and friction, joint by joint."""
+    names = list(dict.fromkeys(row.name for row in (*record.motors, *record.friction)))
+    units = {row.name: row.unit for row in (*record.motors, *record.friction)}
+    by_key = {(row.joint, row.name): row for row in (*record.motors, *record.friction)}
+    head = ["Joint", *(f"{name.replace('_', ' ')} [{units[name]}]" for name in names)]
+    rows = [[joint, *(_number(by_key.get((joint, name))) for name in names)] for joint in record.joint_names]
+    return table(head, rows)
+
+
+def _number(row: NumberRow | None) -> str:
+    if row is None:
+        return "–"
+    if not row.seen:
+        return f"({row.value:.4g}: not seen)" if math.isfinite(row.value) else "not identifiable"
+    return f"{row.value:.4g} ± {row.std:.1g}"
+
+
+def fact_table(record: Calibration) -> Markup:
+    """Ranks, condition numbers and the like."""
+    return table(
+        ["Quantity", "Value"],
+        [[name.replace("_", " "), _plain(value)] for name, value in record.facts.items()],
+    )
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return ", ".join(_plain(entry) for entry in value)
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {_plain(entry)}" for key, entry in value.items())
+    return str(value)
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tuple[int, ...] = ()) -> Markup:
+    """An HTML table, every cell escaped."""
+    lines = ["<table>", "<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
+    for row in rows:
+        cells = (
+            f'<td class="text">{html.escape(cell)}</td>'
+            if k in text_columns
+            else f"<td>{html.escape(cell)}</td>"
+            for k, cell in enumerate(row)
+        )
+        lines.append("<tr>" + "".join(cells) + "</tr>")
+    return Markup("\n".join([*lines, "</table>"]))
