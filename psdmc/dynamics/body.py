@@ -38,30 +38,23 @@ def body_from_parameters(x: Sequence[Scalar]) -> Body:
 def turned(body: Body, turn: Turn | None, double: Turn | None = None) -> Body:
     """A body about a frame, seen from the frame before its turn about z: R h, R S R^T.
 
-    `double`, the turn by twice the angle, is worked out from the turn where it is not given.
+    What xx loses and yy gains is s^2 (xx - yy) + 2 s c xy. With `double`, the turn by twice the angle, half their
+    difference and xy turn by that instead.
     """
     if turn is None:
         return body
     xx, yy, zz, xy, xz, yz = body.second
-    xx, yy, xy = _turned_block(xx, yy, xy, turn, double)
-    xz, yz, _ = turn.inward((xz, yz, 0.0))
-    return Body(body.mass, turn.inward(body.moment), (xx, yy, zz, xy, xz, yz))
-
-
-def _turned_block(
-    xx: Scalar, yy: Scalar, xy: Scalar, turn: Turn, double: Turn | None
-) -> tuple[Scalar, Scalar, Scalar]:
-    """R S R^T for a 2 x 2 symmetric S: with d = xx - yy, what xx loses and yy gains is s^2 d + 2 s c xy."""
     difference = xx - yy
     if double is None:
         square, product = turn.sine * turn.sine, turn.sine * turn.cosine
         moved = square * difference + (product + product) * xy
-        turned_xy = product * difference + (1.0 - (square + square)) * xy
+        xy = product * difference + (1.0 - (square + square)) * xy
     else:
         half = 0.5 * difference
         moved = half - (double.cosine * half - double.sine * xy)
-        turned_xy = double.sine * half + double.cosine * xy
-    return xx - moved, yy + moved, turned_xy
+        xy = double.sine * half + double.cosine * xy
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    return Body(body.mass, turn.inward(body.moment), (xx - moved, yy + moved, zz, xy, xz, yz))
 
 
 def in_previous(frame: Frame, body: Body) -> Body:
@@ -70,11 +63,13 @@ def in_previous(frame: Frame, body: Body) -> Body:
         return body
     moment = to_previous(frame, body.moment)
     xx, yy, zz, xy, xz, yz = body.second
-    if frame.rotation[0] == (1.0, 0.0, 0.0):
-        about_x = Turn(frame.rotation[2][1], frame.rotation[1][1])
-        yy, zz, yz = _turned_block(yy, zz, yz, about_x, None)
-        xy, xz, _ = about_x.inward((xy, xz, 0.0))
-        return Body(body.mass, moment, (xx, yy, zz, xy, xz, yz))
+    sine, cosine = frame.rotation[2][1], frame.rotation[1][1]
+    if frame.rotation[0] == (1.0, 0.0, 0.0) and sine and cosine:
+        difference = yy - zz
+        moved = sine * sine * difference + 2.0 * sine * cosine * yz
+        yz = sine * cosine * difference + (1.0 - 2.0 * sine * sine) * yz
+        xy, xz, _ = Turn(sine, cosine).inward((xy, xz, 0.0))
+        return Body(body.mass, moment, (xx, yy - moved, zz + moved, xy, xz, yz))
     second: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     s = multiply(multiply(frame.rotation, second), transpose(frame.rotation))
     return Body(body.mass, moment, (s[0][0], s[1][1], s[2][2], s[0][1], s[0][2], s[1][2]))
