@@ -1,4 +1,4 @@
-"""python -m psdmc.bench [NAME ...] [--rounds N] [--report FILE.html] [--json FILE]: measure the standard robots."""
+"""python -m psdmc.bench [NAME ...] [--rounds N] [--json FILE]: measure the standard robots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from psdmc.bench.run import ROUNDS, Settings, run
 from psdmc.bench.scaling import scaling_cases
 from psdmc.bench.table import as_text
 from psdmc.errors import PsdmcError
-from psdmc.report.bench_page import write_page
 
 
 def main() -> int:
@@ -23,7 +22,6 @@ def main() -> int:
         "--rivals", nargs="+", choices=[entrant.name for entrant in EVERYONE], help="whom to measure"
     )
     parser.add_argument("--quick", action="store_true", help="no instruction counts, no threads, no scaling")
-    parser.add_argument("--report", type=Path, help="write a page of HTML there")
     parser.add_argument("--json", type=Path, help="write everything measured there")
     options = parser.parse_args()
     rivals = tuple(options.rivals) if options.rivals else None
@@ -39,8 +37,6 @@ def main() -> int:
     print(as_text(result))
     if options.json:
         options.json.write_text(result.to_json())
-    if options.report:
-        write_page(result, options.report)
     return 1 if result.wrong else 0
 
 

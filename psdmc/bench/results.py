@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, is_dataclass
+from itertools import repeat
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from psdmc.bench.contestant import Unavailable
 from psdmc.bench.machine import Machine
 from psdmc.bench.measure import Times
 from psdmc.bench.threads import ThreadTime
+from psdmc.errors import InputError
 
 SCHEMA = 1
 
@@ -95,3 +99,36 @@ class BenchResult:
 
     def to_json(self) -> str:
         return json.dumps({"schema": SCHEMA, **asdict(self)}, indent=1)
+
+    @staticmethod
+    def from_json(text: str) -> BenchResult:
+        """What to_json wrote; InputError where the text is something else."""
+        try:
+            content = json.loads(text)
+            if content.pop("schema") != SCHEMA:
+                raise InputError(
+                    "the benchmark's JSON is of another schema", "measure again: psdmc bench --json"
+                )
+            result: BenchResult = rebuilt(BenchResult, content)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise InputError(
+                f"not a benchmark's JSON: {error}", "make it with: psdmc bench --json"
+            ) from error
+        return result
+
+
+def rebuilt(kind: Any, value: Any) -> Any:
+    """A value of a result's type from what JSON made of it: dataclasses from objects, tuples from arrays."""
+    arguments = get_args(kind)
+    if value is None or kind is Any:
+        return value
+    if get_origin(kind) in (UnionType, Union):
+        return rebuilt(next(a for a in arguments if a is not type(None)), value)
+    if get_origin(kind) is tuple:
+        inner = repeat(arguments[0]) if arguments[-1] is Ellipsis else arguments
+        return tuple(rebuilt(k, v) for k, v in zip(inner, value, strict=False))
+    if is_dataclass(kind):
+        make: Any = kind
+        kinds = get_type_hints(kind)
+        return make(**{name: rebuilt(kinds[name], item) for name, item in value.items()})
+    return value

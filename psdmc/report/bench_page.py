@@ -1,7 +1,9 @@
-"""The benchmark's report: one HTML file that needs nothing else."""
+"""python -m psdmc.report.bench_page RESULT.json PAGE.html: the benchmark's report, one file that needs nothing else."""
 
 from __future__ import annotations
 
+import argparse
+import sys
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -9,7 +11,7 @@ from pathlib import Path
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from psdmc.bench.results import BenchResult
-from psdmc.errors import InputError
+from psdmc.errors import InputError, PsdmcError
 from psdmc.report import bench_plots
 from psdmc.report.bench_view import (
     FunctionTable,
@@ -97,3 +99,27 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         autoescape=True,
     )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m psdmc.report.bench_page", description=__doc__)
+    parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
+    parser.add_argument("page", type=Path, help="HTML to write")
+    options = parser.parse_args()
+    try:
+        write_page(BenchResult.from_json(_text(options.result)), options.page)
+    except PsdmcError as error:
+        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}", "make it with: psdmc bench --json") from error
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -49,7 +49,7 @@ def contestants(
     case: Case, lowering: Lowering, functions: Sequence[str], flags: tuple[str, ...]
 ) -> list[Contestant]:
     """psdmc's functions for one robot: one state a call, rows, and lane by lane."""
-    kernels = _kernels(case.model, lowering, tuple(functions))
+    kernels = kernels_of(case.model, lowering, tuple(functions))
     package = package_view(package_info(case.model, name="bench"), kernels, EmitOptions())
     library = compiled(package, flags)
     ways = (_ways(case, f"psdmc {lowering}", k, library, package.lanes) for k in kernels.values())
@@ -57,7 +57,7 @@ def contestants(
 
 
 @lru_cache(maxsize=2)
-def _kernels(model: DynamicsModel, lowering: Lowering, functions: tuple[str, ...]) -> dict[str, Kernel]:
+def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, ...]) -> dict[str, Kernel]:
     """Lowered once for all flags: searching for the cheapest arrangement takes longer than compiling."""
     return {name: k for name, k in lower(model, lowering, functions).items() if not k.theta}
 

@@ -1,0 +1,21 @@
+"""Instruction counts, on contestants that differ by a hundred instructions."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+from tiny_contestants import tiny
+
+from psdmc.bench.callgrind import instructions
+
+
+@pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
+def test_a_hundred_more_instructions_are_counted_as_such(two_link):
+    few, many = tiny("few"), tiny("many")
+
+    found = instructions([few, many], two_link.chain)
+
+    difference = found[str(many.library), "many"] - found[str(few.library), "few"]
+    assert difference == pytest.approx(100.0, abs=0.5)
+    assert 10.0 < found[str(few.library), "few"] < 60.0

@@ -1,0 +1,121 @@
+"""Counts gate: what grew fails, what fell passes, what cannot be compared is said."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from psdmc.bench import counts as counting
+from psdmc.bench.counts import Baseline, count
+from psdmc.bench.gate import compare
+from psdmc.bench.rivals import psdmc_c
+from psdmc.errors import InputError
+from psdmc.program.program import Instr, Op, Program
+
+ONE = {"KR6": {"inverse_dynamics": {"mul": 225, "add": 222, "instructions state": 885.16}}}
+
+
+def baseline(**changed: float) -> Baseline:
+    named = {key.replace("_", " "): value for key, value in changed.items()}
+    return Baseline("gcc 12", {"KR6": {"inverse_dynamics": {**ONE["KR6"]["inverse_dynamics"], **named}}})
+
+
+def test_equal_counts_pass():
+    assert compare(baseline(), baseline()) == ("counts are those of the baseline", True)
+
+
+def test_one_more_multiplication_fails():
+    text, passed = compare(baseline(), baseline(mul=226))
+
+    assert not passed
+    assert text.splitlines()[0] == "KR6 inverse_dynamics: mul 225 -> 226  GREW"
+
+
+def test_fewer_operations_pass_and_are_said():
+    text, passed = compare(baseline(), baseline(add=221))
+
+    assert passed
+    assert text.splitlines()[0] == "KR6 inverse_dynamics: add 222 -> 221  fell"
+
+
+def test_instructions_may_grow_by_their_slack_and_no_more():
+    assert compare(baseline(), baseline(instructions_state=886.0))[1]
+    assert not compare(baseline(), baseline(instructions_state=888.0))[1]
+
+
+def test_another_compilers_instructions_are_not_compared():
+    text, passed = compare(baseline(), replace(baseline(instructions_state=2000.0), compiler="clang 15"))
+
+    assert passed
+    assert "not compared" in text
+
+
+def test_operations_gate_under_any_compiler():
+    assert not compare(baseline(), replace(baseline(mul=226), compiler="clang 15"))[1]
+
+
+def test_missing_valgrind_is_said():
+    after = Baseline(
+        "gcc 12", {"KR6": {"inverse_dynamics": {"mul": 225, "add": 222}}}, "valgrind was not found"
+    )
+
+    text, passed = compare(baseline(), after)
+
+    assert passed
+    assert "instructions were not counted: valgrind was not found" in text
+
+
+def test_a_function_that_the_baseline_lacks_fails():
+    after = Baseline("gcc 12", {"KR6": {**ONE["KR6"], "gravity": {"mul": 1}}})
+
+    assert not compare(baseline(), after)[1]
+
+
+def test_baseline_reads_what_it_wrote(tmp_path):
+    (tmp_path / "b.json").write_text(baseline().to_json())
+
+    assert Baseline.read(tmp_path / "b.json") == baseline()
+
+
+@pytest.mark.parametrize("text", [None, "{", "[]", '{"schema": 1}'])
+def test_a_missing_or_foreign_baseline_is_one_clear_error(tmp_path, text):
+    path = tmp_path / "b.json"
+    if text is not None:
+        path.write_text(text)
+
+    with pytest.raises(InputError, match=r"b\.json"):
+        Baseline.read(path)
+
+
+def with_one_more_multiplication(program: Program) -> Program:
+    """The same outputs, the first of them squared beforehand for nothing."""
+    (slot, index), *others = program.outputs
+    wasted = Instr(Op.MUL, (index, index))
+    last = len(program.body)
+    body = (*program.body, wasted, Instr(Op.DIV, (last, index)))
+    return Program(body, ((slot, last + 1), *others))
+
+
+def test_an_extra_multiplication_in_the_code_fails_the_gate(two_link, monkeypatch):
+    monkeypatch.setattr(counting, "instructions", lambda contestants, chain: {})
+    before = count([two_link])
+    kernels = psdmc_c.kernels_of(two_link.model, "factored", psdmc_c.FUNCTIONS)
+    worse = {n: replace(k, single=with_one_more_multiplication(k.single)) for n, k in kernels.items()}
+    monkeypatch.setattr(psdmc_c, "kernels_of", lambda *given: worse)
+
+    text, passed = compare(before, count([two_link]))
+
+    assert not passed
+    assert "two-link inverse_dynamics: mul" in text
+
+
+def test_baseline_file_is_committed_and_names_every_standard_robot():
+    from psdmc.bench.cases import EXAMPLES, standard_chains
+
+    path = EXAMPLES.parents[1] / "benchmarks" / "baseline.json"
+    content = json.loads(path.read_text())
+
+    assert list(content["counts"]) == list(standard_chains())
+    assert all(len(functions) == len(psdmc_c.FUNCTIONS) for functions in content["counts"].values())

@@ -1,0 +1,133 @@
+"""Results go to JSON and back, and into a table and a page."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import replace
+
+import pytest
+
+from psdmc.bench.contestant import Unavailable
+from psdmc.bench.machine import Machine
+from psdmc.bench.measure import Spread, Tail, Times
+from psdmc.bench.results import BenchResult, CaseResult, Measurement
+from psdmc.bench.table import as_text
+from psdmc.bench.threads import ThreadTime
+from psdmc.errors import InputError
+from psdmc.report.bench_page import page, write_page
+
+BROWSER = next((path for name in ("chromium", "chromium-browser") if (path := shutil.which(name))), None)
+
+
+def times(ns: float) -> Times:
+    return Times(
+        Spread(ns, ns - 1, ns + 1, ns - 2), Spread(1.3 * ns, ns, 2 * ns, ns), Tail(ns, 2 * ns, 3 * ns, 10_240)
+    )
+
+
+def measurement(
+    rival: str, function: str, ns: float, variant: str = "", layout: str = "state"
+) -> Measurement:
+    operations = (225, 222) if rival.startswith("psdmc") else None
+    return Measurement(rival, variant, function, layout, 1e-15, times(ns), operations, 885.0)
+
+
+@pytest.fixture
+def result() -> BenchResult:
+    functions = ("inverse_dynamics", "forward_dynamics")
+    found = [measurement("psdmc factored", f, 50.0) for f in functions]
+    found += [measurement("psdmc factored", f, 10.0, layout="rows") for f in functions]
+    found += [measurement("psdmc expanded", f, 1300.0) for f in functions]
+    found += [measurement("Pinocchio", "inverse_dynamics", 600.0)]
+    found += [
+        measurement("Pinocchio", "forward_dynamics", ns, way)
+        for ns, way in ((1200.0, "LOCAL"), (1000.0, "WORLD"))
+    ]
+    threads = (
+        ThreadTime("inverse_dynamics", "rows", 1, 10.0),
+        ThreadTime("inverse_dynamics", "rows", 2, 5.0),
+    )
+    why = Unavailable("CasADi", "the wheel 'casadi' is <not> installed")
+    case = CaseResult("Denso", "seed 4", 6, 1295, 30, 0.1, 2**20, tuple(found), (why,), (), 10, True, threads)
+    machine = Machine("a processor", 2, "Linux", "gcc 12", "-O3", "none", "3.11", "2.0")
+    grown = tuple(replace(case, name=f"LBR {n} joints", n=n) for n in (2, 3))
+    return BenchResult(machine, {"psdmc": "0.1.0"}, 1, 65_536, (case,), grown)
+
+
+def test_json_gives_the_same_result_back(result):
+    assert BenchResult.from_json(result.to_json()) == result
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"schema": 1}', '{"schema": 99}'])
+def test_foreign_json_is_one_clear_error(text):
+    with pytest.raises(InputError, match="JSON"):
+        BenchResult.from_json(text)
+
+
+def test_ratios_are_to_the_rivals_better_way(result):
+    case = result.cases[0]
+
+    assert case.ratio("forward_dynamics", over="Pinocchio") == 20.0
+    assert case.ratio("inverse_dynamics", "rows", over="Pinocchio") == 60.0
+    assert case.ratio("gravity", over="Pinocchio") is None
+
+
+def test_the_table_names_who_is_missing(result):
+    text = as_text(result)
+
+    assert "not measured: CasADi: the wheel 'casadi' is <not> installed" in text
+    assert "psdmc factored                   state       225 + 222       50.0 ns" in text
+
+
+def test_a_busy_machine_is_said_in_table_and_page(result):
+    busy = replace(result, cases=(replace(result.cases[0], idle=False),))
+
+    assert "MACHINE BUSY" in as_text(busy)
+    assert "do not trust these times" in page(busy)
+    assert "do not trust these times" not in page(result)
+
+
+def test_the_page_needs_no_network_and_escapes_names(result):
+    text = page(result)
+
+    assert "src=" not in text
+    assert 'href="http' not in text
+    assert "&lt;not&gt; installed" in text
+    assert ">20.0<" in text
+    assert "17.2 µs" in text
+
+
+def test_plots_take_the_pages_ink(result):
+    text = page(result)
+
+    assert "currentColor" in text
+    assert "#010203" not in text
+    assert text.count("<svg") == 4
+
+
+def test_the_same_result_gives_the_same_page(result):
+    assert page(result) == page(result)
+
+
+def test_an_unwritable_page_is_one_clear_error(result, tmp_path):
+    with pytest.raises(InputError, match="cannot be written"):
+        write_page(result, tmp_path / "missing" / "page.html")
+
+
+@pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
+def test_a_browser_shows_the_page(result, tmp_path):
+    write_page(result, tmp_path / "page.html")
+    command = [
+        str(BROWSER),
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--dump-dom",
+        f"file://{tmp_path}/page.html",
+    ]
+
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+
+    assert "At a glance" in dom
+    assert dom.count("<svg") == 4

@@ -1,0 +1,105 @@
+"""Rivals are optional: none is needed, and one that cannot be built is shown with its reason."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from psdmc.bench.case import Case, generic_chain, robot_as_numbers
+from psdmc.bench.cases import first_joints, oblique_chain, standard_cases
+from psdmc.bench.contestant import Unavailable
+from psdmc.bench.rivals import EVERYONE, Entrant, mujoco_c
+from psdmc.bench.rivals.mujoco_c import mjcf, quaternion
+from psdmc.bench.run import Settings, run
+from psdmc.derive.derive import derive_model
+from psdmc.errors import InputError, ToolchainError
+
+
+def refuses(case, flags):
+    raise ToolchainError("the wheel 'rival' is not installed", "pip install rival")
+
+
+def test_a_rival_that_cannot_be_built_says_why(two_link):
+    assert Entrant("rival", refuses).contestants(two_link) == [
+        Unavailable("rival", "the wheel 'rival' is not installed")
+    ]
+
+
+def test_without_compiler_nobody_is_dropped_silently(two_link, monkeypatch, tmp_path):
+    monkeypatch.setenv("CXX", "no-such-compiler")
+    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
+
+    for entrant in EVERYONE:
+        found = list(entrant.contestants(two_link))
+        assert [type(one) for one in found] == [Unavailable] * len(found)
+        assert found
+
+
+def test_the_benchmark_works_with_no_rival(two_link):
+    result = run([two_link], Settings(rounds=1, states=2048, rivals=("psdmc factored", "psdmc expanded")))
+
+    assert {m.rival for m in result.cases[0].measurements} == {"psdmc factored", "psdmc expanded"}
+    assert result.wrong == ()
+
+
+def test_numbers_read_back_exactly(two_link):
+    lines = robot_as_numbers(two_link.chain).splitlines()
+    kind, *numbers = lines[2].split()
+
+    assert lines[0].split()[0] == "2"
+    assert kind == "revolute"
+    assert len(numbers) == 9 + 3 + 10 + 1
+    assert np.array_equal(
+        np.array(numbers[9:12], dtype=float), two_link.chain.joints[1].placement.translation
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_quaternions_give_their_rotation_back(seed):
+    rotation = oblique_chain(1, seed).joints[0].placement.rotation
+    w, x, y, z = quaternion(rotation)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+    assert np.allclose(np.eye(3) + 2 * w * cross + 2 * cross @ cross, rotation, atol=1e-14)
+
+
+def test_mujoco_gets_one_body_a_joint(two_link):
+    assert mjcf(generic_chain(two_link.chain, 1)).count("<body ") == 2
+
+
+def test_mujoco_is_not_asked_for_what_it_leaves_out(two_link):
+    (answer,) = mujoco_c.contestants(two_link, ())
+
+    assert isinstance(answer, Unavailable)
+
+
+def test_generic_inertias_are_physical_and_the_same_for_the_same_seed():
+    chain = oblique_chain(3, 1)
+    first, second = generic_chain(chain, 7), generic_chain(chain, 7)
+
+    assert np.array_equal(first.parameters, second.parameters)
+    assert np.all(first.parameters[:, 10] == 0.0)
+    model = derive_model(first, expand=False)
+    assert model.theta_b is not None
+
+
+def test_a_chain_cut_short_is_the_chains_beginning():
+    chain = generic_chain(oblique_chain(4, 2), 1)
+    short = first_joints(chain, 2)
+
+    assert len(short) == 2
+    assert np.array_equal(short.parameters, chain.parameters[:2])
+    assert short.parameter_span.shape == (22, 20)
+
+
+def test_an_unknown_robot_is_refused_by_name():
+    with pytest.raises(InputError, match="'KR7'"):
+        next(standard_cases(["KR7"]))
+
+
+def test_unknown_inertia_is_refused(two_link):
+    unknown = derive_model(two_link.chain, expand=False)
+    object.__setattr__(unknown, "theta_b", None)
+
+    with pytest.raises(InputError, match="inertial parameter"):
+        Case("two-link", unknown)
