@@ -1,0 +1,73 @@
+"""The calibration's page: complete, self-contained, and safe with names from files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from psdmc.calibrate.quality import Quality
+from psdmc.calibrate.record import Calibration, NumberRow, ParameterRow
+from psdmc.calibrate.steps import JointQuality, Sample, StepQuality
+from psdmc.report.calibrate_report import report_html, write_report
+
+X = np.linspace(0.0, 1.0, 50)
+SAMPLE = Sample("a", "time [s]", X, np.sin(X), np.sin(X) + 0.01, X > 0.8)
+
+
+@pytest.fixture
+def record() -> Calibration:
+    quality = JointQuality(Quality(0.1, 0.999), Quality(0.2, 0.9876))
+    return Calibration(
+        robot="arm <7>",
+        method="linear fit",
+        joint_names=("a",),
+        model=None,  # type: ignore[arg-type]
+        parameters=(
+            ParameterRow("theta_1", "gravity", 7.4174, 0.01, "kg", "m1 + mx1/a1", True),
+            ParameterRow("theta_2", "inertial", 0.0, float("inf"), "kg m^2", "Izz1", False),
+        ),
+        motors=(NumberRow("a", "torque_constant", 36.1, 0.02, "Nm/A"),),
+        friction=(NumberRow("a", "stribeck_velocity", 0.02, 0.5, "rad/s", seen=False),),
+        steps=(StepQuality("All", {"a": quality}, (SAMPLE,)),),
+        warnings=("joint a: <script>alert(1)</script>",),
+        facts={"rank": 31, "singular_values": [3.0, 0.5]},
+    )
+
+
+def test_it_shows_every_number(record: Calibration):
+    page = report_html(record)
+
+    for text in ("7.4174", "m1 + mx1/a1", "0.9876", "not identifiable", "36.1 ± 0.02", "not seen", "3, 0.5"):
+        assert text in page
+
+
+def test_it_loads_nothing_from_outside(record: Calibration):
+    page = report_html(record)
+
+    assert "<svg" in page
+    for outside in ('src="http', 'href="http', "url(http", "<script", "@import"):
+        assert outside not in page
+
+
+def test_names_are_escaped(record: Calibration):
+    page = report_html(record)
+
+    assert "arm &lt;7&gt;" in page
+    assert "<script>alert" not in page
+
+
+def test_the_same_record_gives_the_same_bytes(record: Calibration):
+    assert report_html(record) == report_html(record)
+
+
+def test_the_numbers_stand_beside_it_as_json(record: Calibration, tmp_path: Path):
+    _, numbers = write_report(replace(record, robot="arm"), tmp_path / "page.html")
+
+    data = json.loads(numbers.read_text(encoding="utf-8"))
+
+    assert data["base_parameters"][1]["std"] is None
+    assert data["quality"]["All"]["a"]["held_out"]["r2"] == 0.9876
