@@ -101,24 +101,26 @@ def _environment() -> Environment:
     )
 
 
+def read_result(path: Path) -> BenchResult:
+    """A result that was written as JSON; InputError where the file is missing or something else."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}", "make it with: psdmc bench --json") from error
+    return BenchResult.from_json(text)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m psdmc.report.bench_page", description=__doc__)
     parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
     parser.add_argument("page", type=Path, help="HTML to write")
     options = parser.parse_args()
     try:
-        write_page(BenchResult.from_json(_text(options.result)), options.page)
+        write_page(read_result(options.result), options.page)
     except PsdmcError as error:
         print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
         return error.exit_status
     return 0
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}", "make it with: psdmc bench --json") from error
 
 
 if __name__ == "__main__":

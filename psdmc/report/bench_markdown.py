@@ -1,0 +1,77 @@
+"""python -m psdmc.report.bench_markdown RESULT.json: the headline table for README and docs, with its command."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from psdmc.bench.results import BenchResult, CaseResult
+from psdmc.errors import PsdmcError
+from psdmc.report.bench_page import read_result
+from psdmc.report.bench_view import OURS, PINOCCHIO
+
+COLUMNS = (
+    ("inverse_dynamics", "state"),
+    ("forward_dynamics", "state"),
+    ("mass_matrix", "state"),
+    ("regressor", "state"),
+)
+BATCH = (("inverse_dynamics", "rows"), ("forward_dynamics", "rows"), ("inverse_dynamics", "lanes"))
+TITLES = (
+    "robot",
+    "inverse dynamics",
+    "forward dynamics",
+    "mass matrix",
+    "regressor",
+    "inverse, batch rows",
+    "forward, batch rows",
+    "inverse, lane by lane",
+)
+
+
+def markdown(result: BenchResult, command: str = "make bench") -> str:
+    """ns per state and, in brackets, how many times faster than Pinocchio and than CasADi's C for one state."""
+    return "\n".join(_lines(result, command)) + "\n"
+
+
+def _lines(result: BenchResult, command: str) -> Iterator[str]:
+    yield "| " + " | ".join(TITLES) + " |"
+    yield "|" + "---|" * len(TITLES)
+    for case in result.cases:
+        yield f"| {case.name} | " + " | ".join(_cell(case, *column) for column in (*COLUMNS, *BATCH)) + " |"
+    yield ""
+    machine = result.machine
+    yield (
+        f"ns per state (times faster than Pinocchio's C++ / than CasADi's C). {machine.processor}, one thread, "
+        f"{machine.compiler}, `{machine.flags}`; `{command}`."
+    )
+    busy = [case.name for case in result.cases if not case.idle]
+    if busy:
+        yield f"Measured on a busy machine: {', '.join(busy)}."
+
+
+def _cell(case: CaseResult, function: str, layout: str) -> str:
+    ours = case.best(OURS, function, layout)
+    if ours is None:
+        return "–"
+    ratios = (case.ratio(function, layout, over=rival) for rival in (PINOCCHIO, "CasADi"))
+    return f"{ours.ns:.1f} ({' / '.join(f'{r:.1f}×' if r else '–' for r in ratios)})"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m psdmc.report.bench_markdown", description=__doc__)
+    parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
+    parser.add_argument("--command", default="make bench", help="what is said to have made it")
+    options = parser.parse_args()
+    try:
+        print(markdown(read_result(options.result), options.command), end="")
+    except PsdmcError as error:
+        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
+        return error.exit_status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
