@@ -143,3 +143,12 @@ def thinned(states: States, options: FilterOptions) -> NDArray[np.intp]:
     """
     step = max(1, int(np.floor(0.5 / (options.cutoff * states.period))))
     return np.flatnonzero(states.use)[::step]
+
+
+def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float) -> NDArray[np.bool_]:
+    """Samples that the filter does not mix with any turn: two periods of its cut-off away."""
+    reach = int(np.ceil(2.0 / options.cutoff / period))
+    before = np.concatenate([[0], np.cumsum(turning)])
+    index = np.arange(len(turning))
+    first, last = np.maximum(index - reach, 0), np.minimum(index + reach + 1, len(turning))
+    return np.asarray(before[last] == before[first])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibrate.filter import States, filtered, held_out
+from psdmc.calibrate.filter import States, away_from, filtered, held_out
 from psdmc.calibrate.least_squares import Consider, Estimate, estimate, noise_warnings
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.log_checks import checked
@@ -151,7 +151,8 @@ def _even_part(
         target[[*there, *back]] -= (full - still) @ theta_b
     if run.tool is not None:
         target -= payload_torque(chain, states.q, run.tool.mass, run.tool.com)
-    steady = np.all(np.abs(states.qdd) < STEADY_ACCELERATION, axis=1)
+    turning = np.any(np.abs(states.qdd) >= STEADY_ACCELERATION, axis=1)
+    steady = away_from(turning, options.filter, states.period)
     moves = np.abs(states.qd) > MOVING
     near = np.all(np.abs(states.q[there] - states.q[back]) < SAME_PLACE, axis=1)
     use = (near & steady[there] & steady[back])[:, None] & moves[there] & moves[back]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibrate.filter import FilterOptions, filtered, held_out
+from psdmc.calibrate.filter import FilterOptions, away_from, filtered, held_out
 from psdmc.calibrate.log import Array, Log
 from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.predictor import payload_torque
@@ -103,15 +103,6 @@ def _added(chain: Chain, k: int, run: MotorRun, options: StepOptions) -> tuple[A
     return angle, payload_torque(chain, q, run.load.mass, run.load.com)[:, k], current
 
 
-def _away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float) -> NDArray[np.bool_]:
-    """Samples that the filter does not mix with any turn: two periods of its cut-off away."""
-    reach = int(np.ceil(2.0 / options.cutoff / period))
-    before = np.concatenate([[0], np.cumsum(turning)])
-    index = np.arange(len(turning))
-    first, last = np.maximum(index - reach, 0), np.minimum(index + reach + 1, len(turning))
-    return np.asarray(before[last] == before[first])
-
-
 def _both_ways(chain: Chain, k: int, log: Log, options: FilterOptions) -> tuple[Array, Array, Array]:
     """Angle, current averaged over both directions there, and the pose of the other joints."""
     log = checked(log, chain, options.cutoff)
@@ -120,9 +111,7 @@ def _both_ways(chain: Chain, k: int, log: Log, options: FilterOptions) -> tuple[
     states = filtered(log, options)
     speed = states.qd[:, k]
     typical = float(np.median(np.abs(speed[states.use])))
-    steady = (
-        states.use & (typical > 0) & _away_from(np.abs(speed) <= STEADY * typical, options, states.period)
-    )
+    steady = states.use & (typical > 0) & away_from(np.abs(speed) <= STEADY * typical, options, states.period)
     ways = [np.flatnonzero(steady & (np.sign(speed) == sign)) for sign in (1.0, -1.0)]
     name = chain.joints[k].name
     if any(len(way) < 10 for way in ways):

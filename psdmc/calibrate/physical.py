@@ -16,7 +16,7 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK
 
-SETTLING = 1e-9
+SETTLING = 1e-6
 """Pull beside a squared standard deviation: settles what theta_b leaves open, moves nothing that it fixes."""
 
 

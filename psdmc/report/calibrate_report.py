@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
-
 from psdmc.calibrate.excite import Excitation
 from psdmc.calibrate.quality import Quality
 from psdmc.calibrate.record import Calibration, NumberRow
@@ -32,7 +30,7 @@ class FigureView:
     """One picture with its words."""
 
     title: str
-    svg: Markup
+    svg: str
     caption: str
 
 
@@ -43,10 +41,10 @@ class ReportView:
     robot: str
     summary: str
     warnings: tuple[str, ...]
-    accuracy_table: Markup
-    parameter_table: Markup
-    joint_table: Markup
-    fact_table: Markup
+    accuracy_table: str
+    parameter_table: str
+    joint_table: str
+    fact_table: str
     figures: tuple[FigureView, ...]
 
 
@@ -63,7 +61,7 @@ def write_report(record: Calibration, path: str | Path, found: Excitation | None
 def report_html(record: Calibration, found: Excitation | None = None) -> str:
     """The page as text."""
     figures = [
-        FigureView(step.step, Markup(step_figure(step)), CAPTIONS.get(step.step, ""))
+        FigureView(step.step, step_figure(step), CAPTIONS.get(step.step, ""))
         for step in record.steps
         if step.samples
     ]
@@ -72,9 +70,7 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
             f"Condition number {found.condition:.2f}; the best of {len(found.random_conditions)} random motions "
             f"scaled to the limits has {found.random_conditions[0]:.2f}."
         )
-        figures.append(
-            FigureView("Exciting motion", Markup(excitation_figure(found, record.joint_names)), caption)
-        )
+        figures.append(FigureView("Exciting motion", excitation_figure(found, record.joint_names), caption))
     view = ReportView(
         robot=record.robot,
         summary=_summary(record),
@@ -97,7 +93,7 @@ def _summary(record: Calibration) -> str:
     )
 
 
-def accuracy_table(record: Calibration) -> Markup:
+def accuracy_table(record: Calibration) -> str:
     """Table 3: RMSE and R^2 per joint and step."""
     head = ["Joint", *(f"{step.step}: {what}" for step in record.steps for what in ("RMSE", "R²"))]
     rows = []
@@ -121,7 +117,7 @@ def _r2(value: float) -> str:
     return "–" if math.isnan(value) else f"{value:.4f}"
 
 
-def parameter_table(record: Calibration) -> Markup:
+def parameter_table(record: Calibration) -> str:
     """Table 4: base parameter, value, uncertainty, equation."""
     head = ["Parameter", "Value", "±", "Relative", "Unit", "Group", "Equation"]
     rows = []
@@ -134,7 +130,7 @@ def parameter_table(record: Calibration) -> Markup:
     return table(head, rows, text_columns=(6,))
 
 
-def joint_table(record: Calibration) -> Markup:
+def joint_table(record: Calibration) -> str:
     """Table 2: torque constants and friction, joint by joint."""
     names = list(dict.fromkeys(row.name for row in (*record.motors, *record.friction)))
     units = {row.name: row.unit for row in (*record.motors, *record.friction)}
@@ -152,7 +148,7 @@ def _number(row: NumberRow | None) -> str:
     return f"{row.value:.4g} ± {row.std:.1g}"
 
 
-def fact_table(record: Calibration) -> Markup:
+def fact_table(record: Calibration) -> str:
     """Ranks, condition numbers and the like."""
     return table(
         ["Quantity", "Value"],
@@ -170,7 +166,7 @@ def _plain(value: Any) -> str:
     return str(value)
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tuple[int, ...] = ()) -> Markup:
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tuple[int, ...] = ()) -> str:
     """An HTML table, every cell escaped."""
     lines = ["<table>", "<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
     for row in rows:
@@ -181,4 +177,4 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tupl
             for k, cell in enumerate(row)
         )
         lines.append("<tr>" + "".join(cells) + "</tr>")
-    return Markup("\n".join([*lines, "</table>"]))
+    return "\n".join([*lines, "</table>"])

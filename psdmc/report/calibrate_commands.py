@@ -1,0 +1,106 @@
+"""`psdmc excite | simulate | calibrate`: what the command line calls, files in and files out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from psdmc.calibrate.actuators import actuator_files, calibrated_actuators
+from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
+from psdmc.calibrate.campaign import CampaignOptions, plan_campaign, write_campaign
+from psdmc.calibrate.excite import Excitation
+from psdmc.calibrate.predictor import Regressor
+from psdmc.calibrate.record import Calibration
+from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibrate.trajectory import write_trajectory
+from psdmc.compiler import compile as compile_model
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.store import load, save
+from psdmc.report.calibrate_plots import excitation_figure
+from psdmc.report.calibrate_report import write_report
+
+Progress = Callable[[str], None]
+
+
+def silent(step: str) -> None:
+    """Nobody listens."""
+
+
+def excite_command(
+    model: str | Path, folder: str | Path, options: CampaignOptions | None = None, progress: Progress = silent
+) -> Excitation:
+    """Plan a whole campaign for a model file: trajectories, campaign.toml, excitation.json, .csv and .svg in `folder`."""
+    options = options or CampaignOptions()
+    known = load(model)
+    runs, found = plan_campaign(known.chain, regressor_of(known, progress), known.l, options, progress)
+    campaign = write_campaign(folder, runs, found, options.table)
+    one_period = found.motion.sampled(known.joint_names, options.sweep.period)
+    write_trajectory(one_period, campaign.parent / "excitation.csv")
+    picture = excitation_figure(found, known.joint_names)
+    (campaign.parent / "excitation.svg").write_text(picture, encoding="utf-8")
+    return found
+
+
+def simulate_command(
+    plant: str | Path,
+    campaign: str | Path,
+    options: SimulateOptions | None = None,
+    progress: Progress = silent,
+) -> int:
+    """Write a campaign's logs from a virtual robot; returns how many were simulated, the others being up to date."""
+    return simulate_campaign(plant, campaign, options or SimulateOptions(), progress)
+
+
+def calibrate_command(
+    model: str | Path,
+    sources: Sequence[str | Path],
+    output: str | Path,
+    report: str | Path | None = None,
+    options: CalibrateOptions | None = None,
+    torque_constants: Mapping[str, float] | None = None,
+    actuators: str | Path | None = None,
+    progress: Progress = silent,
+) -> Calibration:
+    """Calibrate a model file from a campaign or from logs.
+
+    output     the calibrated model file, which emit-c takes
+    report     an HTML page, with the numbers as JSON beside it
+    actuators  a folder for C: friction and motors
+    """
+    known = load(model)
+    record = calibrate(
+        known,
+        list(sources),
+        options,
+        regressor=regressor_of(known, progress),
+        torque_constants=torque_constants,
+        progress=progress,
+    )
+    save(record.model, output)
+    if report is not None:
+        write_report(record, report)
+    if actuators is not None:
+        write_actuators(record.model, actuators)
+    return record
+
+
+def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
+    """C for a calibrated model's friction and motors; InputError where it was not calibrated."""
+    found = model.provenance.get("calibration")
+    if found is None:
+        raise InputError(f"{model.chain.name}: not calibrated", "run `psdmc calibrate` first")
+    view = calibrated_actuators(model.chain.name, model.joint_names, found)
+    written = []
+    for path, text in actuator_files(view).items():
+        target = Path(folder) / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8", newline="\n")
+        written.append(target)
+    return written
+
+
+def regressor_of(model: DynamicsModel, progress: Progress = silent) -> Regressor:
+    """The model's regressor, compiled for this machine."""
+    progress("compiling the regressor")
+    return compile_model(model, functions=["regressor"])
