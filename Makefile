@@ -51,17 +51,18 @@ golden: $(READY) ## rewrite the golden files; review their diff like code
 	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit
 	git --no-pager diff --stat -- tests/golden generated
 
-bench: $(READY) ## measure the standard robots against every rival, on an idle machine
+bench: $(READY) ## measure the standard robots against every rival, on an idle machine; page and JSON in generated/
 	$(RUN)/python -m psdmc.bench --json $(GENERATED)/bench.json
+	$(RUN)/python -m psdmc.report.bench_page $(GENERATED)/bench.json $(GENERATED)/bench.html
 
-bench-save: $(READY) ## keep this machine's figures to compare with later
-	$(RUN)/python -m pytest benchmarks --benchmark-only --benchmark-autosave
+bench-save: $(READY) ## rewrite benchmarks/baseline.json: operations and instructions, not times
+	$(RUN)/python -m psdmc.bench.gate save
 
-bench-compare: $(READY) ## the same again, against the figures kept last
-	$(RUN)/python -m pytest benchmarks --benchmark-only --benchmark-compare
+bench-compare: $(READY) ## fail where operations or instructions grew beyond that baseline
+	$(RUN)/python -m psdmc.bench.gate compare
 
-calibrate-demo: $(READY) ## calibrate the virtual Denso end to end
-	$(RUN)/python -m psdmc.calibrate.demo
+calibrate-demo: $(READY) ## excite, simulate and calibrate the virtual Denso; page in generated/
+	$(RUN)/python -m psdmc.report.calibrate_demo
 
 clean: ## remove the environment and everything generated but the reference robot
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info

@@ -1,0 +1,198 @@
+"""What each choice of the factored lowering, and each pass, saves: the tables of docs/factored.md and docs/passes.md.
+
+python docs/effects.py choices [ROBOT ...]    mul + add of inverse dynamics, choice by choice
+python docs/effects.py passes [ROBOT ...]     mul + add per function with all passes, and with one left out
+python docs/effects.py orders [ROBOT ...]     longest dependency chain and values alive, with and without the last passes
+
+ROBOT is one of `psdmc.bench.cases` (KR6, LBR7, Denso, UR5, Panda, "generic 6R" ...): its geometry standing on the floor,
+with generic physical inertias.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+from psdmc.bench.cases import standard_chains
+from psdmc.derive.derive import derive_model
+from psdmc.dynamics.body import body_from_parameters
+from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
+from psdmc.dynamics.motion import Choices
+from psdmc.dynamics.newton_euler import inverse_dynamics
+from psdmc.dynamics.parameters import bodies_of, joint_frame_map
+from psdmc.lower.expanded import lower_expanded
+from psdmc.lower.factored import Arrangement, trace_dynamics
+from psdmc.lower.reframe import reframe
+from psdmc.lower.search import SINGLE, Search, all_feet
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.cost import cost
+from psdmc.program.passes.fuse_sums import FUSED_LATENCY, LATENCY, fuse_sums
+from psdmc.program.passes.schedule import live_values, schedule
+from psdmc.program.pipeline import LAST_FOR_ONE_STATE, LONGEST, ROUND, Pass, optimize
+from psdmc.program.program import Op, Program, Slot
+from psdmc.program.trace import Tracer
+from psdmc.robot.chain import Chain
+
+TEN = slice(0, 10)
+Row = tuple[str, Sequence[int]]
+
+
+def model_of(robot: str) -> DynamicsModel:
+    return derive_model(standard_chains()[robot](), expand=False)
+
+
+def operations(program: Program) -> int:
+    return cost(optimize(program)).total
+
+
+def choices(robot: str) -> Iterator[Row]:
+    """Each line adds one choice to those above it."""
+    model = model_of(robot)
+    chain = model.chain
+    plain = reframe(chain, ("previous",) * len(chain))
+    search = Search(chain, model.representative, model.theta_b)
+
+    def best(candidates: Iterator[Arrangement]) -> int:
+        assert model.theta_b is not None
+        return min(operations(trace_dynamics("inverse_dynamics", one, model.theta_b)) for one in candidates)
+
+    first = next(search.starts(("previous",) * len(chain)))
+    compound, fold = Choices(compound=True), Choices(compound=True, fold=True)
+    yield "the file's frames, every parameter", [operations(in_file_frames(chain))]
+    yield "frames re-framed to modified DH", [operations(in_frames(chain, plain.frames, plain.base, plain))]
+    yield "parameters on sparse carriers", [best(iter([first]))]
+    yield "compound turns of parallel axes", [best(iter([replace(first, choices=compound)]))]
+    yield "last body seen from before its turn", [best(iter([replace(first, choices=fold)]))]
+    yield "the better of all recursions", [best(search.starts(("previous",) * len(chain)))]
+    yield (
+        "where frames sit on their axes",
+        [best(one for feet in all_feet(chain) for one in search.starts(feet))],
+    )
+    found = search.best("inverse_dynamics", SINGLE)
+    assert model.theta_b is not None
+    yield (
+        "unit of length, carriers exchanged by cost",
+        [operations(trace_dynamics("inverse_dynamics", found, model.theta_b))],
+    )
+
+
+def in_file_frames(chain: Chain) -> Program:
+    """Newton-Euler over the chain as it stands, all ten parameters of every link."""
+    bodies = bodies_of(chain, chain.parameters)
+    return _traced(frames_of(chain), bodies, base_acceleration(chain))
+
+
+def in_frames(chain: Chain, frames: Sequence[Frame], base, reframed) -> Program:  # type: ignore[no-untyped-def]
+    """The same over the re-framed chain, its links' parameters moved to the new frames."""
+    bodies = [
+        body_from_parameters((joint_frame_map(place) @ x[TEN]).tolist())
+        for place, x in zip(reframed.link_frames, chain.parameters, strict=True)
+    ]
+    return _traced(frames, bodies, base)
+
+
+def _traced(frames, bodies, base) -> Program:  # type: ignore[no-untyped-def]
+    tracer, n = Tracer(), len(frames)
+    q, qd, qdd = (tracer.symbols(name, n) for name in ("q", "qd", "qdd"))
+    tau = inverse_dynamics(frames, bodies, [0.0] * n, q, qd, qdd, base)
+    return tracer.finish([(Slot("tau", i), value) for i, value in enumerate(tau)])
+
+
+FUNCTIONS = ("inverse_dynamics", "forward_dynamics", "mass_matrix")
+EXPANDED_LIMIT = 3000
+"""The expanded lowering is shown up to this many functions; beyond, it takes minutes."""
+
+
+def programs_of(robot: str) -> dict[str, Program]:
+    """Programs as lowering leaves them, before any pass."""
+    model = derive_model(standard_chains()[robot]())
+    search = Search(model.chain, model.representative, model.theta_b)
+    found = search.best("inverse_dynamics", SINGLE)
+    assert model.theta_b is not None
+    programs = {name: trace_dynamics(name, found, model.theta_b) for name in FUNCTIONS}
+    if model.p is not None and model.p <= EXPANDED_LIMIT:
+        programs["inverse_dynamics, expanded"] = lower_expanded(model, "inverse_dynamics", False)
+    return programs
+
+
+def passes(robot: str) -> Iterator[Row]:
+    programs = list(programs_of(robot).values())
+    yield "as lowered", [cost(program).total for program in programs]
+    yield "all passes", [operations(program) for program in programs]
+    for left_out in dict.fromkeys((*ROUND, *LAST_FOR_ONE_STATE)):
+        kept = [cost(optimized_without((left_out,), program)).total for program in programs]
+        yield f"without {left_out.__name__}", kept
+
+
+def optimized_without(left_out: Sequence[Pass], program: Program) -> Program:
+    """As pipeline.optimize, some passes missing."""
+    for _ in range(LONGEST):
+        shorter = _applied([one for one in ROUND if one not in left_out], program)
+        if _weight(shorter) >= _weight(program):
+            break
+        program = shorter
+    return _applied([one for one in LAST_FOR_ONE_STATE if one not in left_out], program)
+
+
+def _applied(some: Sequence[Pass], program: Program) -> Program:
+    for one in some:
+        program = one(program)
+    return program
+
+
+def _weight(program: Program) -> int:
+    counted = cost(program)
+    return counted.total + counted.div + counted.neg
+
+
+def orders(robot: str) -> Iterator[Row]:
+    """Cycles of the longest dependency chain (latencies as in fuse_sums, sines apart), and values alive per
+    instruction, of one state's inverse dynamics."""
+    program = programs_of(robot)["inverse_dynamics"]
+    variants = {
+        "neither fuse_sums nor schedule": optimized_without((fuse_sums, schedule), program),
+        "fuse_sums": optimized_without((schedule,), program),
+        "schedule": optimized_without((fuse_sums,), program),
+        "both": optimize(program),
+    }
+    for name, one in variants.items():
+        yield name, [longest_chain(one), round(live_values(one) / len(one))]
+
+
+def longest_chain(program: Program) -> int:
+    """Cycles from sines and cosines to the last output on a machine that is never short of ports."""
+    uses = program.uses()
+    ready: list[int] = []
+    for instr in program.body:
+        start = max((ready[a] for a in instr.args), default=0)
+        if instr.op in (Op.LOAD, Op.CONST, Op.SIN, Op.COS):
+            ready.append(0)
+            continue
+        products = [a for a in instr.args if program.body[a].op is Op.MUL and uses[a] == 1]
+        if instr.op in (Op.ADD, Op.SUB) and products:
+            fused = max(products, key=lambda a: ready[a])
+            others = [ready[a] for a in instr.args if a != fused]
+            start = max([*others, *(ready[a] for a in program.body[fused].args)])
+            ready.append(start + FUSED_LATENCY)
+        else:
+            ready.append(start + LATENCY[instr.op])
+    return max(ready[i] for _, i in program.outputs)
+
+
+TABLES: dict[str, Callable[[str], Iterator[Row]]] = {"choices": choices, "passes": passes, "orders": orders}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("table", choices=TABLES)
+    parser.add_argument("robots", nargs="*", default=["KR6", "LBR7"])
+    options = parser.parse_args()
+    for robot in options.robots:
+        print(robot)
+        for label, figures in TABLES[options.table](robot):
+            print(f"  {label:<44}" + "".join(f"{figure:>8}" for figure in figures))
+
+
+if __name__ == "__main__":
+    main()
