@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from psdmc.emit.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
+from psdmc.emit.store_groups import GROUP, StoreGroups
 from psdmc.program.program import Op, Program, Slot
 
 
@@ -55,6 +56,23 @@ class Store:
 
 
 @dataclass(frozen=True, slots=True)
+class GroupStore:
+    """`vector[index ...] = texts`: a group of outputs that have been stored one by one already, for the form
+    that writes rows."""
+
+    vector: str
+    index: int
+    texts: tuple[str, ...]
+
+    @property
+    def line(self) -> str:
+        return f"STORE_GROUP({self.vector}, {self.index}, {', '.join(self.texts)})"
+
+
+Line = Step | Store | GroupStore
+
+
+@dataclass(frozen=True, slots=True)
 class Angle:
     """One angle of a group, and the names that its sine and cosine get (None: not needed)."""
 
@@ -68,7 +86,7 @@ class Section:
     """Steps, then the sines and cosines of the angles that they made known; stores come with the last
     steps."""
 
-    steps: tuple[Step | Store, ...]
+    steps: tuple[Line, ...]
     angles: tuple[Angle, ...]
     number: int
 
@@ -86,7 +104,12 @@ class Body:
 
 
 def make_body(
-    program: Program, inputs: tuple[str, ...], sizes: dict[str, int], suffix: str, stores_early: bool
+    program: Program,
+    inputs: tuple[str, ...],
+    sizes: dict[str, int],
+    suffix: str,
+    stores_early: bool,
+    in_groups: bool = False,
 ) -> Body:
     """Lay out a PROGRAM.
 
@@ -94,8 +117,10 @@ def make_body(
     sizes         output vectors and their lengths; entries that the PROGRAM does not store become zero
     suffix        of constants: '' or 'f'
     stores_early  store a value as soon as it is known (large outputs) or all at the end (small ones)
+    in_groups     also store groups of four, as soon as the last of them is known
     """
-    writer = _Writer(program, suffix, stores_early)
+    groups = StoreGroups(sizes if in_groups else {})
+    writer = _Writer(program, suffix, stores_early, groups)
     sections = writer.sections(sizes)
     read = {slot.vector for slot in program.inputs()}
     return Body(writer.loads(), sections, tuple(name for name in inputs if name not in read))
@@ -104,8 +129,10 @@ def make_body(
 class _Writer:
     """Texts of a PROGRAM's values, made in the order in which they are printed."""
 
-    def __init__(self, program: Program, suffix: str, stores_early: bool) -> None:
+    def __init__(self, program: Program, suffix: str, stores_early: bool, groups: StoreGroups) -> None:
         self.program, self.suffix, self.stores_early = program, suffix, stores_early
+        self.groups = groups
+        self.stored: dict[Slot, Store] = {}
         self.names = Names.of(program)
         self.stores: dict[int, list[Slot]] = {}
         for slot, index in program.outputs:
@@ -126,8 +153,8 @@ class _Writer:
         rest = [*self._steps(range(len(self.program))), *self._late_stores(), *self._zeros(sizes)]
         return (*sections, Section(tuple(rest), (), len(sections)))
 
-    def _steps(self, wanted: range | list[int]) -> tuple[Step | Store, ...]:
-        lines: list[Step | Store] = []
+    def _steps(self, wanted: range | list[int]) -> tuple[Line, ...]:
+        lines: list[Line] = []
         for i in wanted:
             if self.done[i]:
                 continue
@@ -141,27 +168,38 @@ class _Writer:
     def _has_own_line(self, i: int) -> bool:
         return self.names.named[i] and self.program.body[i].op in (Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG)
 
-    def _stores_of(self, i: int) -> list[Store]:
-        slots = self.stores.get(i, [])
-        return [Store(s.vector, s.index, self._value(i).text, self.names.uniform[i]) for s in slots]
+    def _stores_of(self, i: int) -> list[Line]:
+        return [line for slot in self.stores.get(i, []) for line in self._store(slot, i)]
 
-    def _late_stores(self) -> list[Store]:
+    def _late_stores(self) -> list[Line]:
         if self.stores_early:
             return []
-        return [
-            Store(slot.vector, slot.index, self._value(index).text, self.names.uniform[index])
-            for slot, index in self.program.outputs
-        ]
+        return [line for slot, i in self.program.outputs for line in self._store(slot, i)]
 
-    def _zeros(self, sizes: dict[str, int]) -> list[Store]:
-        stored = {slot for slot, _ in self.program.outputs}
+    def _store(self, slot: Slot, i: int) -> list[Line]:
+        return self._stored(Store(slot.vector, slot.index, self._value(i).text, self.names.uniform[i]))
+
+    def _zeros(self, sizes: dict[str, int]) -> list[Line]:
+        taken = {slot for slot, _ in self.program.outputs}
         zero = literal(0.0, self.suffix).text
         return [
-            Store(vector, index, zero, True)
+            line
             for vector, size in sizes.items()
             for index in range(size)
-            if Slot(vector, index) not in stored
+            if Slot(vector, index) not in taken
+            for line in self._stored(Store(vector, index, zero, True))
         ]
+
+    def _stored(self, store: Store) -> list[Line]:
+        """A store, and the groups that it completes."""
+        slot = Slot(store.vector, store.index)
+        self.stored[slot] = store
+        return [store, *(self._group(first) for first in self.groups.completed_by(slot))]
+
+    def _group(self, first: Slot) -> GroupStore:
+        members = (self.stored[Slot(first.vector, first.index + k)] for k in range(GROUP))
+        texts = tuple(spread(store.text, store.uniform) for store in members)
+        return GroupStore(first.vector, first.index, texts)
 
     def _angle(self, a: int) -> Angle:
         taken = {(instr.op, *instr.args) for instr in self.program}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from psdmc.emit.body import Body, make_body
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
+from psdmc.emit.store_groups import GROUP
 from psdmc.errors import InternalError
 from psdmc.program.cost import Cost, cost
 from psdmc.program.functions import FUNCTIONS, Function
@@ -27,8 +28,9 @@ class VectorView:
 class KernelView:
     """One kernel: the file(s) that hold its body, its C functions and their signatures.
 
-    single_file  body file, included once per instantiation; the same as lanes_file where one order serves
-    both pivot_order  joints in the order in which their pivots are found, empty where there are none
+    single_file  body file, included once per instantiation; lanes_file, too, where one order serves both
+    pivot_order  joints in the order in which their pivots are found, empty where there are none
+    direct       a batch call writes its rows straight from registers, without a block of them on the stack
     """
 
     name: str
@@ -42,6 +44,7 @@ class KernelView:
     single_body: Body
     lanes_body: Body
     pivot_order: tuple[int, ...]
+    direct: bool
     cost: Cost
     lowering: str
 
@@ -52,17 +55,36 @@ class KernelView:
 
     @property
     def lanes_signature(self) -> str:
+        return self._signature(f"real *{self.output.name}")
+
+    @property
+    def rows(self) -> str:
+        """The static function that computes one state per lane and writes its output into rows."""
+        return f"{self.name}_rows"
+
+    @property
+    def rows_signature(self) -> str:
+        return self._signature(f"real *const *{self.output.name}_row")
+
+    def _signature(self, output: str) -> str:
         names = [f"const real *{vector.name}" for vector in self.inputs]
         names += ["const real *theta_b"] if self.theta else []
-        names += [f"real *{self.output.name}"]
+        names += [output]
         names += ["real *pivot"] if self.pivot_order else []
         return ", ".join(names)
 
     @property
     def lanes_arguments(self) -> str:
+        return self._arguments(f"{self.output.name}_block + lane")
+
+    @property
+    def rows_arguments(self) -> str:
+        return self._arguments(f"{self.output.name}_row + lane")
+
+    def _arguments(self, output: str) -> str:
         names = [f"{vector.name}_block + lane" for vector in self.inputs]
         names += ["theta_b"] if self.theta else []
-        names += [f"{self.output.name}_block + lane"]
+        names += [output]
         names += ["pivot_block + lane"] if self.pivot_order else []
         return ", ".join(names)
 
@@ -75,7 +97,8 @@ class KernelView:
     def blocks(self) -> tuple[VectorView, ...]:
         """Buffers of a batch call: every vector lane by lane."""
         pivots = (VectorView("pivot", self.inputs[0].size),) if self.pivot_order else ()
-        return (*self.inputs, self.output, *pivots)
+        output = () if self.direct else (self.output,)
+        return (*self.inputs, *output, *pivots)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +152,7 @@ def kernel_view(kernel: Kernel, n: int, l: int, robot: str, options: EmitOptions
         single_body=single_body,
         lanes_body=lanes_body,
         pivot_order=tuple(slot.index for slot, _ in kernel.single.outputs if slot.vector == "pivot"),
+        direct=_is_direct(function, n, l),
         cost=cost(kernel.single),
         lowering=kernel.lowering,
     )
@@ -147,7 +171,12 @@ def _body(kernel: Kernel, program: Program, n: int, l: int, options: EmitOptions
     inputs = (*function.inputs, *(("theta_b",) if kernel.theta else ()))
     sizes = {function.output: function.size(n, l)}
     suffix = "" if options.real == "float64" else "f"
-    return make_body(program, inputs, sizes, suffix, stores_early=function.columns != "1")
+    is_matrix = function.columns != "1"
+    return make_body(program, inputs, sizes, suffix, is_matrix, _is_direct(function, n, l))
+
+
+def _is_direct(function: Function, n: int, l: int) -> bool:
+    return function.columns != "1" and function.size(n, l) >= GROUP
 
 
 def _prototypes(function: Function, theta: bool, robot: str, real: str) -> dict[str, Prototype]:

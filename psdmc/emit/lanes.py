@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from psdmc.emit.options import EmitOptions
+from psdmc.emit.store_groups import GROUP
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,16 @@ class VectorWidth:
         """The steps that transpose `lanes` vectors of `lanes` reals."""
         distances = [1 << k for k in range(self.lanes.bit_length() - 1)]
         return tuple(_stage(self.lanes, distance) for distance in distances)
+
+    @property
+    def piece(self) -> int:
+        """Neighbours of a row that are stored at once where outputs go into rows group by group."""
+        return min(self.lanes, GROUP)
+
+    @property
+    def piece_stages(self) -> tuple[TransposeStage, ...]:
+        """The steps that transpose each square of `piece` vectors and lanes."""
+        return tuple(stage for stage in self.stages if stage.distance < self.piece)
 
 
 def vector_widths(options: EmitOptions) -> tuple[VectorWidth, ...]:

@@ -180,6 +180,8 @@ def library_files(package: PackageView) -> dict[str, str]:
         "src/one_state.h": "one_state.h.jinja",
         "src/lane_states.h": "lane_states.h.jinja",
         "src/rows.h": "rows.h.jinja",
+        "src/lane_rows.h": "lane_rows.h.jinja",
+        "src/groups.h": "groups.h.jinja",
         "src/pivots.h": "pivots.h.jinja",
     }
     files = {path: render(template, package=package) for path, template in named.items()}
