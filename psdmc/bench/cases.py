@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from importlib.util import find_spec
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 import numpy as np
@@ -109,12 +109,12 @@ def _known(name: str) -> Chain:
 
 def _robot_data() -> Path:
     """Where the example-robot-data wheel keeps its robots."""
-    found = find_spec("example_robot_data")
-    for folder in Path(found.origin).parents if found and found.origin else ():
-        robots = folder / "share/example-robot-data/robots"
-        if robots.is_dir():
-            return robots
-    raise InputError("example-robot-data is not installed", "pip install example-robot-data")
+    try:
+        wheel = distribution("example-robot-data")
+    except PackageNotFoundError:
+        raise InputError("example-robot-data is not installed", "pip install example-robot-data") from None
+    inside = next(file for file in wheel.files or () if str(file).endswith(POPULAR["UR5"][0]))
+    return Path(str(wheel.locate_file(inside))).parents[2]
 
 
 def _anywhere(rng: np.random.Generator) -> Placement:
