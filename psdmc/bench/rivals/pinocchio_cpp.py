@@ -80,7 +80,7 @@ def compiled(way: Way, flags: tuple[str, ...]) -> Path:
     used = tuple(flag for flag in flags if way == "header-only" or not flag.startswith(("-march", "-mcpu")))
     product = f"pinocchio_{way.replace('-', '_')}.so"
     names = ("pinocchio_cpp.cpp", "pinocchio_model.hpp", "loops.hpp")
-    command = [cxx(), "-std=c++17", *used, "-fPIC", "-shared", *DEFINES, *includes(prefix)]
+    command = [cxx(), "-std=c++17", *used, "-DNDEBUG", "-shared", *DEFINES, *includes(prefix)]
     command += ["pinocchio_cpp.cpp", "-o", product, *link]
     return built(product, command, {name: source(name) for name in names}, [version_of("pin")])
 
