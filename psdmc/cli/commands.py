@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from psdmc import compiler
+from psdmc.cli import measuring
+from psdmc.cli.progress import steps
 from psdmc.cli.show import print_check, print_cost, print_model, print_terms
 from psdmc.errors import InputError
 from psdmc.lower.kernels import Lowering
@@ -178,11 +176,5 @@ def build(directory: Annotated[Path, typer.Argument(metavar="DIR", help="folder 
     print(f"{directory}: built, self-test passed")
 
 
-@contextmanager
-def steps() -> Iterator[Callable[[str], None]]:
-    """A line on standard error that shows the step under way, where that is a terminal."""
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("", total=None)
-        yield lambda step: progress.update(task, description=step)
+for command in (measuring.bench, measuring.excite, measuring.simulate, measuring.calibrate):
+    app.command()(command)

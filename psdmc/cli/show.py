@@ -1,4 +1,4 @@
-"""What `show` and `check` print."""
+"""Tables that commands print."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from psdmc.calibrate.record import Calibration
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.check import CheckRow
 from psdmc.model.dynamics_model import DynamicsModel
@@ -121,4 +122,13 @@ def print_check(rows: Sequence[CheckRow]) -> None:
         limit = "" if row.limit is None else f"{row.limit:.0e}"
         verdict = "" if row.limit is None else "pass" if row.passed else "FAIL"
         table.add_row(row.name, row.against, f"{row.error:.1e}", limit, verdict)
+    console().print(table)
+
+
+def print_accuracy(record: Calibration) -> None:
+    """R^2 on held-out data per joint and step."""
+    table = Table("joint", *(f"{step.step} R^2" for step in record.steps))
+    for joint in record.joint_names:
+        both = [step.joints.get(joint) for step in record.steps]
+        table.add_row(escape(joint), *("" if b is None else f"{b.held_out.r2:.4f}" for b in both))
     console().print(table)

@@ -1,0 +1,145 @@
+"""The commands beside the pipeline: bench, excite, simulate, calibrate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psdmc.bench.case import Case
+from psdmc.bench.run import Settings, run
+from psdmc.bench.table import as_text
+from psdmc.calibrate.calibrate import CalibrateOptions
+from psdmc.calibrate.campaign import CampaignOptions
+from psdmc.calibrate.excite import ExciteOptions
+from psdmc.calibrate.simulate_campaign import SimulateOptions
+from psdmc.cli.progress import steps
+from psdmc.cli.show import print_accuracy
+from psdmc.errors import InputError
+from psdmc.model.store import load
+from psdmc.report.bench_page import write_page
+from psdmc.report.calibrate_commands import calibrate_command, excite_command, simulate_command
+
+WRONG_STATUS = 5
+"""A contestant's results disagreed with the others'."""
+
+
+def bench(
+    models: Annotated[list[Path], typer.Argument(metavar="MODEL...", help="model files")],
+    report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="write a page")] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE.json", help="write every figure")] = None,
+    rounds: Annotated[int, typer.Option(min=1, help="trials that count")] = Settings().rounds,
+    counts: Annotated[bool, typer.Option("--counts", help="count instructions too (valgrind)")] = False,
+) -> None:
+    """Time generated code against Pinocchio, CasADi and MuJoCo in the same run."""
+    cases = [Case(path.stem, load(path)) for path in models]
+    with steps() as progress:
+        result = run(cases, Settings(rounds=rounds, count=counts), progress)
+    print(as_text(result))
+    if report is not None:
+        write_page(result, report, "psdmc bench " + " ".join(path.name for path in models))
+    if json is not None:
+        _write(json, result.to_json())
+    if result.wrong:
+        raise typer.Exit(WRONG_STATUS)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}", "choose another place") from error
+
+
+def excite(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder of the campaign")],
+    duration: Annotated[float, typer.Option(min=0.1, help="s, period of the exciting motion")] = 10.0,
+    harmonics: Annotated[int, typer.Option(min=1, help="sines per joint")] = 3,
+    seconds: Annotated[float, typer.Option(min=1.0, help="s, longest search")] = ExciteOptions().seconds,
+    log_det: Annotated[
+        bool, typer.Option("--log-det", help="maximise log det instead of the condition")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="of the search")] = 1,
+) -> None:
+    """Plan a calibration campaign: gravity sweeps, friction sines, and an exciting motion within the limits."""
+    search = ExciteOptions(
+        duration=duration,
+        harmonics=tuple(range(1, harmonics + 1)),
+        objective="log_det" if log_det else "condition",
+        seconds=seconds,
+        seed=seed,
+    )
+    with steps() as progress:
+        found = excite_command(model, output, replace(CampaignOptions(), excite=search), progress)
+    best = found.random_conditions[0]
+    print(
+        f"{output}: condition number {found.condition:.3g}, {found.gain:.2f} times below the best random {best:.3g}"
+    )
+
+
+def simulate(
+    plant: Annotated[Path, typer.Argument(metavar="PLANT", help="virtual robot (.toml)")],
+    campaign: Annotated[Path, typer.Argument(metavar="DIR", help="campaign made by excite")],
+    ideal: Annotated[bool, typer.Option("--ideal", help="ideal sensors")] = False,
+    harness: Annotated[
+        bool, typer.Option("--harness", help="with a cable harness, which no model has")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="of the sensors' noise")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 1,
+) -> None:
+    """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
+    with steps() as progress:
+        count = simulate_command(plant, campaign, SimulateOptions(ideal, harness, seed, workers), progress)
+    print(f"{campaign}: {count} runs simulated, the others were up to date")
+
+
+def calibrate(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="campaign folder, or logs")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="MODEL.npz", help="calibrated model")],
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="write a page, with JSON beside it")
+    ] = None,
+    actuators: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="write friction and motors as C there")
+    ] = None,
+    physical: Annotated[
+        bool, typer.Option("--physical", help="base parameters of a real mass distribution only")
+    ] = False,
+    torque_constants: Annotated[
+        str, typer.Option(metavar="JOINT=KT,...", help="N m/A, for plain logs that hold currents")
+    ] = "",
+) -> None:
+    """Identify base parameters, friction and motor constants from logs."""
+    with steps() as progress:
+        record = calibrate_command(
+            model,
+            logs,
+            output,
+            report,
+            CalibrateOptions(physical=physical),
+            _torque_constants(torque_constants),
+            actuators,
+            progress,
+        )
+    print_accuracy(record)
+    print(f"{output}: calibrated model")
+    for warning in record.warnings:
+        print(f"warning: {warning}")
+
+
+def _torque_constants(text: str) -> dict[str, float] | None:
+    """'joint=36.1,...' as a dict; None where nothing is given."""
+    if not text:
+        return None
+    found: dict[str, float] = {}
+    for word in text.split(","):
+        name, _, value = word.rpartition("=")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise InputError(f"--torque-constants: {word!r}", "write JOINT=NUMBER,JOINT=NUMBER") from None
+    return found
