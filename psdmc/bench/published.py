@@ -16,8 +16,8 @@ class Published:
     derivation: float | None
 
 
-PSDM_2021 = "Lloyd, Irani, Ahmadi, Mech. Mach. Theory 156 (2021) 104149"
-DENSO_2022 = "Denso-2022, table 5, Intel i5-8259U"
+PSDM_2021 = "PSDM-2021 (Mech. Mach. Theory 156)"
+DENSO_2022 = "Denso-2022, table 5"
 
 PUBLISHED = {
     "Denso": Published("Denso", DENSO_2022, 400.0, 630.0, 3.0),

@@ -10,6 +10,7 @@ from psdmc.bench.results import BenchResult, CaseResult, Measurement
 
 OURS = "psdmc factored"
 PINOCCHIO = "Pinocchio"
+CASADI = "CasADi"
 
 FUNCTION_TITLES = {
     "inverse_dynamics": "Inverse dynamics",
@@ -50,15 +51,17 @@ class FunctionTable:
 
 @dataclass(frozen=True, slots=True)
 class Headline:
-    """One robot's line of the first table: how many times faster than Pinocchio."""
+    """One robot's line of the first table: how many times faster than Pinocchio, and than CasADi's C."""
 
     robot: str
     inverse_ns: str
     inverse: str
+    inverse_casadi: str
     inverse_rows: str
     inverse_lanes: str
     forward_ns: str
     forward: str
+    forward_casadi: str
     forward_rows: str
     forward_lanes: str
 
@@ -69,8 +72,8 @@ def headlines(result: BenchResult) -> tuple[Headline, ...]:
 
 
 def _headline(case: CaseResult) -> Headline:
-    def ratio(function: str, layout: str = "state") -> str:
-        found = case.ratio(function, layout, over=PINOCCHIO, rival=OURS)
+    def ratio(function: str, layout: str = "state", over: str = PINOCCHIO) -> str:
+        found = case.ratio(function, layout, over=over, rival=OURS)
         return f"{found:.1f}" if found else "–"
 
     def ns(function: str) -> str:
@@ -80,8 +83,8 @@ def _headline(case: CaseResult) -> Headline:
     inverse, forward = "inverse_dynamics", "forward_dynamics"
     return Headline(
         case.name,
-        ns(inverse), ratio(inverse), ratio(inverse, "rows"), ratio(inverse, "lanes"),
-        ns(forward), ratio(forward), ratio(forward, "rows"), ratio(forward, "lanes"),
+        ns(inverse), ratio(inverse), ratio(inverse, over=CASADI), ratio(inverse, "rows"), ratio(inverse, "lanes"),
+        ns(forward), ratio(forward), ratio(forward, over=CASADI), ratio(forward, "rows"), ratio(forward, "lanes"),
     )  # fmt: skip
 
 
@@ -139,7 +142,7 @@ def own_table(result: BenchResult) -> tuple[Quoted, ...]:
     if case is None:
         return ()
     found = []
-    for rival in (OURS, "psdmc expanded", PINOCCHIO, "CasADi"):
+    for rival in (OURS, "psdmc expanded", PINOCCHIO, CASADI):
         pair = case.best(rival, "inverse_dynamics"), case.best(rival, "forward_dynamics")
         if pair[0] and pair[1]:
             found.append((rival, pair[0].ns, pair[1].ns))

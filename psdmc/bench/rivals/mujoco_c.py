@@ -39,7 +39,16 @@ def _compiled(flags: tuple[str, ...]) -> Path:
     library = next(iter(sorted(folder.glob("libmujoco.so*"))), None)
     if library is None:
         raise ToolchainError("this MuJoCo came without its C library", "install the wheel 'mujoco'")
-    command = [cxx(), "-std=c++17", *flags, "-DNDEBUG", "-shared", "-isystem", str(folder / "include"), "mujoco_c.cpp"]
+    command = [
+        cxx(),
+        "-std=c++17",
+        *flags,
+        "-DNDEBUG",
+        "-shared",
+        "-isystem",
+        str(folder / "include"),
+        "mujoco_c.cpp",
+    ]
     command += [str(library), f"-Wl,-rpath,{folder}", "-o", "mujoco_c.so"]
     sources = {name: source(name) for name in ("mujoco_c.cpp", "loops.hpp")}
     return built("mujoco_c.so", command, sources, [version_of("mujoco")])
