@@ -10,7 +10,7 @@ Unknowns p, in order: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1, ine
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import optimize
@@ -19,6 +19,14 @@ from psdmc.calibrate.friction_run import JointRun, lugre_from
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.lugre import PARAMETERS, Lugre
 from psdmc.calibrate.steps import FrictionOptions
+
+DELAY = 9
+FREE = {"lugre": tuple(range(10)), "coulomb_viscous": (0, 3, 7, 8, DELAY)}
+"""Unknowns that each friction law leaves to the data."""
+STIFF_BEND = 1e-5
+"""rad: bristle deflection at Coulomb friction that stands for none at all."""
+UNSEEN_CURVATURE = 1e-13
+"""Of the sum of squares, relative to the largest, below which a direction is not seen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,8 +63,19 @@ def fit_joint(
     name: str, data: JointRun, options: FrictionOptions, start: JointFriction | None
 ) -> JointFriction:
     """The seven of one joint: by the paper's two steps, or from an earlier pass, and polished."""
-    p = unknowns_of(start) if start is not None else _presliding(data, _fast(data, options), options)
-    return _polished(name, data, p, options)
+    if options.law == "coulomb_viscous":
+        sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
+        return _polished(name, replace(data, fit=sliding), _plain(_fast(data, options)), options)
+    first = _presliding(data, _fast(data, options), options) if start is None else unknowns_of(start)
+    return _polished(name, data, first, options)
+
+
+def _plain(fast: Array) -> Array:
+    """Coulomb and viscous friction as LuGre sees them: no Stribeck peak, linear, bristles that hardly bend."""
+    coulomb, viscous, _, inertia, offset = fast
+    return np.array(
+        [coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, inertia, offset, 0.0]
+    )
 
 
 def _fast(data: JointRun, options: FrictionOptions) -> Array:
@@ -120,59 +139,61 @@ def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
 
 
 def _polished(name: str, data: JointRun, p: Array, options: FrictionOptions) -> JointFriction:
-    """All unknowns together by trust region, bounds kept; standard deviations from its Jacobian."""
-    reach = options.largest_delay if options.estimate_delay else 1e-12
-    low = np.array([1e-9, 0.0, np.log(1e-5), 0.0, 0.05, np.log(1.0), 0.0, -np.inf, -np.inf, -reach])
-    high = np.array([np.inf, np.inf, np.log(1e2), np.inf, 3.0, np.log(1e9), np.inf, np.inf, np.inf, reach])
-    scale = np.array(
-        [
-            p[0],
-            0.2 * p[0],
-            1.0,
-            max(p[3], 0.1 * p[0]),
-            0.5,
-            1.0,
-            max(p[6], 1e-4 * np.exp(p[5])),
-            1.0,
-            p[0],
-            1e-3,
-        ]
-    )
-    inner = np.clip(p, low + 1e-6 * scale, np.where(np.isfinite(high), high - 1e-6 * scale, np.inf))
-    steps = 1e-4 * scale
-
-    def jacobian(x: Array) -> Array:
-        base = data.residual(x, data.fit)
-        columns = []
-        for j, step in enumerate(steps):
-            moved = x.copy()
-            moved[j] += step if x[j] + step <= high[j] else -step
-            columns.append((data.residual(moved, data.fit) - base) / (moved[j] - x[j]))
-        return np.stack(columns, axis=1)
+    """All free unknowns together by trust region, bounds kept; standard deviations from its Jacobian."""
+    free = list(FREE[options.law]) if options.estimate_delay else [j for j in FREE[options.law] if j != DELAY]
+    low, high = (bounds[free] for bounds in _bounds(options))
+    scale = _scale(p)[free]
+    inner = np.clip(p[free], low + 1e-6 * scale, np.where(np.isfinite(high), high - 1e-6 * scale, np.inf))
 
     def residual(x: Array) -> Array:
-        return data.residual(x, data.fit)
+        return data.residual(_put(p, free, x), data.fit)
 
-    fitted = optimize.least_squares(
-        residual,
-        inner,
-        jac=jacobian,
-        bounds=(low, high),
-        x_scale=scale,
-        xtol=1e-7,
-        ftol=1e-9,
-        gtol=1e-12,
-        max_nfev=25,
-    )
-    return _with_uncertainty(name, fitted.x, fitted.jac, fitted.fun, scale, options)
+    def jacobian(x: Array) -> Array:
+        base = residual(x)
+        columns = []
+        for j, step in enumerate(1e-4 * scale):
+            moved = x.copy()
+            moved[j] += step if x[j] + step <= high[j] else -step
+            columns.append((residual(moved) - base) / (moved[j] - x[j]))
+        return np.stack(columns, axis=1)
+
+    bounds = {"bounds": (low, high), "x_scale": scale}
+    limits = {"xtol": 1e-7, "ftol": 1e-9, "gtol": 1e-12, "max_nfev": 25}
+    fitted = optimize.least_squares(residual, inner, jac=jacobian, **bounds, **limits)
+    spread = np.zeros((len(p), len(p)))
+    spread[np.ix_(free, free)] = _covariance(fitted.jac * scale, fitted.fun) * np.outer(scale, scale)
+    return _with_uncertainty(name, _put(p, free, fitted.x), spread, options)
 
 
-def _with_uncertainty(
-    name: str, p: Array, jac: Array, residual: Array, scale: Array, options: FrictionOptions
-) -> JointFriction:
-    variance = float(residual @ residual) / max(len(residual) - len(p), 1)
-    normal = (jac * scale).T @ (jac * scale)
-    spread = variance * np.linalg.pinv(normal, rcond=1e-14, hermitian=True) * np.outer(scale, scale)
+def _put(p: Array, free: list[int], x: Array) -> Array:
+    whole = p.copy()
+    whole[free] = x
+    return whole
+
+
+def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
+    """sigma_0, sigma_1, F_v >= 0, F_s >= F_c > 0, v_s > 0; the rest keeps the search where numbers make sense."""
+    reach = options.largest_delay
+    low = [1e-9, 0.0, np.log(1e-5), 0.0, 0.05, np.log(1.0), 0.0, -np.inf, -np.inf, -reach]
+    high = [np.inf, np.inf, np.log(1e2), np.inf, 3.0, np.log(1e9), np.inf, np.inf, np.inf, reach]
+    return np.array(low), np.array(high)
+
+
+def _scale(p: Array) -> Array:
+    """What counts as one step of each unknown."""
+    viscous, damping = max(p[3], 0.1 * p[0]), max(p[6], 1e-4 * np.exp(p[5]))
+    return np.array([p[0], 0.2 * p[0], 1.0, viscous, 0.5, 1.0, damping, 1.0, p[0], 1e-3])
+
+
+def _covariance(jac: Array, residual: Array) -> Array:
+    """Of the scaled unknowns; a direction that the data do not see gets a huge variance, never none."""
+    variance = float(residual @ residual) / max(len(residual) - jac.shape[1], 1)
+    curvature, directions = np.linalg.eigh(jac.T @ jac)
+    seen = np.maximum(curvature, UNSEEN_CURVATURE * curvature[-1])
+    return np.asarray((directions * (variance / seen)) @ directions.T)
+
+
+def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptions) -> JointFriction:
     friction = lugre_from(p)
     to_seven = np.eye(7, 10)
     to_seven[1, 0] = 1.0
@@ -181,7 +202,7 @@ def _with_uncertainty(
     covariance = to_seven @ spread @ to_seven.T
     relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction.as_array()), 1e-12)
     unseen = [PARAMETERS[j] for j in range(7) if not relative[j] < options.unseen]
-    peak_std = float(np.sqrt(spread[1, 1]))
-    if p[1] < 3.0 * peak_std and "stribeck_velocity" not in unseen:  # F_s = F_c: nothing hangs on v_s
+    no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: nothing hangs on v_s
+    if no_peak and "stribeck_velocity" not in unseen and options.law == "lugre":
         unseen.append("stribeck_velocity")
     return JointFriction(name, friction, covariance, tuple(unseen), float(p[7]), float(p[8]), float(p[9]))

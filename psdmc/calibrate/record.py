@@ -147,7 +147,7 @@ def four_step_record(model: DynamicsModel, found: FourSteps) -> Calibration:
             model=model,
             parameters=_parameter_rows(model, theta, inertial.std, groups),
             motors=_motor_rows(model, found),
-            friction=_lugre_rows(found),
+            friction=_lugre_rows(model, found),
             steps=steps if found.motor is None else (found.motor.quality, *steps),
             warnings=found.warnings,
             facts=facts,
@@ -244,13 +244,16 @@ def _motor_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]
     )
 
 
-def _lugre_rows(found: FourSteps) -> tuple[NumberRow, ...]:
+def _lugre_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
+    """The seven per joint; forces carry the torque constant's uncertainty too."""
+    relative = dict(zip(model.joint_names, found.motors.relative_std.tolist(), strict=True))
     rows: list[NumberRow] = []
     for name, joint in found.friction.joints.items():
         values = zip(PARAMETERS, joint.friction.as_array().tolist(), joint.std.tolist(), UNITS, strict=True)
-        rows += [
-            NumberRow(name, p, value, std, unit, p not in joint.unseen) for p, value, std, unit in values
-        ]
+        for parameter, value, std, unit in values:
+            by_constant = relative[name] * value if unit.startswith("Nm") else 0.0
+            seen = parameter not in joint.unseen
+            rows.append(NumberRow(name, parameter, value, float(np.hypot(std, by_constant)), unit, seen))
     return tuple(rows)
 
 

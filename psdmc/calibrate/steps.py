@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,9 @@ class StepOptions:
 class FrictionOptions:
     """How the seven are found.
 
+    law             lugre: all seven; coulomb_viscous: F_c and a linear F_v, for those who want no more
     fast            speed above which pre-sliding is ignored in the first step, share of the run's largest
+    sliding         speed above which plain friction is fitted, share of the run's largest
     simplex_steps   largest number of Nelder-Mead evaluations
     estimate_delay  whether the time between position and current is estimated with them
     largest_delay   s
@@ -77,7 +80,9 @@ class FrictionOptions:
     workers         processes; joints are independent
     """
 
+    law: Literal["lugre", "coulomb_viscous"] = "lugre"
     fast: float = 0.25
+    sliding: float = 0.02
     simplex_steps: int = 160
     estimate_delay: bool = True
     largest_delay: float = 5e-3

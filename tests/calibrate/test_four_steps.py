@@ -94,6 +94,38 @@ def test_a_harness_that_the_model_lacks_is_noticed(arm, campaign: Path):
     assert "standard deviations are too small" in told
 
 
+def test_plain_coulomb_and_viscous_friction_for_those_who_want_no_more(arm, noisy):
+    options = CalibrateOptions()
+    plain = replace(options.campaign, passes=1, lugre=replace(options.campaign.lugre, law="coulomb_viscous"))
+
+    record = calibrate(arm.unknown, noisy[0], replace(options, campaign=plain), regressor=arm.regressor)
+
+    shoulder = {row.name: row for row in record.friction if row.joint == "shoulder"}
+    # the truth is 3.0 + 4.0 |v|^0.7: a straight line through it starts higher and rises less
+    assert 3.0 < shoulder["coulomb"].value < 4.5
+    assert 2.5 < shoulder["viscous"].value < 4.0
+    assert shoulder["viscous_exponent"].value == 1.0
+    assert record.steps[-1].joints["shoulder"].held_out.r2 > 0.99
+
+
+def test_friction_that_has_no_stribeck_peak_leaves_its_velocity_unseen(arm, campaign: Path):
+    text = arm.plant.read_text(encoding="utf-8").replace("static = 3.8", "static = 3.0")
+    flat = arm.folder / "flat.toml"
+    flat.write_text(text, encoding="utf-8")
+    folder = arm.folder / "flat"
+    shutil.copytree(campaign.parent, folder, dirs_exist_ok=True)
+    simulate_campaign(flat, folder, SimulateOptions())
+
+    record = calibrate(arm.unknown, folder, regressor=arm.regressor)
+
+    seen = {(row.joint, row.name): row.seen for row in record.friction}
+    assert not seen["shoulder", "stribeck_velocity"]
+    assert seen["elbow", "stribeck_velocity"]
+    assert seen["shoulder", "coulomb"]
+    (warning,) = [text for text in record.warnings if "shoulder" in text]
+    assert "stribeck_velocity" in warning
+
+
 def test_logs_are_simulated_once(arm, ideal):
     folder = ideal[0]
 
