@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from pathlib import Path
 
 from psdmc.bench.cases import standard_cases
@@ -12,6 +13,8 @@ from psdmc.bench.run import ROUNDS, Settings, run
 from psdmc.bench.scaling import scaling_cases
 from psdmc.bench.table import as_text
 from psdmc.errors import PsdmcError
+
+START = time.perf_counter()
 
 
 def main() -> int:
@@ -41,7 +44,7 @@ def main() -> int:
 
 
 def _tell(message: str) -> None:
-    print(message, file=sys.stderr, flush=True)
+    print(f"{time.perf_counter() - START:6.0f} s  {message}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,9 @@ BLOCK = 1024
 """States per timed block: some 50 us, long against reading the clock, short against the scheduler's slices. Batch
 calls take what the ring holds."""
 
+LATENCY_SHARE = 4
+"""Latency is taken over this part of the states: still far more than a branch predictor remembers."""
+
 TAIL_BLOCK = 64
 """Calls per block for the worst case: single calls are too short for the clock."""
 
@@ -108,7 +111,7 @@ class Runner:
 
     def latency(self) -> Array:
         """ns per state, block by block, where each state waits for the one before."""
-        return self._timed("latency", self._output, self._block)
+        return self._timed("latency", self._output, self._block, self._states.count // LATENCY_SHARE)
 
     def tail(self) -> Array:
         """ns per call over blocks of 64 calls, the clock's own cost subtracted."""
@@ -123,13 +126,14 @@ class Runner:
         self._copy_matrices(False)
         return output.reshape(count // lanes, size, lanes).transpose(0, 2, 1).reshape(count, size)
 
-    def _timed(self, kind: str, output: Array, block: int) -> Array:
-        """Seconds of each block from the library's loop, as ns per state."""
+    def _timed(self, kind: str, output: Array, block: int, count: int | None = None) -> Array:
+        """Seconds of each block from the library's loop over `count` states (all), as ns per state."""
+        count = max(block, count or self._states.count)
         q, qd, x = (vector.ctypes.data for vector in self._inputs)
         states = self._states
         ring = len(output) // self.contestant.outputs
-        work = Work(states.count, states.n, self.contestant.outputs, ring, q, qd, x, output.ctypes.data)
-        seconds = np.zeros(states.count // block)
+        work = Work(count, states.n, self.contestant.outputs, ring, q, qd, x, output.ctypes.data)
+        seconds = np.zeros(count // block)
         loop = getattr(self._library, f"{self.contestant.symbol}_{kind}")
         loop(ctypes.byref(work), ctypes.c_size_t(block), ctypes.c_void_p(seconds.ctypes.data))
         return seconds * (1e9 / block)

@@ -23,6 +23,7 @@ ROUNDS = 10
 
 SCALED = ("inverse_dynamics", "forward_dynamics")
 SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")
+SCALED_ROUNDS = 3
 """What is shown against the number of joints."""
 
 Progress = Callable[[str], None]
@@ -68,7 +69,9 @@ def run(
     scaling  the same robot with more and more joints, for which less is measured
     """
     results = run_cases(cases, settings, progress)
-    scaled = Settings(settings.rounds, settings.states, settings.seed, SCALED_RIVALS, SCALED)
+    scaled = Settings(
+        min(settings.rounds, SCALED_ROUNDS), settings.states, settings.seed, SCALED_RIVALS, SCALED
+    )
     grown = run_cases(scaling, scaled, progress)
     return BenchResult(this_machine(), versions(), settings.seed, settings.states, results, grown)
 

@@ -13,8 +13,9 @@ from psdmc.bench.contestant import Contestant, Runner
 from psdmc.bench.states import States
 
 THREADS = (1, 2)
-TRIALS = 7
-PASSES = 40
+FUNCTIONS = ("inverse_dynamics", "forward_dynamics")
+TRIALS = 5
+PASSES = 30
 """Times that each thread goes through all states in a trial: some 20 ms, long against starting threads."""
 
 
@@ -33,7 +34,7 @@ def measure_threads(contestants: Sequence[Contestant], states: States) -> tuple[
     return tuple(
         ThreadTime(c.function, c.layout, threads, _ns_per_state(c, states, threads))
         for c in contestants
-        if c.layout != "state" and c.rival == "psdmc factored"
+        if c.layout != "state" and c.rival == "psdmc factored" and c.function in FUNCTIONS
         for threads in THREADS
     )
 
