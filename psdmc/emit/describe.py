@@ -29,7 +29,7 @@ def description(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
         "that an output may be one of the inputs (in a batch: where their rows are equally long).",
         "  _batch      one state per row",
         "  _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too",
-        "  _theta      with the base parameters theta_b given at run time",
+        "  _theta      with the base parameters theta_b given at run time (_theta_batch: one theta_b for all rows)",
         "forward_dynamics returns 0, or 1 + the joint whose pivot is not positive, or (batch) 1 + the first",
         "row that has one; the accelerations of such a state are NaN.",
     ]

@@ -11,7 +11,7 @@ from psdmc.emit.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, protot
 from psdmc.emit.store_groups import GROUP
 from psdmc.errors import InternalError
 from psdmc.program.cost import Cost, cost
-from psdmc.program.functions import FUNCTIONS, Function
+from psdmc.program.functions import BY_NAME, FUNCTIONS, Function
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Program
 
@@ -116,6 +116,10 @@ class FunctionView:
     @property
     def has_pivots(self) -> bool:
         return any(kernel.pivot_order for kernel in self.kernels)
+
+    @property
+    def needs_parameters(self) -> bool:
+        return BY_NAME[self.name].theta
 
 
 def function_views(

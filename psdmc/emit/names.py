@@ -21,7 +21,7 @@ co_return co_yield compl concept consteval constexpr constinit const_cast declty
 explicit export false friend mutable namespace new noexcept not not_eq nullptr operator or or_eq private
 protected public reinterpret_cast requires static_assert static_cast template this thread_local throw true
 try typeid typename using virtual wchar_t xor xor_eq"""
-_OTHER = "main linux unix errno NULL NAN INFINITY"
+_OTHER = "main linux unix errno NULL NAN INFINITY std posix"
 RESERVED = frozenset(f"{_C} {_CPP} {_OTHER}".split())
 
 
@@ -38,7 +38,7 @@ def identifier(name: str) -> str:
         cleaned = f"robot_{cleaned}"
     if len(cleaned) > LONGEST:
         digest = _digest(name)
-        cleaned = f"{cleaned[: LONGEST - len(digest) - 1]}_{digest}"
+        cleaned = f"{cleaned[: LONGEST - len(digest) - 1].rstrip('_')}_{digest}"
     return cleaned
 
 
@@ -50,7 +50,7 @@ def identifiers(names: Iterable[str]) -> tuple[str, ...]:
         candidate, count = first, 1
         while candidate in taken:
             count += 1
-            candidate = f"{first[: LONGEST - 8]}_{count}"
+            candidate = f"{first[: LONGEST - 8].rstrip('_')}_{count}"
         taken[candidate] = None
     return tuple(taken)
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from psdmc.emit.cpp import CppClass, cpp_classes
 from psdmc.emit.describe import description
 from psdmc.emit.info import PackageInfo
 from psdmc.emit.kernel_view import FunctionView, function_views
@@ -102,6 +103,10 @@ class PackageView:
         return tuple(f"extern {table.declaration}" for table in self.tables)
 
     @property
+    def cpp_classes(self) -> tuple[CppClass, ...]:
+        return cpp_classes(self.functions)
+
+    @property
     def sources(self) -> tuple[str, ...]:
         """C files of the library, relative to the package."""
         return ("src/tables.c", *(f"src/{function.name}.c" for function in self.functions))
@@ -169,10 +174,11 @@ def package_files(package: PackageView) -> dict[str, str]:
 
 
 def library_files(package: PackageView) -> dict[str, str]:
-    """The C library alone: header and sources."""
+    """The library alone: headers and sources."""
     trig = {"libm": "sincos_libm.h.jinja", "inline": "sincos_inline.h.jinja"}[package.options.trig]
     named = {
         f"include/{package.robot}/{package.robot}.h": "header.h.jinja",
+        f"include/{package.robot}/{package.robot}.hpp": "header.hpp.jinja",
         "src/tables.c": "tables.c.jinja",
         "src/internal.h": "internal.h.jinja",
         "src/vectors.h": "vectors.h.jinja",

@@ -12,37 +12,61 @@ from psdmc.emit.names import c_string
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One constant array: its C declaration without `extern`, and its entries as C text."""
+    """One constant array in C and, as a constexpr member, in C++.
 
+    name          without the robot's prefix
+    declaration   in C, without `extern`
+    entries       as C text
+    cpp_type      element and length in C++: 'Real, dof'
+    cpp_entries   as C++ text
+    """
+
+    name: str
     declaration: str
     entries: tuple[str, ...]
+    cpp_type: str
+    cpp_entries: tuple[str, ...]
 
 
 def tables(info: PackageInfo, robot: str, real: str) -> tuple[Table, ...]:
     """All tables of a package, in the header's order."""
+    lengths = {"dof": f"{robot}_DOF", "base_parameters": f"{robot}_BASE_PARAMETERS", "3": "3"}
 
-    def numbers(name: str, size: str, values: Iterable[float | None]) -> Table:
-        entries = tuple(number(value, real) for value in values)
-        return Table(f"const {real} {robot}_{name}[{size}]", entries)
+    def numbers(name: str, length: str, values: Iterable[float | None]) -> Table:
+        kept = tuple(values)
+        entries = tuple(number(value, real) for value in kept)
+        cpp_entries = tuple(_cpp_number(value, real) for value in kept)
+        declaration = f"const {real} {robot}_{name}[{lengths[length]}]"
+        return Table(name, declaration, entries, f"Real, {length}", cpp_entries)
 
-    def texts(name: str, size: str, values: Iterable[str]) -> Table:
-        return Table(f"const char *const {robot}_{name}[{size}]", tuple(map(c_string, values)))
+    def texts(name: str, length: str, values: Iterable[str]) -> Table:
+        entries = tuple(map(c_string, values))
+        declaration = f"const char *const {robot}_{name}[{lengths[length]}]"
+        return Table(name, declaration, entries, f"const char *, {length}", entries)
 
     joints, parameters = info.joints, info.parameters
-    dof, count = f"{robot}_DOF", f"{robot}_BASE_PARAMETERS"
     return (
-        texts("joint_names", dof, (joint.name for joint in joints)),
-        texts("joint_units", dof, (joint.unit for joint in joints)),
-        numbers("position_lower", dof, (joint.lower for joint in joints)),
-        numbers("position_upper", dof, (joint.upper for joint in joints)),
-        numbers("speed_limit", dof, (joint.speed for joint in joints)),
-        numbers("acceleration_limit", dof, (joint.acceleration for joint in joints)),
-        numbers("effort_limit", dof, (joint.effort for joint in joints)),
+        texts("joint_names", "dof", (joint.name for joint in joints)),
+        texts("joint_units", "dof", (joint.unit for joint in joints)),
+        numbers("position_lower", "dof", (joint.lower for joint in joints)),
+        numbers("position_upper", "dof", (joint.upper for joint in joints)),
+        numbers("speed_limit", "dof", (joint.speed for joint in joints)),
+        numbers("acceleration_limit", "dof", (joint.acceleration for joint in joints)),
+        numbers("effort_limit", "dof", (joint.effort for joint in joints)),
         numbers("gravity_acceleration", "3", info.gravity),
-        numbers("theta_b", count, (parameter.value for parameter in parameters)),
-        texts("base_parameter_equations", count, (parameter.equation for parameter in parameters)),
-        texts("base_parameter_units", count, (parameter.unit for parameter in parameters)),
+        numbers("theta_b", "base_parameters", (parameter.value for parameter in parameters)),
+        texts("base_parameter_equations", "base_parameters", (p.equation for p in parameters)),
+        texts("base_parameter_units", "base_parameters", (p.unit for p in parameters)),
     )
+
+
+def _cpp_number(value: float | None, real: str) -> str:
+    """A real constant in C++, where C's macros would be old-style casts."""
+    if value is None or math.isnan(value):
+        return "std::numeric_limits<Real>::quiet_NaN()"
+    if math.isinf(value):
+        return f"{'-' if value < 0 else ''}std::numeric_limits<Real>::infinity()"
+    return number(value, real)
 
 
 def number(value: float | None, real: str) -> str:

@@ -98,3 +98,12 @@ def test_a_compiler_agrees(tmp_path: object) -> None:
     ]
     done = subprocess.run(["gcc", *flags], input=source, text=True, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_robot_called_std_gets_a_namespace_of_its_own() -> None:
+    """The C++ header puts its classes into a namespace of the robot's name."""
+    assert identifier("std") == "robot_std"
+
+
+def test_a_long_name_is_not_cut_at_an_underscore() -> None:
+    assert "__" not in identifier(f"{'0' * 47}:0000000000")

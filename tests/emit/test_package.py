@@ -25,6 +25,7 @@ ONE = np.array([[0.5]])
 REFERENCES = References(ONE, ONE, ONE, ONE)
 SHOWN = (
     "include/pendulum/pendulum.h",
+    "include/pendulum/pendulum.hpp",
     "src/inverse_dynamics.c",
     "src/inverse_dynamics.inc",
     "src/inverse_dynamics_theta.inc",

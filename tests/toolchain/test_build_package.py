@@ -163,6 +163,7 @@ def test_make_install_gives_the_same_layout(tmp_path: Path) -> None:
     found = sorted(str(path.relative_to(prefix)) for path in prefix.rglob("*") if path.is_file())
     assert found == [
         "include/test_arm/test_arm.h",
+        "include/test_arm/test_arm.hpp",
         "lib/libtest_arm.a",
         "lib/libtest_arm.so",
         "lib/pkgconfig/test_arm.pc",
