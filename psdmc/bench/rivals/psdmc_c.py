@@ -86,7 +86,7 @@ def compiled(package: PackageView, flags: tuple[str, ...]) -> Path:
     files = library_files(package)
     robot = package.robot
     home = _library(files, package.sources, robot, flags)
-    header = next(path for path in files if path.startswith("include/"))
+    header = next(path for path in files if path.startswith("include/") and path.endswith(".h"))
     sources = {"loops.hpp": source("loops.hpp"), "glue.cpp": glue(package), "library.h": files[header]}
     command = [cxx(), "-std=c++17", *flags, "-shared", "-I.", "glue.cpp", str(home / "library.so")]
     return built("contestant.so", [*command, "-o", "contestant.so"], sources)
