@@ -15,6 +15,7 @@ from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.table import as_text
 from psdmc.bench.threads import ThreadTime
 from psdmc.errors import InputError
+from psdmc.report.bench_markdown import markdown
 from psdmc.report.bench_page import page, write_page
 
 BROWSER = next((path for name in ("chromium", "chromium-browser") if (path := shutil.which(name))), None)
@@ -57,6 +58,13 @@ def result() -> BenchResult:
 
 def test_json_gives_the_same_result_back(result):
     assert BenchResult.from_json(result.to_json()) == result
+
+
+def test_the_headline_table_gives_times_ratios_and_the_command(result):
+    lines = markdown(result, "make bench").splitlines()
+
+    assert lines[2].startswith("| Denso | 50.0 (12.0× / –) | 50.0 (20.0× / –) | – |")
+    assert lines[-1].endswith("`make bench`.")
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"schema": 1}', '{"schema": 99}'])

@@ -9,7 +9,7 @@ BODIES = {
     # What inverse dynamics of the two-link arm would be if it were this simple.
     "sums": "for (int j = 0; j < 2; ++j) out[j] = q[j] + 10.0 * qd[j] + 100.0 * x[j];",
     "few": 'asm volatile(".rept 10\\n nop\\n .endr"); out[0] = q[0];',
-    "many": 'asm volatile(".rept 110\\n nop\\n .endr"); out[0] = q[0];',
+    "many": 'asm volatile(".rept 1010\\n nop\\n .endr"); out[0] = q[0];',
 }
 
 BATCH_BODY = (
