@@ -1,7 +1,7 @@
 """What each choice of the factored lowering, and each pass, saves: the tables of docs/factored.md and docs/passes.md.
 
 python docs/effects.py choices [ROBOT ...]    mul + add of inverse dynamics, choice by choice
-python docs/effects.py passes [ROBOT ...]     mul + add per function with all passes, and with one left out
+python docs/effects.py passes [ROBOT ...]     operations per function with all passes, and with one left out
 python docs/effects.py orders [ROBOT ...]     longest dependency chain and values alive, with and without the last passes
 
 ROBOT is one of `psdmc.bench.cases` (KR6, LBR7, Denso, UR5, Panda, "generic 6R" ...): its geometry standing on the floor,
@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from unittest.mock import patch
 
 from psdmc.bench.cases import standard_chains
 from psdmc.derive.derive import derive_model
@@ -21,8 +22,8 @@ from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, joint_frame_map
-from psdmc.lower.expanded import lower_expanded
-from psdmc.lower.factored import Arrangement, trace_dynamics
+from psdmc.lower import expanded
+from psdmc.lower.factored import Arrangement, trace_dynamics, trace_regressor
 from psdmc.lower.reframe import reframe
 from psdmc.lower.search import SINGLE, Search, all_feet
 from psdmc.model.dynamics_model import DynamicsModel
@@ -35,7 +36,7 @@ from psdmc.program.trace import Tracer
 from psdmc.robot.chain import Chain
 
 TEN = slice(0, 10)
-Row = tuple[str, Sequence[int]]
+Row = tuple[str, Sequence[int | str]]
 
 
 def model_of(robot: str) -> DynamicsModel:
@@ -43,6 +44,7 @@ def model_of(robot: str) -> DynamicsModel:
 
 
 def operations(program: Program) -> int:
+    """mul + add after all passes."""
     return cost(optimize(program)).total
 
 
@@ -99,29 +101,38 @@ def _traced(frames, bodies, base) -> Program:  # type: ignore[no-untyped-def]
     return tracer.finish([(Slot("tau", i), value) for i, value in enumerate(tau)])
 
 
-FUNCTIONS = ("inverse_dynamics", "forward_dynamics", "mass_matrix")
-EXPANDED_LIMIT = 3000
-"""The expanded lowering is shown up to this many functions; beyond, it takes minutes."""
+EXPANDED_LIMIT = 7000
+"""The expanded lowering of inverse dynamics is shown up to this many functions; beyond, it takes minutes."""
 
 
 def programs_of(robot: str) -> dict[str, Program]:
-    """Programs as lowering leaves them, before any pass."""
+    """Programs as lowering makes them, before any pass."""
     model = derive_model(standard_chains()[robot]())
+    assert model.theta_b is not None
     search = Search(model.chain, model.representative, model.theta_b)
     found = search.best("inverse_dynamics", SINGLE)
-    assert model.theta_b is not None
-    programs = {name: trace_dynamics(name, found, model.theta_b) for name in FUNCTIONS}
+    programs = {
+        "inverse": trace_dynamics("inverse_dynamics", found, model.theta_b),
+        "with theta": trace_dynamics("inverse_dynamics", found, None),
+        "forward": trace_dynamics("forward_dynamics", found, model.theta_b),
+        "mass": trace_dynamics("mass_matrix", found, model.theta_b),
+        "regressor": trace_regressor("regressor", found.reframed, model.representative),
+    }
     if model.p is not None and model.p <= EXPANDED_LIMIT:
-        programs["inverse_dynamics, expanded"] = lower_expanded(model, "inverse_dynamics", False)
+        with patch.object(expanded, "optimize", lambda program: program):
+            programs["expanded"] = expanded.lower_expanded(model, "inverse_dynamics", False)
     return programs
 
 
 def passes(robot: str) -> Iterator[Row]:
-    programs = list(programs_of(robot).values())
-    yield "as lowered", [cost(program).total for program in programs]
-    yield "all passes", [operations(program) for program in programs]
+    """Operations of all kinds: what the pipeline minimizes."""
+    found = programs_of(robot)
+    programs = list(found.values())
+    yield "", list(found)
+    yield "as lowered", [_weight(program) for program in programs]
+    yield "all passes", [_weight(optimize(program)) for program in programs]
     for left_out in dict.fromkeys((*ROUND, *LAST_FOR_ONE_STATE)):
-        kept = [cost(optimized_without((left_out,), program)).total for program in programs]
+        kept = [_weight(optimized_without((left_out,), program)) for program in programs]
         yield f"without {left_out.__name__}", kept
 
 
@@ -149,7 +160,7 @@ def _weight(program: Program) -> int:
 def orders(robot: str) -> Iterator[Row]:
     """Cycles of the longest dependency chain (latencies as in fuse_sums, sines apart), and values alive per
     instruction, of one state's inverse dynamics."""
-    program = programs_of(robot)["inverse_dynamics"]
+    program = programs_of(robot)["inverse"]
     variants = {
         "neither fuse_sums nor schedule": optimized_without((fuse_sums, schedule), program),
         "fuse_sums": optimized_without((schedule,), program),
@@ -191,7 +202,7 @@ def main() -> None:
     for robot in options.robots:
         print(robot)
         for label, figures in TABLES[options.table](robot):
-            print(f"  {label:<44}" + "".join(f"{figure:>8}" for figure in figures))
+            print(f"  {label:<44}" + "".join(f"{figure:>11}" for figure in figures))
 
 
 if __name__ == "__main__":

@@ -39,7 +39,8 @@ def blocks(document: Path) -> Iterator[Block]:
 
 
 def run(document: Path, folder: Path) -> int:
-    """Run a document's blocks in order in `folder`, one Python session for all; returns how many ran."""
+    """Run a document's blocks in order in `folder`, where `examples` is at hand, one Python session for all."""
+    (folder / "examples").symlink_to(ROOT / "examples")
     session: dict[str, object] = {"__name__": "__document__"}
     ran = 0
     for block in blocks(document):
