@@ -27,7 +27,7 @@ def record() -> Calibration:
         joint_names=("a",),
         model=None,  # type: ignore[arg-type]
         parameters=(
-            ParameterRow("theta_1", "gravity", 7.4174, 0.01, "kg", "m1 + mx1/a1", True),
+            ParameterRow("theta_1", "gravity", 7.4174, 0.01, "kg", "m1 + mx1/a1 <i>", True),
             ParameterRow("theta_2", "inertial", 0.0, float("inf"), "kg m^2", "Izz1", False),
         ),
         motors=(NumberRow("a", "torque_constant", 36.1, 0.02, "Nm/A"),),
@@ -41,7 +41,15 @@ def record() -> Calibration:
 def test_it_shows_every_number(record: Calibration):
     page = report_html(record)
 
-    for text in ("7.4174", "m1 + mx1/a1", "0.9876", "not identifiable", "36.1 ± 0.02", "not seen", "3, 0.5"):
+    for text in (
+        "7.4174",
+        "m1 + mx1/a1 &lt;i&gt;",
+        "0.9876",
+        "not identifiable",
+        "36.1 ± 0.02",
+        "not seen",
+        "3, 0.5",
+    ):
         assert text in page
 
 
@@ -54,10 +62,12 @@ def test_it_loads_nothing_from_outside(record: Calibration):
 
 
 def test_names_are_escaped(record: Calibration):
-    page = report_html(record)
+    page = report_html(replace(record, joint_names=("j<i>",)))
 
     assert "arm &lt;7&gt;" in page
     assert "<script>alert" not in page
+    assert "j&lt;i&gt;" in page
+    assert "j<i>" not in page
 
 
 def test_the_same_record_gives_the_same_bytes(record: Calibration):
