@@ -11,9 +11,9 @@ from typing import Any
 from psdmc.bench.build import COUNTED
 from psdmc.bench.callgrind import instructions
 from psdmc.bench.case import Case
-from psdmc.bench.contestant import Contestant
 from psdmc.bench.rivals import psdmc_c
 from psdmc.errors import InputError, ToolchainError
+from psdmc.program.cost import cost
 from psdmc.toolchain.compiler_command import find_compiler
 
 SCHEMA = 1
@@ -48,31 +48,45 @@ class Baseline:
             ) from None
 
 
-def count(cases: Sequence[Case], progress: Callable[[str], None] = lambda message: None) -> Baseline:
+def count(
+    cases: Sequence[Case],
+    progress: Callable[[str], None] = lambda message: None,
+    with_instructions: bool = True,
+) -> Baseline:
     """Operations of every function and instructions per state, for each case, factored.
 
-    Instructions are left out, with the reason, where valgrind is missing.
+    Instructions are left out, with the reason, where they are not wanted or valgrind is missing.
     """
     counts: Counts = {}
-    without: str | None = None
+    without = None if with_instructions else "not asked for"
     for case in cases:
         progress(f"{case.name}: counting")
-        contestants = psdmc_c.factored(case, COUNTED)
-        counts[case.name] = _operations(contestants)
-        try:
-            for (_, symbol), value in instructions(contestants, case.chain).items():
-                one = next(c for c in contestants if c.symbol == symbol)
-                counts[case.name][one.function][f"instructions {one.layout}"] = round(value, 2)
-        except ToolchainError as error:
-            without = error.message
+        counts[case.name] = operations(case)
+        if with_instructions:
+            try:
+                _add_instructions(counts[case.name], case)
+            except ToolchainError as error:
+                without = error.message
     return Baseline(find_compiler().version.splitlines()[0], counts, without)
 
 
-def _operations(contestants: Sequence[Contestant]) -> dict[str, dict[str, float]]:
+def operations(case: Case) -> dict[str, dict[str, float]]:
+    """Multiplications and additions (with subtractions and divisions) of each function's PROGRAMs."""
     table: dict[str, dict[str, float]] = {}
-    for one in contestants:
-        row = table.setdefault(one.function, {})
-        if one.operations and one.layout != "lanes":
-            kind = "" if one.layout == "state" else "batch "
-            row[f"{kind}mul"], row[f"{kind}add"] = one.operations
+    for name, kernel in psdmc_c.kernels_of(case.model, "factored", psdmc_c.FUNCTIONS).items():
+        single, batch = cost(kernel.single), cost(kernel.batch)
+        table[name] = {
+            "mul": single.mul,
+            "add": single.add + single.div,
+            "batch mul": batch.mul,
+            "batch add": batch.add + batch.div,
+        }
     return table
+
+
+def _add_instructions(table: dict[str, dict[str, float]], case: Case) -> None:
+    contestants = psdmc_c.factored(case, COUNTED)
+    found = instructions(contestants, case.chain)
+    for one in contestants:
+        value = found[str(one.library), one.symbol]
+        table[one.function][f"instructions {one.layout}"] = round(value, 2)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import json
+import shutil
 from dataclasses import replace
 
 import pytest
 
-from psdmc.bench import counts as counting
+from psdmc.bench.case import Case
+from psdmc.bench.cases import EXAMPLES, standard_chains
 from psdmc.bench.counts import Baseline, count
-from psdmc.bench.gate import compare
+from psdmc.bench.gate import BASELINE, compare
 from psdmc.bench.rivals import psdmc_c
+from psdmc.derive.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.program.program import Instr, Op, Program
 
@@ -99,23 +101,47 @@ def with_one_more_multiplication(program: Program) -> Program:
 
 
 def test_an_extra_multiplication_in_the_code_fails_the_gate(two_link, monkeypatch):
-    monkeypatch.setattr(counting, "instructions", lambda contestants, chain: {})
-    before = count([two_link])
+    before = count([two_link], with_instructions=False)
     kernels = psdmc_c.kernels_of(two_link.model, "factored", psdmc_c.FUNCTIONS)
     worse = {n: replace(k, single=with_one_more_multiplication(k.single)) for n, k in kernels.items()}
     monkeypatch.setattr(psdmc_c, "kernels_of", lambda *given: worse)
 
-    text, passed = compare(before, count([two_link]))
+    text, passed = compare(before, count([two_link], with_instructions=False))
 
     assert not passed
     assert "two-link inverse_dynamics: mul" in text
 
 
-def test_baseline_file_is_committed_and_names_every_standard_robot():
-    from psdmc.bench.cases import EXAMPLES, standard_chains
+def committed() -> Baseline:
+    return Baseline.read(EXAMPLES.parents[1] / BASELINE)
 
-    path = EXAMPLES.parents[1] / "benchmarks" / "baseline.json"
-    content = json.loads(path.read_text())
 
-    assert list(content["counts"]) == list(standard_chains())
-    assert all(len(functions) == len(psdmc_c.FUNCTIONS) for functions in content["counts"].values())
+def case_of(name: str) -> Case:
+    """Lowered the same with or without E and P, and derived sooner without."""
+    return Case(name, derive_model(standard_chains()[name](), expand=False))
+
+
+def test_the_committed_baseline_names_every_standard_robot_and_function():
+    counts = committed().counts
+
+    assert list(counts) == list(standard_chains())
+    assert all(tuple(functions) == psdmc_c.FUNCTIONS for functions in counts.values())
+
+
+LONG_TO_LOWER = ("generic 6R", "generic 7R")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG_TO_LOWER)) for n in standard_chains()]
+)
+def test_no_operation_more_than_the_committed_baseline(name):
+    text, passed = compare(committed(), count([case_of(name)], with_instructions=False))
+
+    assert passed, text
+
+
+@pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
+def test_no_instruction_more_than_the_committed_baseline():
+    text, passed = compare(committed(), count([case_of("KR6")]))
+
+    assert passed, text
