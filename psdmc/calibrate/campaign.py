@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from psdmc.calibrate.excite import Excitation, ExciteOptions, excite
+from psdmc.calibrate.excite import Excitation, ExciteOptions, excite, require_limits
 from psdmc.calibrate.excite_poses import motor_poses
 from psdmc.calibrate.four_steps import Runs
 from psdmc.calibrate.gravity import gravity_split
@@ -30,7 +30,7 @@ from psdmc.calibrate.sweeps import (
     single_joint_sweep,
     swept_range,
 )
-from psdmc.calibrate.trajectory import Trajectory, write_trajectory
+from psdmc.calibrate.trajectory import Trajectory, sliding_joints, write_trajectory
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 
@@ -47,6 +47,7 @@ class CampaignOptions:
     load          kg and centre of mass (m, tip frame) of the motor step's mass; beside the last axis, so that it is felt
     gravity_runs  sweeps through the workspace, each there and back
     repeats       periods of the exciting motion
+    acceleration  rad/s^2 (m/s^2), for joints whose file gives no limit, as no URDF does; None: refuse them
     table         format of trajectories and logs: csv, npz or parquet
     """
 
@@ -56,6 +57,7 @@ class CampaignOptions:
     load: Load = field(default_factory=lambda: Load(3.5, (0.08, 0.0, 0.06)))
     gravity_runs: int = 2
     repeats: int = 6
+    acceleration: float | None = None
     table: str = "csv"
 
 
@@ -74,6 +76,7 @@ def plan_campaign(
     chain: Chain, model: Regressor, l: int, options: CampaignOptions, progress: Progress = lambda step: None
 ) -> tuple[tuple[PlannedRun, ...], Excitation]:
     """All runs of the four steps, and the exciting motion's search. Collisions are not looked at."""
+    chain = bounded(chain, options.acceleration)
     runs: list[PlannedRun] = []
     progress("motor sweeps")
     poses = motor_poses(chain, options.load.mass, options.load.com)
@@ -96,10 +99,43 @@ def plan_campaign(
     if wanted.columns is None:
         inertial = tuple(int(k) for k in gravity_split(chain, model, l).rest)
         wanted = replace(wanted, columns=inertial)
-    found = excite(chain, model, wanted)
+    found = excite(chain, model, wanted, _spoken(progress))
     motion = found.motion.sampled(chain.joint_names, options.sweep.period, options.repeats)
+    motion = replace(motion, sliding=sliding_joints(chain))
     runs.append(PlannedRun("inertial", "inertial", motion))
     return tuple(runs), found
+
+
+def bounded(chain: Chain, acceleration: float | None) -> Chain:
+    """The chain with limits where its file has none: a half turn either way for joints that turn freely, and the
+    acceleration that was given. InputError where a limit is still missing."""
+    joints = []
+    for joint in chain.joints:
+        limits = joint.limits
+        if joint.kind == "revolute" and not np.isfinite([limits.lower, limits.upper]).any():
+            limits = replace(limits, lower=-np.pi, upper=np.pi)
+        if not np.isfinite(limits.acceleration) and acceleration is not None:
+            limits = replace(limits, acceleration=acceleration)
+        joints.append(replace(joint, limits=limits))
+    require_limits(joints)
+    return replace(chain, joints=tuple(joints))
+
+
+def _spoken(progress: Progress) -> Callable[[float, float], None]:
+    """The search's progress, every few seconds."""
+    said = 0.0
+
+    def say(seconds: float, condition: float) -> None:
+        nonlocal said
+        if seconds - said >= SPOKEN_EVERY:
+            said = seconds
+            progress(f"exciting motion: condition {condition:.2f} after {seconds:.0f} s")
+
+    return say
+
+
+SPOKEN_EVERY = 5.0
+"""s between two words on the search."""
 
 
 def write_campaign(folder: str | Path, runs: Sequence[PlannedRun], found: Excitation, table: str) -> Path:

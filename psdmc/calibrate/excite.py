@@ -1,12 +1,13 @@
 """Exciting trajectories: sums of sines per joint (22), optimised for the regressor's condition (23), limits kept.
 
-A candidate is scaled until it touches a limit, so that every candidate is feasible and the search needs no constraints.
+A candidate is scaled to a share of what its limits allow, so that every candidate is feasible and the search needs no
+constraints.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,7 +18,7 @@ from psdmc.calibrate.log import Array
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.trajectory import Trajectory
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.chain import Chain, Joint
 
 STEP = 0.5
 """First step of CMA-ES, in standard deviations of a random start's weights."""
@@ -141,6 +142,26 @@ def excite(
     return Excitation(motion, condition, conditions, np.array(history), evaluations, spent)
 
 
+def require_limits(joints: Sequence[Joint]) -> None:
+    """InputError names the joints that have no limits to move within, and which."""
+    lacking = []
+    for joint in joints:
+        limits = joint.limits
+        named = {
+            "position": limits.upper - limits.lower,
+            "speed": limits.speed,
+            "acceleration": limits.acceleration,
+        }
+        missing = [what for what, value in named.items() if not np.isfinite(value)]
+        if missing:
+            lacking.append(f"{joint.name} ({', '.join(missing)})")
+    if lacking:
+        raise InputError(
+            f"joint(s) without limits to move within: {', '.join(lacking)}",
+            "add them to the robot file; an acceleration for all such joints can be given with --acceleration",
+        )
+
+
 def _search(
     judge: _Judge, starts: Array, options: ExciteOptions, begin: float, progress: Progress | None
 ) -> tuple[Array, list[tuple[float, float]], int]:
@@ -178,16 +199,9 @@ class _Space:
     """Candidates, as vectors: per joint sine and cosine weights and where the motion sits within the range."""
 
     def __init__(self, chain: Chain, options: ExciteOptions) -> None:
+        require_limits(chain.joints)
         limits = [joint.limits for joint in chain.joints]
         bounds = np.array([(x.lower, x.upper, x.speed, x.acceleration) for x in limits])
-        unbounded = [
-            joint.name for joint, row in zip(chain.joints, bounds, strict=True) if not np.isfinite(row).all()
-        ]
-        if unbounded:
-            raise InputError(
-                f"joint(s) {', '.join(unbounded)}: position, speed and acceleration limits are needed to excite within them",
-                "add them to the robot file, or pass them as options",
-            )
         self.options = options
         self.n, self.h = len(chain), len(options.harmonics)
         self.size = self.n * (2 * self.h + 2)

@@ -28,6 +28,7 @@ class Log:
     effort       (N, n)  A, N m or N, as `quantity` says; motor torque counts positive in the joint's positive sense
     quantity     current: of the motor; motor_torque: with friction; joint_torque: without
     notes        what reading it assumed
+    sliding      names of joints whose position is in m
     """
 
     name: str
@@ -38,6 +39,7 @@ class Log:
     effort: Array
     quantity: Quantity
     notes: tuple[str, ...] = ()
+    sliding: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joint_names", tuple(self.joint_names))

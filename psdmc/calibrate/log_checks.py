@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,16 +56,7 @@ def checked(log: Log, chain: Chain, cutoff: float, options: CheckOptions | None 
     if faults:
         raise InputError("; ".join(f"{log.name}: {fault}" for fault in faults), _hint(faults))
     notes = [text for check in _REMARKS for text in check(log, chain, cutoff, options)]
-    return Log(
-        log.name,
-        log.joint_names,
-        log.time,
-        log.position,
-        log.velocity,
-        log.effort,
-        log.quantity,
-        (*log.notes, *(f"{log.name}: {note}" for note in notes)),
-    )
+    return replace(log, notes=(*log.notes, *(f"{log.name}: {note}" for note in notes)))
 
 
 def still_joints(log: Log, options: CheckOptions | None = None) -> tuple[bool, ...]:

@@ -31,11 +31,12 @@ EFFORTS: tuple[tuple[str, Quantity], ...] = (
 POSITIONS = ("position_rad", "position_m")
 VELOCITIES = ("velocity_rad_s", "velocity_m_s")
 
-_COLUMN_OF: dict[Quantity, str] = {
-    "current": "current_a",
-    "motor_torque": "motor_torque_nm",
-    "joint_torque": "joint_torque_nm",
+_EFFORT_COLUMNS: dict[Quantity, tuple[str, str]] = {
+    "current": ("current_a", "current_a"),
+    "motor_torque": ("motor_torque_nm", "motor_torque_n"),
+    "joint_torque": ("joint_torque_nm", "joint_torque_n"),
 }
+"""For turning and for sliding joints."""
 
 
 def read_log(path: str | Path) -> Log:
@@ -73,6 +74,7 @@ def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
         effort=np.column_stack([columns[column] for column in effort_names]),
         quantity=quantity,
         notes=notes,
+        sliding=tuple(joint for joint, column in joints.items() if column.startswith("position_m.")),
     )
 
 
@@ -115,15 +117,18 @@ def _efforts(
 
 
 def columns_of(log: Log) -> dict[str, Array]:
-    """Named columns, as files hold them (turning joints' units)."""
+    """Named columns, as files hold them."""
+    metres = [joint in log.sliding for joint in log.joint_names]
     columns: dict[str, Array] = {"time_s": log.time}
-    for k, joint in enumerate(log.joint_names):
-        columns[f"position_rad.{joint}"] = log.position[:, k]
-    for k, joint in enumerate(log.joint_names):
-        if log.velocity is not None:
-            columns[f"velocity_rad_s.{joint}"] = log.velocity[:, k]
-    for k, joint in enumerate(log.joint_names):
-        columns[f"{_COLUMN_OF[log.quantity]}.{joint}"] = log.effort[:, k]
+    parts = (
+        (POSITIONS, log.position),
+        (VELOCITIES, log.velocity),
+        (_EFFORT_COLUMNS[log.quantity], log.effort),
+    )
+    for (turning, sliding), values in parts:
+        for k, joint in enumerate(log.joint_names):
+            if values is not None:
+                columns[f"{sliding if metres[k] else turning}.{joint}"] = values[:, k]
     return columns
 
 

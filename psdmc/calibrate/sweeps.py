@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibrate.log import Array
-from psdmc.calibrate.trajectory import Trajectory
+from psdmc.calibrate.trajectory import Trajectory, sliding_joints
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain, Joint
 
@@ -83,7 +83,7 @@ def single_joint_sweep(chain: Chain, joint: int, pose: Array, options: SweepOpti
     q = np.tile(np.asarray(pose, dtype=np.float64), (len(time), 1))
     qd, qdd = np.zeros_like(q), np.zeros_like(q)
     q[:, joint], qd[:, joint], qdd[:, joint] = _run(pieces, low, time)
-    return Trajectory(chain.joint_names, time, q, qd, qdd)
+    return Trajectory(chain.joint_names, time, q, qd, qdd, sliding_joints(chain))
 
 
 def gravity_sweep(chain: Chain, seed: int, options: SweepOptions) -> Trajectory:
@@ -108,6 +108,7 @@ def gravity_sweep(chain: Chain, seed: int, options: SweepOptions) -> Trajectory:
         np.vstack([q, q[-2::-1]]),
         np.vstack([qd, -qd[-2::-1]]),
         np.vstack([qdd, qdd[-2::-1]]),
+        sliding_joints(chain),
     )
 
 
@@ -125,7 +126,7 @@ def sine_series(chain: Chain, joint: int, pose: Array, options: SineOptions) -> 
     qd, qdd = np.zeros_like(q), np.zeros_like(q)
     q[:, joint] += moved
     qd[:, joint], qdd[:, joint] = rate, acceleration
-    return Trajectory(chain.joint_names, time, q, qd, qdd)
+    return Trajectory(chain.joint_names, time, q, qd, qdd, sliding_joints(chain))
 
 
 def sine_plan(joint: Joint, centre: float, options: SineOptions) -> list[tuple[float, float]]:

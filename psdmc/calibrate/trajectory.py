@@ -13,7 +13,8 @@ from psdmc.calibrate.log_files import read_columns, write_columns
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 
-_PREFIXES = ("position_rad", "velocity_rad_s", "acceleration_rad_s2")
+_TURNING = ("position_rad", "velocity_rad_s", "acceleration_rad_s2")
+_SLIDING = ("position_m", "velocity_m_s", "acceleration_m_s2")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,6 +23,7 @@ class Trajectory:
 
     time        (N,)    s, from zero
     q, qd, qdd  (N, n)  rad, rad/s, rad/s^2 (m for sliding joints)
+    sliding     names of joints whose position is in m
     """
 
     joint_names: tuple[str, ...]
@@ -29,6 +31,7 @@ class Trajectory:
     q: Array
     qd: Array
     qdd: Array
+    sliding: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         shape = (len(self.time), len(self.joint_names))
@@ -48,10 +51,14 @@ class Trajectory:
 def write_trajectory(trajectory: Trajectory, path: str | Path) -> None:
     """Write time_s and, per joint, position, velocity and acceleration as .csv, .parquet or .npz."""
     columns = {"time_s": trajectory.time}
-    for prefix, values in zip(_PREFIXES, (trajectory.q, trajectory.qd, trajectory.qdd), strict=True):
+    for part, values in enumerate((trajectory.q, trajectory.qd, trajectory.qdd)):
         for k, name in enumerate(trajectory.joint_names):
-            columns[f"{prefix}.{name}"] = values[:, k]
+            columns[_column(part, name, trajectory.sliding)] = values[:, k]
     write_columns(columns, Path(path))
+
+
+def _column(part: int, name: str, sliding: Sequence[str]) -> str:
+    return f"{(_SLIDING if name in sliding else _TURNING)[part]}.{name}"
 
 
 def read_trajectory(path: str | Path) -> Trajectory:
@@ -60,16 +67,24 @@ def read_trajectory(path: str | Path) -> Trajectory:
     if not path.exists():
         raise InputError(f"{path}: no such file")
     columns = read_columns(path)
-    names = tuple(column.partition(".")[2] for column in columns if column.startswith(f"{_PREFIXES[0]}."))
-    wanted = ["time_s", *(f"{prefix}.{name}" for prefix in _PREFIXES for name in names)]
-    missing = [column for column in wanted if column not in columns]
+    split = [column.partition(".") for column in columns]
+    names = tuple(name for prefix, _, name in split if prefix in (_TURNING[0], _SLIDING[0]))
+    sliding = tuple(name for prefix, _, name in split if prefix == _SLIDING[0])
+    wanted = [[_column(part, name, sliding) for name in names] for part in range(3)]
+    listed = ["time_s", *(column for part in wanted for column in part)]
+    missing = [column for column in listed if column not in columns]
     if missing or not names:
         raise InputError(f"{path}: no column(s) {', '.join(missing) or 'position_rad.<joint>'}")
     steps = np.diff(columns["time_s"])
     if len(steps) < 2 or np.abs(steps - steps[0]).max() > 1e-6 * abs(steps[0]) + 1e-9:
         raise InputError(f"{path}: a trajectory needs evenly spaced times")
-    stacked = [np.column_stack([columns[f"{prefix}.{name}"] for name in names]) for prefix in _PREFIXES]
-    return Trajectory(names, columns["time_s"] - columns["time_s"][0], *stacked)
+    q, qd, qdd = (np.column_stack([columns[column] for column in part]) for part in wanted)
+    return Trajectory(names, columns["time_s"] - columns["time_s"][0], q, qd, qdd, sliding)
+
+
+def sliding_joints(chain: Chain) -> tuple[str, ...]:
+    """Names of the chain's joints that slide."""
+    return tuple(joint.name for joint in chain.joints if joint.kind == "prismatic")
 
 
 def limit_faults(trajectory: Trajectory, chain: Chain) -> list[str]:

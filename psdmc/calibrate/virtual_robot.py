@@ -201,6 +201,7 @@ def simulate(
         velocity=None,
         effort=_quantised(current, robot.sensors.current_step),
         quantity="current",
+        sliding=trajectory.sliding,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -63,6 +62,9 @@ def excite(
         bool, typer.Option("--log-det", help="maximise log det instead of the condition")
     ] = False,
     seed: Annotated[int, typer.Option(help="of the search")] = 1,
+    acceleration: Annotated[
+        float | None, typer.Option(min=0.1, help="rad/s^2, for joints whose file gives no limit (any URDF)")
+    ] = None,
 ) -> None:
     """Plan a calibration campaign: gravity sweeps, friction sines, and an exciting motion within the limits."""
     search = ExciteOptions(
@@ -73,7 +75,9 @@ def excite(
         seed=seed,
     )
     with steps() as progress:
-        found = excite_command(model, output, replace(CampaignOptions(), excite=search), progress)
+        found = excite_command(
+            model, output, CampaignOptions(excite=search, acceleration=acceleration), progress
+        )
     best = found.random_conditions[0]
     print(
         f"{output}: condition number {found.condition:.3g}, {found.gain:.2f} times below the best random {best:.3g}"

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from psdmc.calibrate.campaign import bounded
 from psdmc.calibrate.excite import ExciteOptions, excite
 from psdmc.calibrate.predictor import ChainRegressor
 from psdmc.calibrate.trajectory import limit_faults
@@ -67,8 +68,24 @@ def test_a_joint_without_limits_is_named(arm):
     chain = arm.model.chain
     free = replace(chain, joints=(replace(chain.joints[0], limits=Limits()), chain.joints[1]))
 
-    with pytest.raises(InputError, match=r"joint\(s\) shoulder: position, speed and acceleration limits"):
+    with pytest.raises(
+        InputError, match=r"limits to move within: shoulder \(position, speed, acceleration\)"
+    ):
         excite(free, arm.regressor, OPTIONS)
+
+
+def test_an_acceleration_can_be_given_for_robots_whose_file_has_none(arm):
+    chain = arm.model.chain
+    free = Limits(speed=2.0)
+    turning = replace(chain, joints=(replace(chain.joints[0], limits=free), chain.joints[1]))
+
+    found = bounded(turning, 9.0).joints
+
+    assert found[0].limits == Limits(-np.pi, np.pi, 2.0, 9.0)
+    assert found[1].limits == chain.joints[1].limits
+    with pytest.raises(InputError, match=r"shoulder \(acceleration\)") as raised:
+        bounded(turning, None)
+    assert "--acceleration" in str(raised.value.hint)
 
 
 @pytest.mark.slow

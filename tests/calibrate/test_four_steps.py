@@ -12,10 +12,14 @@ import pytest
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
 from psdmc.calibrate.campaign import listed_runs, read_campaign
 from psdmc.calibrate.four_steps import calibrate_four_steps
+from psdmc.calibrate.gravity import calibrate_gravity, gravity_split
+from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.record import Calibration
 from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibrate.steps import CalibrationOptions, GravityRun, Load
+from psdmc.calibrate.sweeps import SweepOptions, gravity_sweep
 from psdmc.calibrate.truth import compare
-from psdmc.calibrate.virtual_robot import load_virtual_robot
+from psdmc.calibrate.virtual_robot import Payload, load_virtual_robot, simulate
 from psdmc.errors import InputError
 from psdmc.model.store import load, save
 
@@ -126,6 +130,26 @@ def test_friction_that_has_no_stribeck_peak_leaves_its_velocity_unseen(arm, camp
     assert "stribeck_velocity" in warning
 
 
+def test_a_known_tool_is_taken_out_of_gravity(arm):
+    chain, options = arm.model.chain, CalibrationOptions()
+    robot = load_virtual_robot(arm.plant, ideal_sensors=True)
+    motion = gravity_sweep(chain, 1, SweepOptions(speed=0.15, seconds=16.0, range=0.8))
+    log = simulate(robot, motion, payload=Payload(2.0, (0.05, 0.02, 0.0)))
+    motors = Motors(np.array([12.0, 5.0]), np.zeros(2))
+    split = gravity_split(chain, arm.regressor, arm.model.l)
+
+    def phi(tool: Load | None) -> np.ndarray:
+        runs = [GravityRun(log, tool)]
+        found = calibrate_gravity(
+            chain, arm.regressor, split, motors, runs, options.gravity, arm.model.theta_b
+        )
+        return found.estimate.values
+
+    truth = split.phi(arm.model.theta_b)
+    assert np.abs(phi(Load(2.0, (0.05, 0.02, 0.0))) - truth).max() < 5e-2 * np.abs(truth).max()
+    assert np.abs(phi(None) - truth).max() > 0.3 * np.abs(truth).max()
+
+
 def test_logs_are_simulated_once(arm, ideal):
     folder = ideal[0]
 
@@ -143,7 +167,6 @@ def test_currents_without_a_motor_step_are_refused(arm, noisy):
 
 def test_a_load_on_the_axis_leaves_the_torque_constant_unidentifiable(arm, noisy):
     from psdmc.calibrate.motor import calibrate_motors
-    from psdmc.calibrate.steps import CalibrationOptions, Load
 
     # the loaded run's currents are the unloaded one's: as if the mass hung where the elbow cannot feel it
     run = next(run for run in read_campaign(noisy[0]).motor if run.joint == "elbow")

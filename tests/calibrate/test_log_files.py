@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from psdmc.calibrate.log import Log
-from psdmc.calibrate.log_files import log_from_columns, read_log, write_log
+from psdmc.calibrate.log_files import columns_of, log_from_columns, read_log, write_log
 from psdmc.errors import InputError
 
 COLUMNS = {
@@ -42,10 +42,19 @@ def test_effort_is_read_as_motor_torque_and_said():
     assert "motor torque" in log.notes[0]
 
 
-def test_sliding_joints_are_in_metres():
-    columns = {name.replace("position_rad.b", "position_m.b"): values for name, values in COLUMNS.items()}
+def test_sliding_joints_are_in_metres_and_newtons():
+    names = {
+        "position_rad.b": "position_m.b",
+        "current_a.a": "motor_torque_nm.a",
+        "current_a.b": "motor_torque_n.b",
+    }
+    columns = {names.get(name, name): values for name, values in COLUMNS.items()}
 
-    assert log_from_columns("run", columns).joint_names == ("a", "b")
+    log = log_from_columns("run", columns)
+
+    assert log.joint_names == ("a", "b")
+    assert log.sliding == ("b",)
+    assert columns_of(log).keys() == columns.keys()
 
 
 def test_joints_are_matched_by_name_and_missing_ones_are_named():

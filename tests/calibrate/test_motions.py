@@ -91,6 +91,15 @@ def test_a_trajectory_is_kept_by_its_file(arm, tmp_path: Path):
     assert np.array_equal(again.qdd, motion.qdd)
 
 
+def test_sliding_joints_are_written_in_metres(arm, tmp_path: Path):
+    motion = replace(motions(arm)[0], sliding=("elbow",))
+    write_trajectory(motion, tmp_path / "motion.npz")
+
+    with np.load(tmp_path / "motion.npz") as stored:
+        assert "velocity_m_s.elbow" in stored.files
+    assert read_trajectory(tmp_path / "motion.npz").sliding == ("elbow",)
+
+
 def test_a_trajectory_file_without_accelerations_is_refused(tmp_path: Path):
     (tmp_path / "motion.csv").write_text(
         "time_s,position_rad.a,velocity_rad_s.a\n0,0,0\n1,0,0\n2,0,0\n", encoding="utf-8"
