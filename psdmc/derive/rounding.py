@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 DIGITS = 12
 """Decimal digits of a simple number: products of two lengths given to 0.1 mm have fewer."""
 
+SIMPLE = 2e-13
+"""Relative distance of a simple number that its computation can have moved. A small coefficient may stand beside a large
+parameter: moved by the noise of larger ones, it would cost digits of the torque."""
+
 
 def merged(values: Array, noise: Array) -> Array:
     """The same numbers with those equal up to `noise` made equal in magnitude; none moves by more than its
@@ -44,4 +48,4 @@ def _simplest(sizes: Array, noise: Array) -> Array:
     # An integer below 2^53 divided by a power of ten up to 10^22 is the double nearest to that decimal.
     power = 10.0 ** np.clip(exponent, 0, 22)
     decimal = np.round(sizes * power) / power
-    return np.where(np.abs(decimal - sizes) <= noise, decimal, sizes)
+    return np.where(np.abs(decimal - sizes) <= np.minimum(noise, SIMPLE * sizes), decimal, sizes)
