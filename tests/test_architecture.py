@@ -39,7 +39,17 @@ OUTSIDE = {
     "lower": {"numpy", "scipy"},
     "emit": {"jinja2", "numpy"},
     "toolchain": {"cffi", "numpy"},
-    "bench": {"numpy", "scipy", "pinocchio", "cffi", "jinja2", "casadi", "mujoco", "cmeel", "example_robot_data"},
+    "bench": {
+        "numpy",
+        "scipy",
+        "pinocchio",
+        "cffi",
+        "jinja2",
+        "casadi",
+        "mujoco",
+        "cmeel",
+        "example_robot_data",
+    },
     "calibrate": {"numpy", "scipy", "pinocchio", "cvxpy", "cma", "rosbags", "pyarrow", "cffi", "jinja2"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
@@ -77,9 +87,13 @@ def test_imports_run_one_way(stage: str, path: Path):
                 continue
             other = rest.split(".")[0]
             allowed = MAY_IMPORT.get(stage, set()) | SHARED | {stage}
-            assert other in allowed, f"{path.relative_to(PACKAGE)} imports {name}: {stage} may not import {other}"
+            assert other in allowed, (
+                f"{path.relative_to(PACKAGE)} imports {name}: {stage} may not import {other}"
+            )
         elif head not in sys.stdlib_module_names:
-            assert head in OUTSIDE.get(stage, set()), f"{path.relative_to(PACKAGE)} imports {head}, which {stage} does not own"
+            assert head in OUTSIDE.get(stage, set()), (
+                f"{path.relative_to(PACKAGE)} imports {head}, which {stage} does not own"
+            )
 
 
 def test_every_folder_is_a_stage_of_the_table():
@@ -89,4 +103,8 @@ def test_every_folder_is_a_stage_of_the_table():
 
 def test_no_vague_module_names():
     vague = {"utils", "helpers", "common", "build", "misc"}
-    assert not [path for _, path in modules() if path.parent.name in vague or path.stem in {"utils", "helpers", "common"}]
+    assert not [
+        path
+        for _, path in modules()
+        if path.parent.name in vague or path.stem in {"utils", "helpers", "common"}
+    ]

@@ -48,9 +48,7 @@ class Placement:
         return Placement(np.eye(3), np.zeros(3))
 
     def __matmul__(self, inner: Placement) -> Placement:
-        return Placement(
-            self.rotation @ inner.rotation, self.rotation @ inner.translation + self.translation
-        )
+        return Placement(self.rotation @ inner.rotation, self.rotation @ inner.translation + self.translation)
 
     def inverse(self) -> Placement:
         return Placement(self.rotation.T, -self.rotation.T @ self.translation)
