@@ -41,8 +41,9 @@ def lower(
     lowering: Lowering = "auto",
     functions: Sequence[str] | None = None,
     progress: Callable[[str], None] = lambda message: None,
+    theta_variants: bool = True,
 ) -> dict[str, Kernel]:
-    """Kernels by name, `_theta` variants included, in the order of FUNCTIONS.
+    """Kernels by name, `_theta` variants included where wanted, in the order of FUNCTIONS.
 
     functions  names of FUNCTIONS; None takes all that the model admits: without theta_b only those that need none, and
                forward dynamics only where the mass matrix is regular for some q
@@ -52,7 +53,7 @@ def lower(
     lowered = _Lowered(model, lowering)
     kernels: dict[str, Kernel] = {}
     for name in wanted:
-        for theta in (False, True) if BY_NAME[name].theta else (False,):
+        for theta in (False, True) if BY_NAME[name].theta and theta_variants else (False,):
             if not theta and model.theta_b is None and BY_NAME[name].theta:
                 continue
             progress(name + ("_theta" if theta else ""))

@@ -59,7 +59,7 @@ def contestants(
 @lru_cache(maxsize=2)
 def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, ...]) -> dict[str, Kernel]:
     """Lowered once for all flags: searching for the cheapest arrangement takes longer than compiling."""
-    return {name: k for name, k in lower(model, lowering, functions).items() if not k.theta}
+    return lower(model, lowering, functions, theta_variants=False)
 
 
 def _ways(case: Case, rival: str, kernel: Kernel, library: Path, lanes: int) -> list[Contestant]:
