@@ -18,6 +18,9 @@ from psdmc.toolchain.compiler_command import find_compiler
 IDLE_SHARE = 0.05
 """Cores that others may keep busy while a trial counts: beyond, a shared core costs up to a factor of two."""
 
+RESOLUTION = 0.02
+"""s; /proc/stat counts in hundredths: less than two of them is no sign of anyone."""
+
 _TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 
 
@@ -58,7 +61,7 @@ def others_share() -> Callable[[], float]:
 
     def share() -> float:
         busy, own, wall = _busy_seconds(), time.process_time(), time.monotonic()
-        others = (busy - begin[0]) - (own - begin[1])
+        others = (busy - begin[0]) - (own - begin[1]) - RESOLUTION
         return max(0.0, others) / max(wall - begin[2], 1e-9) if busy else 0.0
 
     return share
