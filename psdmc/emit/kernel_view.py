@@ -49,6 +49,11 @@ class KernelView:
     lowering: str
 
     @property
+    def needs_lanes(self) -> bool:
+        """Whether anything calls the form that leaves its output lane by lane."""
+        return not self.direct or "batch_soa" in self.prototypes
+
+    @property
     def lanes(self) -> str:
         """The static function that computes one state per lane."""
         return f"{self.name}_lanes"

@@ -41,10 +41,10 @@ SHOWN = (
 def test_the_text_is_the_golden_one(path: str) -> None:
     text = package_files(pendulum(references=REFERENCES))[path]
     golden = GOLDEN / Path(path).name
-    if os.environ.get("UPDATE_GOLDEN"):
+    if os.environ.get("PSDMC_REWRITE_GOLDEN"):
         golden.parent.mkdir(parents=True, exist_ok=True)
         golden.write_text(text, encoding="utf-8")
-    assert text == golden.read_text(encoding="utf-8"), "run with UPDATE_GOLDEN=1 and review the difference"
+    assert text == golden.read_text(encoding="utf-8"), "run with PSDMC_REWRITE_GOLDEN=1 and review the difference"
 
 
 def test_text_ends_with_one_newline_and_has_no_trailing_blanks() -> None:

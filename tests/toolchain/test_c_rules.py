@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -24,8 +25,8 @@ STRICT = [
 ]
 EXTRA = ["-Wstrict-prototypes", "-Wmissing-prototypes", "-Wundef", "-Wvla"]
 COMPILERS = ["gcc", "clang"]
-NAMES = ["inverse_dynamics", "forward_dynamics", "jacobian"]
-"""One of each kind: torques with parameters, pivots, a matrix without parameters."""
+NAMES = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian"]
+"""One of each kind: torques with parameters, pivots, a matrix with and one without parameters."""
 
 
 def _need(program: str) -> None:
@@ -58,6 +59,47 @@ def test_no_warnings(compiler: str, options: tuple[str, str], flag: str, tmp_pat
     for source in package.sources:
         words = [compiler, *STRICT, *EXTRA, "-O1", flag, f"-I{tmp_path}/include", "-c"]
         _compile([*words, str(tmp_path / source), "-o", str(tmp_path / "x.o")])
+
+
+PLAIN = {
+    "gcc": ["-Dtest_arm_NO_VECTORS"],
+    "clang": ["-U__GNUC__", "-fms-compatibility", "-Wno-builtin-macro-redefined", "-Wno-literal-range"],
+}
+"""As near to MSVC as there is here. The literal range: without __GNUC__ glibc's own INFINITY is 1e10000f."""
+
+GNU_C = r"\b__(?!builtin_(?:inf|nan)f\b)\w+|#pragma|_Pragma"
+"""Names and pragmas of GCC's; INFINITY and NAN are math.h's own business."""
+
+
+@pytest.mark.parametrize("options", [("float64", "inline"), ("float32", "inline"), ("float64", "libm")])
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_without_vectors_it_is_plain_c99(compiler: str, options: tuple[str, str], tmp_path: Path) -> None:
+    """No vector extension, attribute, builtin or pragma is left for a compiler that has none of GCC's."""
+    _need(compiler)
+    package = arm_package(options=EmitOptions(*options), names=NAMES)  # type: ignore[arg-type]
+    write_sources(package, tmp_path)
+    for source in map(str, (tmp_path / source for source in package.sources)):
+        words = [compiler, *STRICT, "-pedantic-errors", *PLAIN[compiler], f"-I{tmp_path}/include"]
+        _compile([*words, "-O1", "-c", source, "-o", str(tmp_path / "x.o")])
+        if "-U__GNUC__" not in PLAIN[compiler]:
+            continue
+        words = [compiler, "-std=c99", *PLAIN[compiler], f"-I{tmp_path}/include", "-E", source]
+        text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+        own = _own_lines(text, tmp_path)
+        assert len(own) > 10
+        assert [line for line in own if re.search(GNU_C, line)] == []
+
+
+def _own_lines(preprocessed: str, folder: Path) -> list[str]:
+    """Lines that come from the package's files, by the preprocessor's line markers."""
+    own, inside = [], False
+    for line in preprocessed.splitlines():
+        marker = re.match(r'# \d+ "([^"]*)"', line)
+        if marker:
+            inside = marker[1].startswith(str(folder))
+        elif inside and line.strip():
+            own.append(line)
+    return own
 
 
 @pytest.fixture(scope="module")
