@@ -39,7 +39,7 @@ demo: $(READY) ## derive, emit, build, check and benchmark the bundled Denso VS-
 test: $(READY) ## run all tests
 	$(RUN)/python -m pytest -n $(JOBS) tests
 
-FAST := tests/test_architecture.py tests/program tests/robot
+FAST := tests/test_architecture.py tests/program tests/robot tests/dynamics tests/model
 
 check: $(READY) ## format, lint, types and the fast tests: seconds
 	$(RUN)/ruff format --check .
@@ -48,8 +48,8 @@ check: $(READY) ## format, lint, types and the fast tests: seconds
 	$(RUN)/python -m pytest -m 'not slow' $(FAST)
 
 golden: $(READY) ## rewrite the golden files; review their diff like code
-	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit
-	git --no-pager diff --stat -- tests/golden generated
+	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit tests/end_to_end/test_reference_robot.py
+	git --no-pager diff --stat -- tests/golden $(GENERATED)
 
 bench: $(READY) ## measure the standard robots against every rival, on an idle machine; page and JSON in generated/
 	$(RUN)/python -m psdmc.bench --json $(GENERATED)/bench.json
