@@ -6,12 +6,14 @@ is positive. Then the mass matrix is positive definite everywhere, and forward d
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from psdmc.calibrate.log import Array
+from psdmc.dynamics.parameters import inertia_matrix, second_moments
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK
@@ -76,12 +78,33 @@ def physically_consistent(
         c for link in range(len(model.chain)) for c in _link_constraints(cp, model, x, link, options)
     ]
     problem = cp.Problem(cp.Minimize(loss / size + options.pull * cp.sum_squares(inner)), constraints)
-    problem.solve(solver=cp.CLARABEL)
+    with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; what matters is checked below
+        warnings.simplefilter("ignore", UserWarning)
+        problem.solve(solver=cp.CLARABEL)
     if inner.value is None:
         raise InputError(f"physical consistency: clarabel found no solution ({problem.status})")
     found = np.asarray(span @ inner.value)
+    _require_physical(model, found)
     theta_b = model.B @ found
     return Physical(found, theta_b, np.concatenate([theta_b, np.asarray(free.value) / unit[l:]]))
+
+
+def _require_physical(model: DynamicsModel, x: Array) -> None:
+    """The solver's word, held against the pseudo-inertias themselves; none may be negative beyond rounding."""
+    for joint, link in zip(model.chain.joints, x.reshape(-1, PARAMETERS_PER_LINK), strict=True):
+        matrix = np.zeros((4, 4))
+        matrix[:3, :3] = second_moments(inertia_matrix(link))
+        matrix[:3, 3] = matrix[3, :3] = link[1:4]
+        matrix[3, 3] = link[0]
+        smallest = float(np.linalg.eigvalsh(matrix)[0])
+        if smallest < -ROUNDING * float(np.abs(matrix).max()):
+            raise InputError(
+                f"physical consistency: link {joint.link_name} came out with pseudo-inertia {smallest:.3g}"
+            )
+
+
+ROUNDING = 1e-9
+"""Negative eigenvalue of a pseudo-inertia, relative to its largest entry, that counts as zero."""
 
 
 def nearest_physical(

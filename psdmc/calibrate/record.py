@@ -202,7 +202,9 @@ def linear_record(
 def with_theta(record: Calibration, theta_b: Array, warnings: tuple[str, ...] = ()) -> Calibration:
     """The same calibration with other base parameters: the physically consistent ones nearest to what was found."""
     rows = tuple(replace(row, value=float(v)) for row, v in zip(record.parameters, theta_b, strict=True))
-    return _with_model(replace(record, parameters=rows, warnings=(*record.warnings, *warnings)), theta_b)
+    method = f"{record.method}, physically consistent"
+    changed = replace(record, method=method, parameters=rows, warnings=(*record.warnings, *warnings))
+    return _with_model(changed, theta_b)
 
 
 def _kept(model: DynamicsModel, theta_b: Array, identifiable: NDArray[np.bool_]) -> Array:
