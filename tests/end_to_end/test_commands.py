@@ -101,7 +101,7 @@ def test_help_names_every_command():
     done = typed("--help")
 
     assert done.returncode == 0
-    for command in ("derive", "show", "check", "emit-c", "build"):
+    for command in ("derive", "show", "check", "emit-c", "build", "bench", "excite", "simulate", "calibrate"):
         assert command in done.stdout
 
 
