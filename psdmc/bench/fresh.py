@@ -7,6 +7,7 @@ import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 
 from psdmc.derive.derive import derive_model
 from psdmc.errors import DerivationError
@@ -15,6 +16,8 @@ from psdmc.robot.chain import Chain
 
 if sys.platform != "win32":
     import resource
+
+STATUS = Path("/proc/self/status")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,5 +51,10 @@ def measured_derivation(chain: Chain) -> Derivation:
 def _peak_bytes() -> int | None:
     if sys.platform == "win32":
         return None
+    if STATUS.is_file():  # Linux carries ru_maxrss over from the parent, this not
+        kibibytes = next(
+            line.split()[1] for line in STATUS.read_text().splitlines() if line.startswith("VmHWM")
+        )
+        return 1024 * int(kibibytes)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak
