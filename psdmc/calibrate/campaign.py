@@ -19,6 +19,7 @@ from psdmc.calibrate.excite import Excitation, ExciteOptions, excite, require_li
 from psdmc.calibrate.excite_poses import motor_poses
 from psdmc.calibrate.four_steps import Runs
 from psdmc.calibrate.gravity import gravity_split
+from psdmc.calibrate.lead_in import from_rest_to_rest
 from psdmc.calibrate.log_files import read_log
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.steps import FrictionRun, GravityRun, InertialRun, Load, MotorRun
@@ -101,7 +102,7 @@ def plan_campaign(
         wanted = replace(wanted, columns=inertial)
     found = excite(chain, model, wanted, _spoken(progress))
     motion = found.motion.sampled(chain.joint_names, options.sweep.period, options.repeats)
-    motion = replace(motion, sliding=sliding_joints(chain))
+    motion = from_rest_to_rest(replace(motion, sliding=sliding_joints(chain)), chain)
     runs.append(PlannedRun("inertial", "inertial", motion))
     return tuple(runs), found
 

@@ -29,7 +29,7 @@ FILL = 3.0
 
 Objective = Literal["condition", "log_det"]
 Progress = Callable[[float, float], None]
-"""Called with seconds spent and the best condition number so far."""
+"""Called with seconds spent and the best score so far: the condition number, or minus the log determinant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ class Excitation:
 
     condition         of the column-scaled regressor along it
     random_conditions (random,) of random motions scaled to the limits, ascending
-    history           (k, 2) candidates seen and best condition so far
+    history           (k, 2) candidates seen and best score so far: the condition, or minus the log determinant
     """
 
     motion: SineSum

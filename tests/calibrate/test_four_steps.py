@@ -109,7 +109,7 @@ def test_plain_coulomb_and_viscous_friction_for_those_who_want_no_more(arm, nois
     assert 3.0 < shoulder["coulomb"].value < 4.5
     assert 2.5 < shoulder["viscous"].value < 4.0
     assert shoulder["viscous_exponent"].value == 1.0
-    assert record.steps[-1].joints["shoulder"].held_out.r2 > 0.99
+    assert record.steps[-1].joints["shoulder"].held_out.r2 > 0.97
 
 
 def test_friction_that_has_no_stribeck_peak_leaves_its_velocity_unseen(arm, campaign: Path):
