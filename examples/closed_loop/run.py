@@ -84,7 +84,7 @@ def plot(runs: dict[str, Run], joints: tuple[str, ...], file: Path) -> None:
         axis.grid(alpha=0.3)
     axes[0].legend(joints, ncols=3, fontsize="small", loc="lower right")
     axes[-1].set_xlabel("time (s)")
-    figure.savefig(file, dpi=110)
+    figure.savefig(file, dpi=75)
 
 
 def main() -> None:
