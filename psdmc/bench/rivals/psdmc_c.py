@@ -33,6 +33,10 @@ EXPANDED = ("inverse_dynamics", "forward_dynamics")
 """What PSDM-2021 and Denso-2022 published times of."""
 
 
+EXPANDED_LIMIT = 25_000
+"""Functions p up to which the expanded form is measured: beyond, lowering and compiling it takes many minutes."""
+
+
 def factored(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
     """The factored lowering, what users get."""
     return contestants(case, "factored", FUNCTIONS, flags)
@@ -42,6 +46,9 @@ def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailabl
     """The expanded lowering, PSDM-2021's form."""
     if case.model.p is None:
         return [Unavailable("psdmc expanded", "this model was derived without E and P")]
+    if case.model.p > EXPANDED_LIMIT:
+        reason = f"p = {case.model.p:,} functions: not lowered and compiled beyond {EXPANDED_LIMIT:,}, it takes too long"
+        return [Unavailable("psdmc expanded", reason)]
     return [*contestants(case, "expanded", EXPANDED, flags)]
 
 
