@@ -50,7 +50,7 @@ def calibrate(
     """Calibrate a model from a campaign (its folder or campaign.toml) or from plain logs.
 
     regressor         the compiled model where there is one; else Newton-Euler on arrays
-    torque_constants  N m/A by joint name, for plain logs that hold currents
+    torque_constants  N m/A by joint name, for plain logs that hold currents and joints that no load reaches
     InputError where a file is missing or a log cannot be used.
     """
     options = options or CalibrateOptions()
@@ -59,17 +59,26 @@ def calibrate(
     if not paths:
         raise InputError("no log to calibrate from")
     if len(paths) == 1 and (paths[0].suffix == ".toml" or (paths[0] / FILE).exists()):
-        return calibrate_campaign(model, read_campaign(paths[0]), options, regressor, progress)
+        return calibrate_campaign(
+            model, read_campaign(paths[0]), options, regressor, torque_constants, progress
+        )
     progress("reading logs")
     logs = [read_log(path) for path in paths]
     return calibrate_logs(model, logs, options, regressor, torque_constants, progress)
 
 
 def calibrate_campaign(
-    model: DynamicsModel, runs: Runs, options: CalibrateOptions, regressor: Regressor, progress: Progress
+    model: DynamicsModel,
+    runs: Runs,
+    options: CalibrateOptions,
+    regressor: Regressor,
+    torque_constants: Mapping[str, float] | None,
+    progress: Progress,
 ) -> Calibration:
     """The four steps, and the nearest physical parameters where they are wanted."""
-    found = calibrate_four_steps(model.chain, regressor, model.l, runs, options.campaign, progress)
+    found = calibrate_four_steps(
+        model.chain, regressor, model.l, runs, options.campaign, progress, torque_constants
+    )
     record = four_step_record(model, found)
     return _consistent(model, found, record, options) if options.physical else record
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,13 +54,17 @@ def calibrate_four_steps(
     runs: Runs,
     options: CalibrationOptions | None = None,
     progress: Progress | None = None,
+    torque_constants: Mapping[str, float] | None = None,
 ) -> FourSteps:
-    """Torque constants, gravity, friction, inertia; gravity to inertia as often as the options say."""
+    """Torque constants, gravity, friction, inertia; gravity to inertia as often as the options say.
+
+    torque_constants  N m/A by joint name, for joints that no load can reach (an axis along gravity)
+    """
     options = options or CalibrationOptions()
     say = progress or (lambda step: None)
     say("motors")
     motor = calibrate_motors(chain, runs.motor, options.motor) if runs.motor else None
-    motors = _motors(chain, motor, runs)
+    motors = _motors(chain, motor, runs, torque_constants or {})
     split = gravity_split(chain, model, l)
     theta_b: Array | None = None
     friction: FrictionResult | None = None
@@ -81,22 +85,31 @@ def calibrate_four_steps(
     return FourSteps(motor, motors, gravity, friction, inertial)
 
 
-def _motors(chain: Chain, motor: MotorResult | None, runs: Runs) -> Motors:
-    """Identified constants, or ones where every log holds torques; InputError where currents stay unexplained."""
+def _motors(chain: Chain, motor: MotorResult | None, runs: Runs, given: Mapping[str, float]) -> Motors:
+    """Identified constants, given ones where none was identified, or ones where every log holds torques.
+
+    InputError where currents stay unexplained.
+    """
     logs = [run.log for step in (runs.gravity, runs.friction, runs.inertial) for run in step]
     quantities = sorted(dict.fromkeys(log.quantity for log in logs))
-    if motor is None:
-        if "current" in quantities:
-            raise InputError(
-                "the logs hold currents, but there is no motor run", "add sweeps with a known load"
-            )
+    if "current" not in quantities:
+        if motor is not None:
+            raise InputError(f"motor runs are given, but the other logs hold {', '.join(quantities)}")
         return Motors.torques(len(chain))
     if quantities != ["current"]:
-        raise InputError(f"motor runs are given, but the other logs hold {', '.join(quantities)}")
-    missing = [name for name, seen in zip(chain.joint_names, motor.identified, strict=True) if not seen]
+        raise InputError(f"the logs hold {' and '.join(quantities)}: only one kind can be calibrated")
+    constant, relative = np.full(len(chain), np.nan), np.zeros(len(chain))
+    if motor is not None:
+        constant = np.array(motor.torque_constant)
+        relative = np.where(motor.identified, np.abs(motor.std / constant), 0.0)
+    for k, name in enumerate(chain.joint_names):
+        if np.isnan(constant[k]) and name in given:
+            constant[k] = given[name]
+    missing = [name for name, value in zip(chain.joint_names, constant, strict=True) if np.isnan(value)]
     if missing:
+        why = "unidentifiable" if motor is not None else "unknown, for there is no motor run"
         raise InputError(
-            f"joint(s) {', '.join(missing)}: torque constant unidentifiable, so currents cannot become torques",
-            "use a load whose centre of mass lies beside the joint's axis, or log torques",
+            f"joint(s) {', '.join(missing)}: torque constant {why}, so currents cannot become torques",
+            "use a load that these joints feel, give --torque-constants for them, or log torques",
         )
-    return Motors(motor.torque_constant, np.abs(motor.std / motor.torque_constant))
+    return Motors(constant, relative)

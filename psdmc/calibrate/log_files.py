@@ -146,6 +146,7 @@ def write_columns(columns: Mapping[str, Array], path: Path) -> None:
     os.close(handle)
     try:
         _WRITERS[path.suffix](columns, Path(own))
+        Path(own).chmod(0o644)  # mkstemp's files are for their owner alone
         Path(own).replace(path)
     finally:
         Path(own).unlink(missing_ok=True)

@@ -237,12 +237,14 @@ def _parameter_rows(
 
 
 def _motor_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
-    if found.motor is None:
+    """None where torques were logged; a constant that was given, not identified, is marked as not seen."""
+    constants, relative = found.motors.torque_constant, found.motors.relative_std
+    if found.motor is None and np.all(constants == 1.0):
         return ()
-    pairs = zip(model.joint_names, found.motor.torque_constant, found.motor.std, strict=True)
+    seen = np.zeros(model.n, dtype=bool) if found.motor is None else found.motor.identified
     return tuple(
-        NumberRow(name, "torque_constant", float(value), float(std), "Nm/A", bool(np.isfinite(value)))
-        for name, value, std in pairs
+        NumberRow(name, "torque_constant", float(value), float(abs(value) * share), "Nm/A", bool(known))
+        for name, value, share, known in zip(model.joint_names, constants, relative, seen, strict=True)
     )
 
 

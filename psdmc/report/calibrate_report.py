@@ -144,7 +144,8 @@ def _number(row: NumberRow | None) -> str:
     if row is None:
         return "–"
     if not row.seen:
-        return f"({row.value:.4g}: not seen)" if math.isfinite(row.value) else "not identifiable"
+        word = "given" if row.name == "torque_constant" else "not seen"
+        return f"({row.value:.4g}: {word})" if math.isfinite(row.value) else "not identifiable"
     return f"{row.value:.4g} ± {row.std:.1g}"
 
 

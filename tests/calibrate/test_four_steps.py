@@ -161,8 +161,23 @@ def test_logs_are_simulated_once(arm, ideal):
 def test_currents_without_a_motor_step_are_refused(arm, noisy):
     runs = replace(read_campaign(noisy[0]), motor=[])
 
-    with pytest.raises(InputError, match="no motor run"):
+    with pytest.raises(InputError, match=r"joint\(s\) shoulder, elbow: torque constant unknown"):
         calibrate_four_steps(arm.model.chain, arm.regressor, arm.model.l, runs)
+
+
+def test_a_joint_that_no_load_reaches_can_be_given_its_constant(arm, noisy):
+    runs = read_campaign(noisy[0])
+    only = replace(runs, motor=[run for run in runs.motor if run.joint == "elbow"])
+    given = {"shoulder": 12.0, "elbow": 999.0}
+
+    with pytest.raises(InputError, match=r"joint\(s\) shoulder: torque constant unidentifiable"):
+        calibrate_four_steps(arm.model.chain, arm.regressor, arm.model.l, only)
+    options = replace(CalibrationOptions(), passes=1)
+    found = calibrate_four_steps(
+        arm.model.chain, arm.regressor, arm.model.l, only, options, torque_constants=given
+    )
+
+    assert found.motors.torque_constant == pytest.approx([12.0, 5.0], rel=1e-2)
 
 
 def test_a_load_on_the_axis_leaves_the_torque_constant_unidentifiable(arm, noisy):
