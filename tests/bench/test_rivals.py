@@ -8,7 +8,7 @@ import pytest
 from psdmc.bench.case import Case, generic_chain, robot_as_numbers
 from psdmc.bench.cases import first_joints, oblique_chain, standard_cases
 from psdmc.bench.contestant import Unavailable
-from psdmc.bench.rivals import EVERYONE, Entrant, mujoco_c
+from psdmc.bench.rivals import EVERYONE, Entrant, mujoco_c, psdmc_c
 from psdmc.bench.rivals.mujoco_c import mjcf, quaternion
 from psdmc.bench.run import Settings, run
 from psdmc.derive.derive import derive_model
@@ -33,6 +33,16 @@ def test_without_compiler_nobody_is_dropped_silently(two_link, monkeypatch, tmp_
         found = list(entrant.contestants(two_link))
         assert [type(one) for one in found] == [Unavailable] * len(found)
         assert found
+
+
+def test_a_form_too_large_to_compile_is_left_out_with_the_reason(two_link, monkeypatch):
+    monkeypatch.setattr(psdmc_c, "EXPANDED_LIMIT", 17)
+
+    (answer,) = psdmc_c.expanded(two_link, ())
+
+    assert answer == Unavailable(
+        "psdmc expanded", "p = 18 functions: not lowered and compiled beyond 17, it takes too long"
+    )
 
 
 def test_the_benchmark_works_with_no_rival(two_link):
