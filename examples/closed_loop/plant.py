@@ -70,7 +70,7 @@ class Plant:
             self.data.qfrc_applied[self.at] = tau
             mujoco.mj_step(self.model, self.data, nstep=round(period / PHYSICS_STEP))
             rows.append((reference.q - q, tau))
-        error, tau = (np.array(column) for column in zip(*rows, strict=True))
+        error, tau = (np.array(column, np.float64) for column in zip(*rows, strict=True))
         return Run(times, error, tau)
 
     def _reset(self, q: Array) -> None:

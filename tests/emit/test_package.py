@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from importlib import resources
@@ -44,7 +45,9 @@ def test_the_text_is_the_golden_one(path: str) -> None:
     if os.environ.get("PSDMC_REWRITE_GOLDEN"):
         golden.parent.mkdir(parents=True, exist_ok=True)
         golden.write_text(text, encoding="utf-8")
-    assert text == golden.read_text(encoding="utf-8"), "run with PSDMC_REWRITE_GOLDEN=1 and review the difference"
+    assert text == golden.read_text(encoding="utf-8"), (
+        "run with PSDMC_REWRITE_GOLDEN=1 and review the difference"
+    )
 
 
 def test_text_ends_with_one_newline_and_has_no_trailing_blanks() -> None:
@@ -152,10 +155,33 @@ def test_no_name_reaches_the_c_text_unescaped(name: str, tmp_path: Path) -> None
         ["gcc", *flags, f"-I{tmp_path}/include", *sources], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    whole = "".join(text for path, text in files.items() if path.endswith((".c", ".h", ".inc")))
+    whole = "".join(text for path, text in files.items() if path.endswith((".c", ".h", ".hpp", ".inc")))
     code = re.sub(r'/\*.*?\*/|"(?:[^"\\]|\\.)*"', "", whole, flags=re.DOTALL)
     assert "evil" not in code.replace(json.loads(files["manifest.json"])["robot"], "")
     assert "system" not in code.replace("a_system_x", "")
+
+
+@pytest.mark.parametrize("real", ["float64", "float32"])
+@pytest.mark.parametrize("name", ["pendulum", *NASTY])
+def test_the_cpp_header_takes_any_name_and_precision(name: str, real: str, tmp_path: Path) -> None:
+    if shutil.which("g++") is None:
+        pytest.skip("g++ is not installed")
+    package = pendulum(pendulum_info(name, joint=name), EmitOptions(real=real))  # type: ignore[arg-type]
+    files = package_files(package)
+    for kind in ("h", "hpp"):
+        (tmp_path / package.robot).mkdir(exist_ok=True)
+        (tmp_path / package.robot / f"{package.robot}.{kind}").write_text(
+            files[f"include/{package.robot}/{package.robot}.{kind}"], encoding="ascii"
+        )
+    (tmp_path / "main.cpp").write_text(
+        f'#include "{package.robot}/{package.robot}.hpp"\n'
+        f"static_assert(::{package.robot}::Robot::speed_limit[0] == 4);\n"
+        f"static_assert(::{package.robot}::Robot::effort_limit[0] > 1e30f);\n"
+    )
+    flags = ["-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-fsyntax-only"]
+    words = ["g++", *flags, f"-I{tmp_path}", str(tmp_path / "main.cpp")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_single_and_batch_orders_that_differ_get_a_file_each() -> None:
