@@ -60,7 +60,7 @@ class Plant:
 
     def run(self, controller: Controller, wanted: Trajectory, period: float) -> Run:
         """From rest on the reference; the controller is called every `period` s, and its torque held."""
-        times = np.arange(round(wanted.end / period)) * period
+        times = np.arange(round(wanted.end / period), dtype=np.float64) * period
         self._reset(wanted(0.0).q)
         rows = []
         for time in times:
