@@ -44,7 +44,7 @@ def _lines(result: BenchResult, command: str) -> Iterator[str]:
     yield ""
     machine = result.machine
     yield (
-        f"ns per state (times faster than Pinocchio's C++ / than CasADi's C). {machine.processor}, one thread, "
+        f"ns per state (times faster than Pinocchio's C++ / than CasADi's C, which all take one state a call). {machine.processor}, one thread, "
         f"{machine.compiler}, `{machine.flags}`; `{command}`."
     )
     busy = [case.name for case in result.cases if not case.idle]
