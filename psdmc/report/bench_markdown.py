@@ -44,8 +44,8 @@ def _lines(result: BenchResult, command: str) -> Iterator[str]:
     yield ""
     machine = result.machine
     yield (
-        f"ns per state (times faster than Pinocchio's C++ / than CasADi's C, which all take one state a call). {machine.processor}, one thread, "
-        f"{machine.compiler}, `{machine.flags}`; `{command}`."
+        "ns per state (times faster than Pinocchio's C++ / than CasADi's C, which take one state a call). "
+        f"{machine.processor}, one thread, {machine.compiler}, `{machine.flags}`; `{command}`."
     )
     busy = [case.name for case in result.cases if not case.idle]
     if busy:
