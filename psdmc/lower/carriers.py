@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -37,12 +38,16 @@ WEIGHTS = {
 }
 """Operations that a parameter adds to Newton-Euler, roughly; the start of the search."""
 
-INDEPENDENT = 1e-7
-"""A column counts as independent where this part of its length is left beside the columns already chosen. Coarse on
-purpose: a carrier that is barely independent would carry huge values."""
+INDEPENDENT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12)
+"""A column counts as independent where this part of its length is left beside the columns already chosen: the first
+figure, then, for the places that are still open, the next. A carrier that is barely independent would carry huge
+values."""
 
-EXACT = 1e-11
-"""Transfer entries below this, relative to the largest of their column's, are rounding of an exact zero."""
+EXACT = 3e-14
+"""Contributions below this, relative to the whole, are rounding of an exact zero."""
+
+FAIR_SHARE = 1e-3
+"""Exchanges that would multiply the carriers' values by more than the inverse of this are not considered."""
 
 STATES = 48
 SEED = 20211
@@ -55,8 +60,8 @@ def pseudo_map() -> Array:
     for row, inertia in enumerate((4, 6, 9), start=4):
         matrix[row, [4, 6, 9]] = 0.5
         matrix[row, inertia] -= 1.0
-    for row, product in ((7, 5), (8, 7), (9, 8)):
-        matrix[row, product] = -1.0
+    for row, off_diagonal in ((7, 5), (8, 7), (9, 8)):
+        matrix[row, off_diagonal] = -1.0
     matrix[10, 10] = 1.0
     return matrix
 
@@ -93,43 +98,55 @@ class CarrierSpace:
         chosen: list[int] = []
         rank = self.columns.shape[0]
         basis = np.zeros((rank, 0))
-        for j in order:
+        for share, j in product(INDEPENDENT, order):
             column = self.columns[:, j]
             length = np.linalg.norm(column)
-            if length == 0.0 or len(chosen) == rank:
+            if length == 0.0 or len(chosen) == rank or j in chosen:
                 continue
             rest = column - basis @ (basis.T @ column)
             rest -= basis @ (basis.T @ rest)
-            if np.linalg.norm(rest) > INDEPENDENT * length:
+            if np.linalg.norm(rest) > share * length:
                 basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
                 chosen.append(j)
         return tuple(sorted(chosen))
 
     def exchanges(self, carriers: Sequence[int]) -> list[tuple[int, int]]:
-        """(out, in): pairs whose exchange leaves a basis, by the coefficients of each column in the carriers."""
-        coefficients = np.linalg.solve(self.columns[:, list(carriers)], self.columns)
+        """(out, in): pairs whose exchange leaves a basis: where the one coming in carries, in the old basis, a fair
+        share of the one going out."""
+        lengths = self.lengths
+        coefficients = self._coordinates(carriers, self.columns)
         pairs = []
         for j in range(self.count):
-            if j in carriers or not np.any(self.columns[:, j]):
+            if j in carriers or not lengths[j]:
                 continue
-            largest = np.max(np.abs(coefficients[:, j]))
             for row, carrier in enumerate(carriers):
-                if abs(coefficients[row, j]) > 1e-6 * max(largest, 1.0):
+                if abs(coefficients[row, j]) * lengths[carrier] > FAIR_SHARE * lengths[j]:
                     pairs.append((carrier, j))
         return pairs
 
     def transfer(self, carriers: Sequence[int]) -> Array:
-        """(len(carriers), l): theta_b to the carriers' values, with exact zeros and ones."""
-        raw = np.linalg.solve(self.columns[:, list(carriers)], self.target)
-        return cleaned(np.asarray(raw, np.float64))
+        """(len(carriers), l): theta_b to the carriers' values, with exact zeros and ones.
 
+        An entry is zero where what it would contribute is rounding beside what its base parameter does.
+        """
+        raw = self._coordinates(carriers, self.target)
+        contribution = np.abs(raw) * self.lengths[list(carriers), None]
+        whole = np.linalg.norm(self.target, axis=0)
+        out = np.where(contribution < EXACT * whole, 0.0, raw)
+        nearest = np.round(out)
+        return np.asarray(np.where((np.abs(out - nearest) < EXACT) & (np.abs(nearest) == 1), nearest, out))
 
-def cleaned(matrix: Array) -> Array:
-    """Entries within rounding of zero or of +-1 made exact."""
-    scale = np.maximum(np.max(np.abs(matrix), axis=0, keepdims=True, initial=0.0), 1e-300)
-    out = np.where(np.abs(matrix) < EXACT * scale, 0.0, matrix)
-    nearest = np.round(out)
-    return np.asarray(np.where((np.abs(out - nearest) < EXACT) & (np.abs(nearest) == 1), nearest, out))
+    @property
+    def lengths(self) -> Array:
+        return np.asarray(np.linalg.norm(self.columns, axis=0))
+
+    def _coordinates(self, carriers: Sequence[int], wanted: Array) -> Array:
+        """Columns in the basis of the carriers; in the least-squares sense where directions below INDEPENDENT are
+        left out."""
+        basis = self.columns[:, list(carriers)]
+        if basis.shape[0] == basis.shape[1]:
+            return np.asarray(np.linalg.solve(basis, wanted))
+        return np.asarray(np.linalg.lstsq(basis, wanted, rcond=None)[0])
 
 
 def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
@@ -145,7 +162,7 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     scale = np.linalg.norm(columns, axis=0)
     scale[scale < 1e-12 * np.max(scale)] = 1.0
     u, sizes, _ = np.linalg.svd(columns / scale, full_matrices=False)
-    rank = int(np.sum(sizes > 1e-9 * sizes[0]))
+    rank = int(np.sum(sizes > 1e-12 * sizes[0]))
     compact = u[:, :rank].T @ columns
     compact[:, np.linalg.norm(columns, axis=0) < 1e-12 * np.max(scale)] = 0.0
     return CarrierSpace(compact, compact @ lift)

@@ -23,6 +23,10 @@ Foot = Literal["previous", "next"]
 EXACT = 1e-12
 """Lengths (relative to the chain's reach) and direction cosines below this are rounding of an exact zero."""
 
+NEARLY_PARALLEL = 2e-2
+"""Sine of the angle below which two axes are treated as parallel but for the rotation between them: their common
+normal may lie kilometres away, and torques would be differences of huge numbers."""
+
 DECIMALS = 14
 """Lengths are kept to this many decimals (1e-14 m), far below what torques can show."""
 
@@ -53,7 +57,7 @@ def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
     before, after = _orientations(chain, placed, axes, origins)
     frames, link_frames = [], []
     for i, joint in enumerate(chain.joints):
-        rotation = np.eye(3) if i == 0 else _about_x(after[i - 1].T @ before[i])
+        rotation = np.eye(3) if i == 0 else _between(after[i - 1].T @ before[i])
         offset = np.zeros(3) if i == 0 else after[i - 1].T @ (origins[i] - origins[i - 1])
         angle = _angle_about_z(before[i].T @ after[i])
         quarters = round(angle / (np.pi / 2))
@@ -106,7 +110,7 @@ def _clean_lengths(lengths: Array, scale: float) -> Array:
 
 
 def _parallel(a: Array, b: Array) -> bool:
-    return float(np.linalg.norm(np.cross(a, b))) < EXACT
+    return float(np.linalg.norm(np.cross(a, b))) < NEARLY_PARALLEL
 
 
 def _origins(
@@ -136,11 +140,11 @@ def _origins(
 
 
 def _foot(point: Array, axis: Array, other_point: Array, other_axis: Array) -> Array | None:
-    """Point of the line (point, axis) nearest to the other line; None where they are parallel."""
+    """Point of the line (point, axis) nearest to the other line; None where they are nearly parallel."""
+    if _parallel(axis, other_axis):
+        return None
     normal = np.cross(axis, other_axis)
     square = float(normal @ normal)
-    if square < EXACT**2:
-        return None
     along = float(np.cross(other_point - point, other_axis) @ normal) / square
     return np.asarray(point + along * axis)
 
@@ -160,14 +164,21 @@ def _orientations(
         elif float(x_after @ x_before) < -EXACT:
             x_after = -x_after
         after.append(np.column_stack([x_after, np.cross(axes[i], x_after), axes[i]]))
-        x_before = x_after
+        x_before = x_after if i + 1 == n else _across(x_after, axes[i + 1])
     return before, after
 
 
+def _across(direction: Array, axis: Array) -> Array:
+    """The part of a unit direction across an axis; itself where it is all across."""
+    along = float(axis @ direction)
+    return direction if abs(along) < EXACT else _clean(direction - along * axis)
+
+
 def _normal(axis: Array, following: Array, step: Array) -> Array | None:
-    """Direction of the common normal of two axes; None where every perpendicular would do."""
+    """Direction of the common normal of two axes; None where every perpendicular would do. Nearly parallel axes take
+    the step from one origin to the next instead."""
     normal = np.cross(axis, following)
-    if np.linalg.norm(normal) < EXACT:
+    if _parallel(axis, following):
         normal = step - axis * float(axis @ step)
         if np.linalg.norm(normal) < EXACT:
             return None
@@ -183,6 +194,12 @@ def _first_x(chain: Chain, first: Placement, axis: Array) -> Array:
     if np.count_nonzero(np.abs(local) > EXACT * np.linalg.norm(across)) == 1:
         return np.asarray(first.rotation[:, 0])
     return _clean(across / np.linalg.norm(across))
+
+
+def _between(rotation: Array) -> Array:
+    """A constant rotation between frames: about x, but where axes are nearly parallel."""
+    turns_x = np.max(np.abs([*rotation[0, 1:], *rotation[1:, 0]])) > EXACT
+    return rotation if turns_x else _about_x(rotation)
 
 
 def _about_x(rotation: Array) -> Array:

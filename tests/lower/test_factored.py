@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_chains import Oracle, random_chain, relative_error, states
+from scipy.spatial.transform import Rotation
 
 from psdmc.lower.carriers import carrier_space
 from psdmc.lower.factored import trace_dynamics, trace_jacobian, trace_regressor
@@ -15,7 +18,7 @@ from psdmc.lower.search import ALL_CHOICES, BATCH, SINGLE, Search, all_feet
 from psdmc.lower.solve import SingularMassMatrix, solve_symmetric
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
-from psdmc.robot.chain import Chain
+from psdmc.robot.chain import Chain, Placement
 
 
 def known(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
@@ -156,3 +159,25 @@ def test_a_mass_matrix_without_inertia_is_named_singular():
     with pytest.raises(SingularMassMatrix) as caught:
         solve_symmetric([[1.0, 0.0], [0.0, 0.0]], [1.0, 1.0])
     assert caught.value.joint == 1
+
+
+def tilted(chain: Chain, angle: float) -> Chain:
+    """The chain with every joint turned a little more, about a random axis: no two axes stay parallel."""
+    rng = np.random.default_rng(1)
+    joints = []
+    for joint in chain.joints:
+        turn = Rotation.from_rotvec(angle * rng.uniform(-1.0, 1.0, 3)).as_matrix()
+        place = Placement(turn @ joint.placement.rotation, joint.placement.translation)
+        joints.append(replace(joint, placement=place))
+    return replace(chain, joints=tuple(joints))
+
+
+@pytest.mark.parametrize("angle", [3e-2, 1e-2, 3e-3, 1e-3])
+def test_axes_that_are_nearly_parallel_cost_no_digits(angle: float):
+    chain = tilted(random_chain(3, "RRRRRR", tidy=True), angle)
+    representative, theta_b = known(chain)
+    search = Search(chain, representative, theta_b, budget=150)
+    program = search.rearranged("inverse_dynamics", search.best("inverse_dynamics", SINGLE), SINGLE)
+    q, qd, qdd = states(6, 200)
+    found = run(program, 6, 6, "tau", q=q, qd=qd, qdd=qdd)
+    assert relative_error(found, Oracle(chain).rnea(q, qd, qdd)) < 1e-12
