@@ -27,8 +27,12 @@ NEARLY_PARALLEL = 2e-2
 """Sine of the angle below which two axes are treated as parallel but for the rotation between them: their common
 normal may lie kilometres away, and torques would be differences of huge numbers."""
 
-DECIMALS = 14
-"""Lengths are kept to this many decimals (1e-14 m), far below what torques can show."""
+DECIMALS = 12
+"""A length this near to one of so many decimals is that one, so that equal lengths stay equal; see ROUNDING."""
+
+ROUNDING = 1e-15
+"""What composing placements can move a length by, relative to the chain's reach. Rounded to decimals beyond this, lengths of
+centimetres would lose digits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +55,7 @@ class Reframed:
 
 def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
     """The chain in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""
-    placed = _placed_at_zero(chain)
+    placed, reach = _placed_at_zero(chain), _reach(chain)
     axes = [_clean(place.rotation[:, 2]) for place in placed]
     origins = _origins(chain, placed, axes, feet)
     before, after = _orientations(chain, placed, axes, origins)
@@ -66,24 +70,24 @@ def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
             Frame(
                 joint.kind,
                 as_matrix(rotation.tolist()),
-                as_vector(_clean_lengths(offset, _reach(chain)).tolist()),
+                as_vector(_clean_lengths(offset, reach).tolist()),
                 0.0 if abs(rest) < EXACT else float(rest),
                 quarters % 4,
             )
         )
         mine = Placement(after[i], origins[i])
-        link_frames.append(_rounded(mine.inverse() @ placed[i] @ joint.link_frame))
+        link_frames.append(_rounded(mine.inverse() @ placed[i] @ joint.link_frame, reach))
     base = _clean_lengths(before[0].T @ -chain.gravity, float(np.linalg.norm(chain.gravity)))
-    tip = _rounded(Placement(after[-1], origins[-1]).inverse() @ placed[-1] @ chain.tip)
+    tip = _rounded(Placement(after[-1], origins[-1]).inverse() @ placed[-1] @ chain.tip, reach)
     base_axes = as_matrix(np.where(np.abs(before[0]) < EXACT, 0.0, before[0]).tolist())
     return Reframed(tuple(frames), as_vector(base.tolist()), tuple(link_frames), tip, base_axes)
 
 
-def _rounded(place: Placement) -> Placement:
+def _rounded(place: Placement, reach: float) -> Placement:
     """A placement with the rounding of exact zeros and ones removed."""
     near = np.round(place.rotation)
     rotation = np.where(np.abs(place.rotation - near) < EXACT, near, place.rotation) + 0.0
-    return Placement(rotation, np.round(place.translation, DECIMALS) + 0.0)
+    return Placement(rotation, _clean_lengths(place.translation, reach) + 0.0)
 
 
 def _placed_at_zero(chain: Chain) -> list[Placement]:
@@ -106,7 +110,12 @@ def _clean(direction: Array) -> Array:
 
 def _clean_lengths(lengths: Array, scale: float) -> Array:
     """Rounding of zeros removed, and of decimal lengths, so that equal lengths stay equal."""
-    return np.asarray(np.round(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), DECIMALS), np.float64)
+    return _decimal(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), scale)
+
+
+def _decimal(lengths: Array, scale: float) -> Array:
+    nearest = np.round(lengths, DECIMALS)
+    return np.asarray(np.where(np.abs(nearest - lengths) <= ROUNDING * scale, nearest, lengths), np.float64)
 
 
 def _parallel(a: Array, b: Array) -> bool:
