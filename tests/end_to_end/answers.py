@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from psdmc.program.kernel import Kernel
 from psdmc.toolchain.call import CompiledRobot
 
 Array = np.ndarray
-Answers = Iterator[tuple[str, Array]]
+Answers = Iterable[tuple[str, Array]]
 """Function (with what is special about this way of computing it), and its result per state as (count, n or rows, ...)."""
 
 LIMIT = {"forward_dynamics": 1e-9}
