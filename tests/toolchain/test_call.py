@@ -118,7 +118,7 @@ def test_other_threads_run_during_a_call(robot: CompiledRobot) -> None:
         sys.setswitchinterval(interval)
         stop.set()
         counter.join()
-    assert during > 100
+    assert during > 10, "with the GIL held there is at most one"
 
 
 def test_a_wrong_number_of_joints_names_the_joints(robot: CompiledRobot) -> None:
