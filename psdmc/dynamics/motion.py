@@ -11,7 +11,7 @@ skew-symmetric: the Slotine-Li form.
 Two choices that change the operation count, never the result:
 compound  consecutive parallel axes turn w and dw once, by the sum of their angles, from the frame before the first.
 fold      the last body is looked at from the frame before its joint's turn, where U differs from its predecessor's in
-          five entries only; the body's parameters are turned instead.
+          six entries only; the body's parameters are turned instead.
 """
 
 from __future__ import annotations
