@@ -18,8 +18,6 @@ from psdmc.derive.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot
 
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "datasets" / "ur10_jointstate"
-
 ROBOT = """
 name = "two_link"
 convention = "standard"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import SHARED
+from shared_data import UR10_LOG
 
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
 from psdmc.calibrate.log_files import read_log
@@ -17,7 +17,7 @@ from psdmc.robot.load import load_robot
 
 REFERENCE = np.array([0.974, 0.989, 0.996, 0.986, 0.976, 0.962])
 
-pytestmark = pytest.mark.skipif(not SHARED.exists(), reason="the UR10 log is not part of the project")
+pytestmark = pytest.mark.skipif(not UR10_LOG.exists(), reason="the UR10 log is not part of the project")
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +34,8 @@ def held_out(record: Calibration) -> np.ndarray:
 
 
 def test_the_bag_holds_what_the_table_holds():
-    table = read_log(SHARED / "exciting_trajectory.csv")
-    bag = read_log(SHARED / "exciting_trajectory.db3").ordered(table.joint_names)
+    table = read_log(UR10_LOG / "exciting_trajectory.csv")
+    bag = read_log(UR10_LOG / "exciting_trajectory.db3").ordered(table.joint_names)
 
     assert len(bag) == len(table) == 3441
     assert np.abs(bag.time - table.time).max() < 1e-6
@@ -44,7 +44,7 @@ def test_the_bag_holds_what_the_table_holds():
 
 
 def test_the_fit_is_as_good_as_the_reference(model):
-    record = calibrate(model, SHARED / "exciting_trajectory.csv", regressor=ChainRegressor(model))
+    record = calibrate(model, UR10_LOG / "exciting_trajectory.csv", regressor=ChainRegressor(model))
 
     assert np.all(np.round(held_out(record), 3) >= REFERENCE)
     assert any("motor torque" in warning for warning in record.warnings)
@@ -52,7 +52,7 @@ def test_the_fit_is_as_good_as_the_reference(model):
 
 def test_physical_consistency_costs_at_most_a_hundredth(model):
     pytest.importorskip("cvxpy")
-    log = SHARED / "exciting_trajectory.csv"
+    log = UR10_LOG / "exciting_trajectory.csv"
 
     plain = calibrate(model, log, regressor=ChainRegressor(model))
     physical = calibrate(model, log, CalibrateOptions(physical=True), regressor=ChainRegressor(model))
