@@ -10,6 +10,7 @@ from psdmc.dynamics.parameters import joint_frame_map, standard_parameters
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
+from psdmc.robot.small import times
 
 DRIVE = PARAMETERS_PER_LINK - 1
 FLOOR_MOUNT = (0.0, 0.0, -9.81)
@@ -71,7 +72,7 @@ def physical_body(rng: np.random.Generator) -> Array:
     masses = rng.uniform(0.1, 0.6, size=8)
     places = rng.normal(scale=0.08, size=(8, 3)) + rng.normal(scale=0.05, size=3)
     second = np.einsum("k,ki,kj->ij", masses, places, places)
-    return standard_parameters(masses.sum(), masses @ places, np.trace(second) * np.eye(3) - second)
+    return standard_parameters(masses.sum(), times(masses, places), np.trace(second) * np.eye(3) - second)
 
 
 def robot_as_numbers(chain: Chain) -> str:
@@ -82,7 +83,7 @@ def robot_as_numbers(chain: Chain) -> str:
     """
     lines = [f"{len(chain)} {_numbers(chain.gravity)}"]
     for joint, row in zip(chain.joints, chain.parameters, strict=True):
-        body = joint_frame_map(joint.link_frame) @ row[:DRIVE]
+        body = times(joint_frame_map(joint.link_frame), row[:DRIVE])
         placement = joint.placement
         lines.append(
             f"{joint.kind} {_numbers(placement.rotation)} {_numbers(placement.translation)} "

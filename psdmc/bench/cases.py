@@ -13,6 +13,7 @@ from psdmc.bench.fresh import derive_fresh
 from psdmc.errors import InputError
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Placement
 from psdmc.robot.load import load_robot
+from psdmc.robot.small import length
 
 SEED = 4
 """Of generic inertias and geometry; printed with every result."""
@@ -122,10 +123,13 @@ def _anywhere(rng: np.random.Generator) -> Placement:
 
 
 def _rotation(rng: np.random.Generator) -> Array:
-    """A uniformly random rotation."""
-    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
-    q *= np.sign(np.diag(r))
-    if np.linalg.det(q) < 0.0:
-        q[:, 0] = -q[:, 0]
-    rotation: Array = q
-    return rotation
+    """A uniformly random rotation: a random direction's quaternion, in arithmetic that is the same on every processor."""
+    quaternion = rng.normal(size=4)
+    w, x, y, z = quaternion / length(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )

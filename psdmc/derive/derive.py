@@ -19,6 +19,7 @@ from psdmc.derive.units import Scaled, parameter_units, scaled
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
+from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 
@@ -106,5 +107,5 @@ def base_parameters(B: Array, chain: Chain) -> Array | None:
     unknown = np.isnan(x)
     if B[:, unknown].any():
         return None
-    theta: Array = B @ np.where(unknown, 0.0, x)
+    theta: Array = times(B, np.where(unknown, 0.0, x))
     return theta

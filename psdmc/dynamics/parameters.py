@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement
+from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 
@@ -45,9 +46,10 @@ def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
 def moved(x: Array, frame: Placement) -> Array:
     """Ten standard parameters about a frame, about the frame that it is placed in instead."""
     r, p = frame.rotation, frame.translation
-    moment = r @ x[1:4]
+    moment = times(r, x[1:4])
     crossed = np.outer(moment, p)
-    second = r @ second_moments(inertia_matrix(x)) @ r.T + crossed + crossed.T + x[0] * np.outer(p, p)
+    turned = times(times(r, second_moments(inertia_matrix(x))), r.T)
+    second = turned + crossed + crossed.T + x[0] * np.outer(p, p)
     return standard_parameters(x[0], moment + x[0] * p, inertia_of(second))
 
 
@@ -63,7 +65,7 @@ def bodies_of(chain: Chain, x: Array) -> tuple[Body, ...]:
     """
     rows = np.asarray(x, dtype=np.float64).reshape(len(chain), PARAMETERS_PER_LINK)
     return tuple(
-        body_from_parameters((joint_frame_map(joint.link_frame) @ row[:BODY_PARAMETERS]).tolist())
+        body_from_parameters(times(joint_frame_map(joint.link_frame), row[:BODY_PARAMETERS]).tolist())
         for joint, row in zip(chain.joints, rows, strict=True)
     )
 

@@ -18,7 +18,9 @@ from psdmc.dynamics.parameters import BODY_PARAMETERS, joint_frame_map
 from psdmc.dynamics.regressor import DRIVE, regressor
 from psdmc.dynamics.scalar import Scalar
 from psdmc.lower.reframe import Reframed
+from psdmc.lower.tableau import Long, Tableau
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Placement
+from psdmc.robot.small import times
 
 PSEUDO_NAMES = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz", "Im")
 """A link's parameters in pseudo-inertia form, in the order of carriers."""
@@ -71,7 +73,7 @@ def link_map(place: Placement) -> Array:
     matrix = np.zeros((11, 11))
     matrix[:BODY_PARAMETERS, :BODY_PARAMETERS] = joint_frame_map(place)
     matrix[10, 10] = 1.0
-    return np.asarray(pseudo_map() @ matrix)
+    return np.asarray(times(pseudo_map(), matrix))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,41 +82,31 @@ class CarrierSpace:
 
     r, the rank of all columns; l, the model's base parameters
 
-    columns  (r, 11 n)  regressor columns in pseudo-inertia form about the re-framed joint frames, as coordinates in a
-                        basis of their span
-    target   (r, l)     what theta_b has to give, in the same coordinates
+    columns   (r, 11 n)  regressor columns in pseudo-inertia form about the re-framed joint frames, as coordinates in a
+                         basis of their span
+    tableau   the same columns in a basis of themselves, and behind them the model's l: what theta_b has to give
+    whole     (l,)  lengths of the model's columns
     """
 
     columns: Array
-    target: Array
+    tableau: Tableau
+    whole: Array
 
     @property
     def count(self) -> int:
         return int(self.columns.shape[1])
 
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
-        """The basis of least weight, ascending; ties go to the earlier parameter."""
-        order = sorted(range(self.count), key=lambda j: (weights[j], j))
-        chosen: list[int] = []
-        rank = self.columns.shape[0]
-        basis = np.zeros((rank, 0))
-        for share, j in product(INDEPENDENT, order):
-            column = self.columns[:, j]
-            length = np.linalg.norm(column)
-            if length == 0.0 or len(chosen) == rank or j in chosen:
-                continue
-            rest = column - basis @ (basis.T @ column)
-            rest -= basis @ (basis.T @ rest)
-            if np.linalg.norm(rest) > share * length:
-                basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
-                chosen.append(j)
-        return tuple(sorted(chosen))
+        """The basis of least weight, ascending; ties go to the earlier parameter. Where rounding hides the last directions
+        from this order, the basis that the tableau started with."""
+        chosen = _lightest(self.columns, weights)
+        return chosen if len(chosen) == len(self.tableau.basis) else self.tableau.basis
 
     def exchanges(self, carriers: Sequence[int]) -> list[tuple[int, int]]:
         """(out, in): pairs whose exchange leaves a basis: where the one coming in carries, in the old basis, a fair
         share of the one going out."""
         lengths = self.lengths
-        coefficients = self._coordinates(carriers, self.columns)
+        coefficients = self._coordinates(carriers)
         pairs = []
         for j in range(self.count):
             if j in carriers or not lengths[j]:
@@ -129,10 +121,9 @@ class CarrierSpace:
 
         An entry is zero where what it would contribute is rounding beside what its base parameter does.
         """
-        raw = self._coordinates(carriers, self.target)
+        raw = self._coordinates(carriers)[:, self.count :]
         contribution = np.abs(raw) * self.lengths[list(carriers), None]
-        whole = np.linalg.norm(self.target, axis=0)
-        out = np.where(contribution < EXACT * whole, 0.0, raw)
+        out = np.where(contribution < EXACT * self.whole, 0.0, raw)
         nearest = np.round(out)
         return np.asarray(np.where((np.abs(out - nearest) < EXACT) & (np.abs(nearest) == 1), nearest, out))
 
@@ -140,46 +131,76 @@ class CarrierSpace:
     def lengths(self) -> Array:
         return np.asarray(np.linalg.norm(self.columns, axis=0))
 
-    def _coordinates(self, carriers: Sequence[int], wanted: Array) -> Array:
-        """Columns in the basis of the carriers; in the least-squares sense where directions below INDEPENDENT are
-        left out."""
-        basis = self.columns[:, list(carriers)]
-        if basis.shape[0] == basis.shape[1]:
-            return np.asarray(np.linalg.solve(basis, wanted))
-        return np.asarray(np.linalg.lstsq(basis, wanted, rcond=None)[0])
+    def _coordinates(self, carriers: Sequence[int]) -> Array:
+        """All columns and the model's in the basis of the carriers."""
+        return self.tableau.within(carriers).entries.astype(np.float64)
 
 
 def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     """The carriers of a model whose theta_b lifts to standard parameters about the link frames by `representative`."""
     n = len(reframed.frames)
-    columns = _sampled_columns(reframed)
-    lift = np.zeros((PARAMETERS_PER_LINK * n, representative.shape[1]))
+    samples = _sampled_columns(reframed)
+    lift = np.zeros((PARAMETERS_PER_LINK * n, representative.shape[1]), np.longdouble)
     for k, place in enumerate(reframed.link_frames):
         rows = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
-        lift[rows] = link_map(place) @ representative[rows]
-    unused_drives = [j for j in range(DRIVE, 11 * n, 11) if not np.any(lift[j])]
-    columns[:, unused_drives] = 0.0
+        lift[rows] = _product(link_map(place), representative[rows])
+    unused_drives = [
+        j for j in range(DRIVE, PARAMETERS_PER_LINK * n, PARAMETERS_PER_LINK) if not np.any(lift[j])
+    ]
+    samples[:, unused_drives] = 0.0
+    columns = samples.astype(np.float64)
     scale = np.linalg.norm(columns, axis=0)
     scale[scale < 1e-12 * np.max(scale)] = 1.0
     u, sizes, _ = np.linalg.svd(columns / scale, full_matrices=False)
     rank = int(np.sum(sizes > 1e-12 * sizes[0]))
     compact = u[:, :rank].T @ columns
     compact[:, np.linalg.norm(columns, axis=0) < 1e-12 * np.max(scale)] = 0.0
-    return CarrierSpace(compact, compact @ lift)
+    basis = _lightest(compact, [1.0] * compact.shape[1])
+    target = _product(samples, lift)
+    whole = np.linalg.norm(target.astype(np.float64), axis=0)
+    return CarrierSpace(compact, Tableau.of(np.hstack([samples, target]), basis), whole)
 
 
-def _sampled_columns(reframed: Reframed) -> Array:
-    """(STATES n, 11 n) regressor in pseudo-inertia form at fixed random states."""
+def _product(a: Array | Long, b: Array | Long) -> Long:
+    """a @ b in extended precision, term by term in the same order everywhere."""
+    total = np.zeros((a.shape[0], b.shape[1]), np.longdouble)
+    for k in range(a.shape[1]):
+        total += np.outer(a[:, k].astype(np.longdouble), b[k])
+    return total
+
+
+def _lightest(columns: Array, weights: Sequence[float]) -> tuple[int, ...]:
+    """The basis of least weight among columns; ties go to the earlier one."""
+    order = sorted(range(columns.shape[1]), key=lambda j: (weights[j], j))
+    chosen: list[int] = []
+    rank = columns.shape[0]
+    basis = np.zeros((rank, 0))
+    for share, j in product(INDEPENDENT, order):
+        column = columns[:, j]
+        length = np.linalg.norm(column)
+        if length == 0.0 or len(chosen) == rank or j in chosen:
+            continue
+        rest = column - basis @ (basis.T @ column)
+        rest -= basis @ (basis.T @ rest)
+        if np.linalg.norm(rest) > share * length:
+            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+            chosen.append(j)
+    return tuple(sorted(chosen))
+
+
+def _sampled_columns(reframed: Reframed) -> Long:
+    """(STATES n, 11 n) regressor in pseudo-inertia form at fixed random states, in extended precision."""
     n = len(reframed.frames)
-    q, qd, qdd = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(3, n, STATES))
+    drawn = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(3, n, STATES))
+    q, qd, qdd = drawn.astype(np.longdouble)
     here = [Placement.identity()] * n
     rows = regressor(reframed.frames, here, range(11 * n), list(q), list(qd), list(qdd), reframed.base)
-    standard = np.zeros((n, STATES, 11 * n))
+    standard = np.zeros((n, STATES, 11 * n), np.longdouble)
     for i, row in enumerate(rows):
         for column, value in row.items():
             standard[i, :, column] = value
-    back = np.linalg.inv(pseudo_map())
-    return np.asarray((standard.reshape(n * STATES, n, 11) @ back).reshape(n * STATES, 11 * n))
+    back = np.round(np.linalg.inv(pseudo_map()))  # zeros and ones
+    return np.asarray(_product(standard.reshape(-1, 11), back).reshape(n * STATES, 11 * n))
 
 
 def bodies_from_carriers(

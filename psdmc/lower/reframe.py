@@ -17,6 +17,7 @@ import numpy as np
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector
 from psdmc.dynamics.scalar import Matrix, Vector
 from psdmc.robot.chain import Array, Chain, Placement
+from psdmc.robot.small import length, times
 
 Foot = Literal["previous", "next"]
 
@@ -61,9 +62,9 @@ def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
     before, after = _orientations(chain, placed, axes, origins)
     frames, link_frames = [], []
     for i, joint in enumerate(chain.joints):
-        rotation = np.eye(3) if i == 0 else _between(after[i - 1].T @ before[i])
-        offset = np.zeros(3) if i == 0 else after[i - 1].T @ (origins[i] - origins[i - 1])
-        angle = _angle_about_z(before[i].T @ after[i])
+        rotation = np.eye(3) if i == 0 else _between(times(after[i - 1].T, before[i]))
+        offset = np.zeros(3) if i == 0 else times(after[i - 1].T, origins[i] - origins[i - 1])
+        angle = _angle_about_z(times(before[i].T, after[i]))
         quarters = round(angle / (np.pi / 2))
         rest = angle - quarters * (np.pi / 2)
         frames.append(
@@ -77,7 +78,7 @@ def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
         )
         mine = Placement(after[i], origins[i])
         link_frames.append(_rounded(mine.inverse() @ placed[i] @ joint.link_frame, reach))
-    base = _clean_lengths(before[0].T @ -chain.gravity, float(np.linalg.norm(chain.gravity)))
+    base = _clean_lengths(times(before[0].T, -chain.gravity), length(chain.gravity))
     tip = _rounded(Placement(after[-1], origins[-1]).inverse() @ placed[-1] @ chain.tip, reach)
     base_axes = as_matrix(np.where(np.abs(before[0]) < EXACT, 0.0, before[0]).tolist())
     return Reframed(tuple(frames), as_vector(base.tolist()), tuple(link_frames), tip, base_axes)
@@ -100,12 +101,12 @@ def _placed_at_zero(chain: Chain) -> list[Placement]:
 
 
 def _reach(chain: Chain) -> float:
-    return float(sum(np.linalg.norm(joint.placement.translation) for joint in chain.joints)) or 1.0
+    return sum(length(joint.placement.translation) for joint in chain.joints) or 1.0
 
 
 def _clean(direction: Array) -> Array:
     cleaned = np.where(np.abs(direction) < EXACT, 0.0, direction)
-    return np.asarray(cleaned / np.linalg.norm(cleaned))
+    return np.asarray(cleaned / length(cleaned))
 
 
 def _clean_lengths(lengths: Array, scale: float) -> Array:
@@ -143,7 +144,7 @@ def _origins(
             foot = _foot(points[i], axes[i], origins[i - 1], axes[i - 1])
         if foot is None:
             reference = origins[i - 1] if i > 0 and _parallel(axes[i], axes[i - 1]) else points[i]
-            foot = points[i] + axes[i] * float(axes[i] @ (reference - points[i]))
+            foot = points[i] + axes[i] * times(axes[i], reference - points[i])
         origins.append(foot)
     return origins
 
@@ -153,8 +154,8 @@ def _foot(point: Array, axis: Array, other_point: Array, other_axis: Array) -> A
     if _parallel(axis, other_axis):
         return None
     normal = np.cross(axis, other_axis)
-    square = float(normal @ normal)
-    along = float(np.cross(other_point - point, other_axis) @ normal) / square
+    square = times(normal, normal)
+    along = times(np.cross(other_point - point, other_axis), normal) / square
     return np.asarray(point + along * axis)
 
 
@@ -170,7 +171,7 @@ def _orientations(
         x_after = _normal(axes[i], axes[i + 1], origins[i + 1] - origins[i]) if i + 1 < n else None
         if x_after is None:
             x_after = placed[i].rotation[:, 0] if chain.joints[i].kind == "revolute" else x_before
-        elif float(x_after @ x_before) < -EXACT:
+        elif times(x_after, x_before) < -EXACT:
             x_after = -x_after
         after.append(np.column_stack([x_after, np.cross(axes[i], x_after), axes[i]]))
         x_before = x_after if i + 1 == n else _across(x_after, axes[i + 1])
@@ -179,7 +180,7 @@ def _orientations(
 
 def _across(direction: Array, axis: Array) -> Array:
     """The part of a unit direction across an axis; itself where it is all across."""
-    along = float(axis @ direction)
+    along = times(axis, direction)
     return direction if abs(along) < EXACT else _clean(direction - along * axis)
 
 
@@ -188,21 +189,21 @@ def _normal(axis: Array, following: Array, step: Array) -> Array | None:
     the step from one origin to the next instead."""
     normal = np.cross(axis, following)
     if _parallel(axis, following):
-        normal = step - axis * float(axis @ step)
+        normal = step - axis * times(axis, step)
         if np.linalg.norm(normal) < EXACT:
             return None
-    return _clean(normal / np.linalg.norm(normal))
+    return _clean(normal / length(normal))
 
 
 def _first_x(chain: Chain, first: Placement, axis: Array) -> Array:
     """The base is free to turn about the first axis: with gravity across it, x goes along gravity's part across."""
-    across = chain.gravity - axis * float(axis @ chain.gravity)
+    across = chain.gravity - axis * times(axis, chain.gravity)
     if np.linalg.norm(across) < EXACT * (1.0 + float(np.linalg.norm(chain.gravity))):
         return np.asarray(first.rotation[:, 0])
-    local = first.rotation.T @ across
+    local = times(first.rotation.T, across)
     if np.count_nonzero(np.abs(local) > EXACT * np.linalg.norm(across)) == 1:
         return np.asarray(first.rotation[:, 0])
-    return _clean(across / np.linalg.norm(across))
+    return _clean(across / length(across))
 
 
 def _between(rotation: Array) -> Array:

@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.robot.small import times
+
 Array = NDArray[np.float64]
 JointKind = Literal["revolute", "prismatic"]
 
@@ -48,10 +50,11 @@ class Placement:
         return Placement(np.eye(3), np.zeros(3))
 
     def __matmul__(self, inner: Placement) -> Placement:
-        return Placement(self.rotation @ inner.rotation, self.rotation @ inner.translation + self.translation)
+        translation = times(self.rotation, inner.translation) + self.translation
+        return Placement(times(self.rotation, inner.rotation), translation)
 
     def inverse(self) -> Placement:
-        return Placement(self.rotation.T, -self.rotation.T @ self.translation)
+        return Placement(self.rotation.T, -times(self.rotation.T, self.translation))
 
 
 @dataclass(frozen=True, slots=True)

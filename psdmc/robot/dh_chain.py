@@ -15,6 +15,7 @@ from psdmc.robot.dh import DhJoint, DhLink, DhRobot, read_dh
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, standard_parameters
 from psdmc.robot.rotation import about
+from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, snap_rotation
 from psdmc.robot.zeros import COM_NAMES, canonical
 
@@ -57,7 +58,7 @@ def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tupl
             placement = before @ offset
             link = Placement(twist, np.array([row.a, 0.0, row.d]))
         else:
-            placement = before @ Placement(twist, twist @ [row.a, 0.0, row.d]) @ offset
+            placement = before @ Placement(twist, times(twist, np.array([row.a, 0.0, row.d]))) @ offset
             link = Placement.identity()
         joints.append(Joint(row.name, link_name(number), row.kind, placement, link, row.limits))
         before = link

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from psdmc.robot.chain import Array
+from psdmc.robot.small import times
 from psdmc.robot.snap import snap_rotation
 
 
@@ -26,4 +27,4 @@ def roll_pitch_yaw(angles: tuple[float, float, float], snap: float = 0.0) -> Arr
     angles, snap   rad
     """
     roll, pitch, yaw = (snap_rotation(about(axis, angle), snap)[0] for axis, angle in enumerate(angles))
-    return yaw @ pitch @ roll
+    return np.asarray(times(times(yaw, pitch), roll))

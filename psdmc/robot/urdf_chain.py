@@ -11,6 +11,7 @@ from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, without_noise
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 from psdmc.robot.rotation import roll_pitch_yaw
+from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, snap_translation
 from psdmc.robot.tree import Route, find_route
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
@@ -39,7 +40,7 @@ def urdf_draft(
         parameters=tuple(np.append(x, 0.0) for x in bodies),
         zeros=tuple(("m",) if joint.link_name in bare else () for joint in joints),
         drives=(False,) * len(joints),
-        gravity=base_rotation.T @ root_gravity + 0.0,
+        gravity=times(base_rotation.T, root_gravity) + 0.0,
         tip=tip_frame,
         snaps=(*base_snaps, *snaps),
         notes=(

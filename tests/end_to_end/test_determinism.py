@@ -1,4 +1,5 @@
-"""Same input, same bytes: model file and C package, under three PYTHONHASHSEEDs and in processes of their own."""
+"""Same input, same bytes: model file and C package, under three PYTHONHASHSEEDs and in processes of their own; and the
+same operations whatever instructions BLAS takes its sums with."""
 
 from __future__ import annotations
 
@@ -27,3 +28,27 @@ def test_same_model_and_same_c(name: str, tmp_path: Path):
     for other in made[1:]:
         assert list(other) == list(made[0])
         assert [path for path, content in other.items() if content != made[0][path]] == []
+
+
+@pytest.mark.parametrize("name", ["kr6", "rounded_arm"])
+def test_another_processors_blas_gives_the_same_operations(name: str, tmp_path: Path):
+    """Last digits of BLAS differ between processors; which numbers are zero, one or equal must not."""
+    headers = []
+    for kernels in ("Sandybridge", "Haswell"):
+        folder = tmp_path / kernels
+        folder.mkdir()
+        functions = "inverse_dynamics,mass_matrix,forward_dynamics"
+        for words in (
+            ("derive", robot_path(name), "-o", "m.npz"),
+            ("emit-c", "m.npz", "-o", "c", "--functions", functions),
+        ):
+            done = typed(*words, cwd=folder, OPENBLAS_CORETYPE=kernels)
+            assert done.returncode == 0, done.stderr
+        headers.append([line for line in _text(files_in(folder), ".h") if " mul + " in line])
+
+    assert len(headers[0]) == 6
+    assert headers[0] == headers[1]
+
+
+def _text(files: dict[str, bytes], ending: str) -> list[str]:
+    return [line for path in files if path.endswith(ending) for line in files[path].decode().splitlines()]

@@ -1,0 +1,66 @@
+"""Columns as combinations of some of them, in extended precision: what must be exactly zero or one comes out so.
+
+LAPACK's results differ in the last digit from one processor to the next, and with them which numbers are equal. Here
+every operation is elementwise, in NumPy's longest float, so that generated code is the same on every x86.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Long = NDArray[Any]
+"""An array of np.longdouble: 64 bits of mantissa on x86, 113 on most Arm, 53 where the C library has no more."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tableau:
+    """Coordinates of all columns in a basis of some of them.
+
+    basis    r column indices; row i belongs to basis[i]
+    entries  (r, columns) columns = columns[:, basis] @ entries; unit vectors in the basis's own columns
+    """
+
+    basis: tuple[int, ...]
+    entries: Long
+
+    @staticmethod
+    def of(columns: Long, basis: Sequence[int]) -> Tableau:
+        """By Gauss-Jordan elimination with row pivots; the basis's columns must be independent."""
+        rest = columns.copy()
+        rows: list[int] = []
+        for j in basis:
+            free = np.abs(rest[:, j])
+            free[rows] = -1.0
+            row = int(np.argmax(free))
+            rows.append(row)
+            _pivot(rest, row, j)
+        return Tableau(tuple(basis), rest[rows])
+
+    def within(self, basis: Sequence[int]) -> Tableau:
+        """The same columns in another basis, which must be one."""
+        entering = [j for j in basis if j not in self.basis]
+        leaving = [i for i, j in enumerate(self.basis) if j not in basis]
+        now, entries = list(self.basis), self.entries.copy()
+        while entering:
+            block = np.abs(entries[np.ix_(leaving, entering)])
+            row, column = np.unravel_index(int(np.argmax(block)), block.shape)
+            i, j = leaving.pop(int(row)), entering.pop(int(column))
+            _pivot(entries, i, j)
+            now[i] = j
+        order = [now.index(j) for j in basis]
+        return Tableau(tuple(basis), entries[order])
+
+
+def _pivot(entries: Long, row: int, column: int) -> None:
+    """Make `column` the unit vector of `row`."""
+    entries[row] /= entries[row, column]
+    factors = entries[:, column].copy()
+    factors[row] = 0.0
+    used = np.flatnonzero(factors)
+    entries[used] -= factors[used, None] * entries[row]
+    entries[used, column] = 0.0
