@@ -56,7 +56,7 @@ OUTSIDE = {
     "cli": {"typer", "rich", "numpy"},
 }
 
-SHARED = {"errors"}
+SHARED = {"errors", "version"}
 ENTRY_POINTS = {"__init__", "__main__"}
 
 

@@ -17,6 +17,7 @@ from psdmc.model.check import check_model
 from psdmc.model.store import load
 from psdmc.robot.load import DEFAULT_SNAP, load_robot
 from psdmc.toolchain.build_package import build_package
+from psdmc.version import psdmc_version
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -34,8 +35,19 @@ RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="URDF, or DH ta
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="model file made by psdmc derive (.npz)")]
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"psdmc {psdmc_version()}")
+        raise typer.Exit
+
+
 @app.callback()
-def options(debug: Annotated[bool, typer.Option("--debug", help="show tracebacks")] = False) -> None:
+def options(
+    debug: Annotated[bool, typer.Option("--debug", help="show tracebacks")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="print it", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
     """Options before the command."""
 
 
@@ -147,7 +159,9 @@ def emit_c(
     lowering: Annotated[str, typer.Option(help="auto, expanded or factored")] = "auto",
     functions: Annotated[str, typer.Option(metavar="NAME,...", help="generate these functions only")] = "",
     real: Annotated[str, typer.Option(help="float64 or float32")] = "float64",
-    trig: Annotated[str, typer.Option(help="inline or libm")] = "inline",
+    trig: Annotated[
+        str, typer.Option(help="inline, freestanding (no libm, NaN beyond 1e5 rad) or libm")
+    ] = "inline",
     name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
 ) -> None:

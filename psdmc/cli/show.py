@@ -63,10 +63,10 @@ def _joints(joints: Sequence[Joint], errors: Sequence[float]) -> Table:
             escape(joint.name),
             escape(joint.link_name),
             joint.kind,
-            f"{_limit(limits.lower)} .. {_limit(limits.upper)} {unit}",
-            f"{_limit(limits.speed)} {unit}/s",
-            f"{_limit(limits.acceleration)} {unit}/s^2",
-            f"{_limit(limits.effort)} {'N m' if joint.kind == 'revolute' else 'N'}",
+            _range(limits.lower, limits.upper, unit),
+            _limit(limits.speed, f"{unit}/s"),
+            _limit(limits.acceleration, f"{unit}/s^2"),
+            _limit(limits.effort, "N m" if joint.kind == "revolute" else "N"),
             f"{error:.1e}",
         )
     return table
@@ -89,8 +89,14 @@ def _snapping(model: DynamicsModel) -> list[str]:
     return [f"snapping changed torques by at most {max(effect):.2g} N m"]
 
 
-def _limit(value: float) -> str:
-    return "none" if math.isinf(value) else f"{value:.4g}"
+def _limit(value: float, unit: str) -> str:
+    return "none" if math.isinf(value) else f"{value:.4g} {unit}"
+
+
+def _range(lower: float, upper: float, unit: str) -> str:
+    if math.isinf(lower) and math.isinf(upper):
+        return "none"
+    return f"{lower:.4g} .. {upper:.4g} {unit}"
 
 
 def _numbers(values: Iterable[float]) -> str:

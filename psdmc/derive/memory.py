@@ -23,6 +23,10 @@ optimistic check: with oblique axes the mass matrix keeps up to six times the la
 joints), and only then is the number of velocity terms known."""
 
 
+HEADROOM = 0.75
+"""Part of the free memory that an expansion may plan for: the estimate is one, and others run on the machine, too."""
+
+
 def largest_function_count(kinds: Sequence[JointKind]) -> int:
     """The p of a chain of these joints with axes in general position; no such chain has more.
 
@@ -72,8 +76,8 @@ def refuse_beyond(needed: int, available: int, functions: int, n: int) -> None:
 
 
 def available_memory() -> int:
-    """Bytes that this process may still take: what the machine has free, or its control group's rest."""
-    return min(_machine_memory(), _group_memory())
+    """Bytes that an expansion may plan for: most of what the machine has free, or its control group's rest."""
+    return int(HEADROOM * min(_machine_memory(), _group_memory()))
 
 
 def _machine_memory() -> int:

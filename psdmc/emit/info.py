@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.version import psdmc_version
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +118,3 @@ def _parameters(model: DynamicsModel) -> tuple[BaseParameterInfo, ...]:
         BaseParameterInfo(str(parameter.equation), str(parameter.unit), value)
         for parameter, value in zip(known, values, strict=True)
     )
-
-
-def psdmc_version() -> str:
-    try:
-        return version("psdmc")
-    except PackageNotFoundError:
-        return "unknown"

@@ -17,7 +17,6 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from scipy import sparse
 from psdmc.errors import InputError
 from psdmc.model.chain_json import chain_from_json, chain_to_json
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.version import psdmc_version
 
 SCHEMA = 1
 FORMAT = "psdmc model"
@@ -123,20 +123,13 @@ def _manifest(model: DynamicsModel) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "schema": SCHEMA,
-        "psdmc": _psdmc_version(),
+        "psdmc": psdmc_version(),
         "expanded": model.E is not None,
         "theta_b_known": model.theta_b is not None,
         "certificate": model.certificate.tolist(),
         "chain": chain_to_json(model.chain),
         "provenance": dict(model.provenance),
     }
-
-
-def _psdmc_version() -> str:
-    try:
-        return version("psdmc")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _hash(arrays: Arrays, manifest: Mapping[str, Any]) -> str:

@@ -145,3 +145,8 @@ def code_alone(text: str) -> str:
             code.append(text[i])
             i += 1
     return "".join(code)
+
+
+def test_the_version_is_the_installed_one(capsys: pytest.CaptureFixture[str]):
+    assert status("--version") == 0
+    assert re.fullmatch(r"psdmc \d+\.\d+\.\d+\S*\n", capsys.readouterr().out)
