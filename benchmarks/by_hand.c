@@ -1,24 +1,14 @@
-/* One emitted library timed by hand, sharing no code with the bench: its figures must agree with the page's within 15 %.
- *
- *   psdmc derive examples/robots/kr6.toml -o generated/kr6.npz && psdmc emit-c generated/kr6.npz -o generated/kr6
- *   gcc -O3 -march=native -ffp-contract=fast -fno-math-errno -fno-trapping-math -Igenerated/kr6/include \
- *       -DROBOT=kr6 -DHEADER='<kr6/kr6.h>' benchmarks/by_hand.c generated/kr6/src/[a-z]*.c -lm -o generated/by_hand
- *   generated/by_hand
- */
+/* The emitted KR6 library timed by hand, sharing no code with the bench. benchmarks/by_hand.sh compiles and runs it. */
 #define _POSIX_C_SOURCE 200809L
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 
-#include HEADER
+#include <kr6/kr6.h>
 
-#define JOIN2(a, b) a##b
-#define JOIN(a, b) JOIN2(a, b)
-#define OF_ROBOT(name) JOIN(ROBOT, name)
+enum { N = kr6_DOF, STATES = 65536, PASSES = 15, BLOCK = 4096, LARGEST = kr6_DOF * kr6_BASE_PARAMETERS, RING = 128 };
 
-enum { N = OF_ROBOT(_DOF), STATES = 65536, PASSES = 15, RING = 4096 };
-
-static double q[STATES * N], qd[STATES * N], x[STATES * N], out[RING * N];
+static _Alignas(64) double q[STATES * N], qd[STATES * N], x[STATES * N], out[RING * LARGEST];
 
 static double seconds(void)
 {
@@ -41,8 +31,21 @@ static int ascending(const void *a, const void *b)
 static void report(const char *name, double *passes)
 {
     qsort(passes, PASSES, sizeof *passes, ascending);
-    printf("%-24s median %7.1f, best %7.1f ns per state\n", name, 1e9 * passes[PASSES / 2] / STATES, 1e9 * passes[0] / STATES);
+    printf("psdmc      %-28s %8.1f ns\n", name, 1e9 * passes[PASSES / 2] / STATES);
 }
+
+/* The median pass over all states, `step` of them a call. */
+#define TIME(name, step, call) \
+    for (int pass = 0; pass < PASSES; ++pass) { \
+        const double start = seconds(); \
+        for (size_t i = 0; i < STATES; i += (step)) { \
+            double *to = out + i / (step) % ((step) > 1 ? 1 : RING) * LARGEST; \
+            call; \
+        } \
+        passes[pass] = seconds() - start; \
+        check += out[1]; \
+    } \
+    report(name, passes)
 
 int main(void)
 {
@@ -52,29 +55,13 @@ int main(void)
         qd[i] = random_in(3.0);
         x[i] = random_in(15.0);
     }
-    for (int pass = 0; pass < PASSES; ++pass) {
-        const double start = seconds();
-        for (size_t i = 0; i < STATES; ++i)
-            OF_ROBOT(_inverse_dynamics)(q + i * N, qd + i * N, x + i * N, out + i % RING * N);
-        passes[pass] = seconds() - start;
-        check += out[N];
-    }
-    report("inverse_dynamics", passes);
-    for (int pass = 0; pass < PASSES; ++pass) {
-        const double start = seconds();
-        for (size_t i = 0; i < STATES; ++i)
-            OF_ROBOT(_forward_dynamics)(q + i * N, qd + i * N, x + i * N, out + i % RING * N);
-        passes[pass] = seconds() - start;
-        check += out[N];
-    }
-    report("forward_dynamics", passes);
-    for (int pass = 0; pass < PASSES; ++pass) {
-        const double start = seconds();
-        for (size_t i = 0; i < STATES; i += RING)
-            OF_ROBOT(_inverse_dynamics_batch)(RING, q + i * N, qd + i * N, x + i * N, out);
-        passes[pass] = seconds() - start;
-        check += out[N];
-    }
-    report("inverse_dynamics_batch", passes);
+    TIME("inverse_dynamics", 1, kr6_inverse_dynamics(q + i * N, qd + i * N, x + i * N, to));
+    TIME("forward_dynamics", 1, kr6_forward_dynamics(q + i * N, qd + i * N, x + i * N, to));
+    TIME("mass_matrix", 1, kr6_mass_matrix(q + i * N, to));
+    TIME("regressor", 1, kr6_regressor(q + i * N, qd + i * N, x + i * N, to));
+    TIME("inverse_dynamics rows", BLOCK, kr6_inverse_dynamics_batch(BLOCK, q + i * N, qd + i * N, x + i * N, to));
+    TIME("forward_dynamics rows", BLOCK, kr6_forward_dynamics_batch(BLOCK, q + i * N, qd + i * N, x + i * N, to));
+    TIME("inverse_dynamics lanes", BLOCK, kr6_inverse_dynamics_batch_soa(BLOCK, q + i * N, qd + i * N, x + i * N, to));
+    TIME("forward_dynamics lanes", BLOCK, kr6_forward_dynamics_batch_soa(BLOCK, q + i * N, qd + i * N, x + i * N, to));
     return check == 0.0;
 }

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from psdmc.bench.states import States
+from psdmc.bench.states import States, at_cache_line
 from psdmc.robot.chain import Array
 
 Layout = Literal["state", "rows", "lanes"]
@@ -95,7 +95,7 @@ class Runner:
         self._library = ctypes.CDLL(str(contestant.library))
         self._inputs = states.inputs(contestant.function, contestant.lanes)
         ring = min(states.count, max(TAIL_BLOCK, 1 << int(np.log2(RING_BYTES / (8 * contestant.outputs)))))
-        self._output = np.zeros(ring * contestant.outputs)
+        self._output = at_cache_line(ring * contestant.outputs)
         self._block = min(BLOCK, states.count) if contestant.layout == "state" else ring
         self._states = states
         self.setup()
