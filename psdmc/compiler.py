@@ -97,7 +97,7 @@ def emit_c(
     lowering   which arithmetic: "auto" takes the cheaper per function
     functions  names of functions to generate; None: all that the model admits
     real       precision of the package
-    trig       sine and cosine "inline", for all joints at once, or from "libm"
+    trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"
     name       the robot's name in C; None: the robot's own
     force      whether to overwrite files that psdmc did not write
     """
@@ -130,7 +130,7 @@ def _package(
 ) -> PackageView:
     _choose("lowering", lowering, ("auto", "expanded", "factored"))
     _choose("real", options.real, ("float64", "float32"))
-    _choose("trig", options.trig, ("inline", "libm"))
+    _choose("trig", options.trig, ("inline", "libm", "freestanding"))
     kernels = lower(model, lowering, functions, progress)
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     return package_view(package_info(model, name, shown), kernels, options, references(model))

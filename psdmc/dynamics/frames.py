@@ -70,6 +70,11 @@ class Turn(NamedTuple):
     sine: Scalar
     cosine: Scalar
 
+    def then(self, other: Turn) -> Turn:
+        """Both turns as one, by the addition theorems."""
+        s, c = self.sine, self.cosine
+        return Turn(s * other.cosine + c * other.sine, c * other.cosine - s * other.sine)
+
     def outward(self, v: Vector) -> Vector:
         """Rz^T v: from the frame before the turn into the frame after it."""
         s, c = self.sine, self.cosine
@@ -113,6 +118,11 @@ def outward(turn: Turn | None, v: Vector) -> Vector:
 
 def inward(turn: Turn | None, v: Vector) -> Vector:
     return v if turn is None else turn.inward(v)
+
+
+def joined(first: Turn | None, second: Turn | None) -> Turn | None:
+    """One turn after another."""
+    return second if first is None else first if second is None else first.then(second)
 
 
 def joint_angle(frame: Frame, q: Scalar) -> Angle:

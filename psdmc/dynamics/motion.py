@@ -25,6 +25,7 @@ from psdmc.dynamics.frames import (
     Frame,
     Turn,
     from_previous,
+    joined,
     joint_angle,
     joint_offset,
     outward,
@@ -35,11 +36,13 @@ from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, multiply, t
 @dataclass(frozen=True, slots=True)
 class Choices:
     """How the recursion is arranged; see the module's docstring. `fold_double_angle` turns the folded body's second
-    moments by sincos(2 q) of its own instead of products of sincos(q)."""
+    moments by sincos(2 q) of its own instead of products of sincos(q); `add_sines` makes the compound turns' sincos from
+    those of their parts instead of a sincos of the sum."""
 
     compound: bool = False
     fold: bool = False
     fold_double_angle: bool = False
+    add_sines: bool = False
 
 
 PLAIN = Choices()
@@ -165,7 +168,7 @@ def sweep_outward(
     motions: list[LinkMotion] = []
     all_rates: list[Rates] = []
     rates, group = AT_REST, AT_REST
-    angle = NO_TURN
+    angle, turn = NO_TURN, None
     group_rates: tuple[Scalar, Scalar, Scalar] = (0.0, 0.0, 0.0)
     previous = LinkMotion(base, spin_of(AT_REST))
     last = len(frames) - 1
@@ -181,7 +184,8 @@ def sweep_outward(
         if frame.kind == "revolute":
             group_rates = (group_rates[0] + qd[i], group_rates[1] + qd_r[i], group_rates[2] + qdd_r[i])
         same = qd[i] is qd_r[i] and group.w is group.w_r
-        own_turn, turn = own_angle.turn(), angle.turn()
+        own_turn = own_angle.turn()
+        turn = joined(turn, own_turn) if joins and choices.add_sines else angle.turn()
         shifted = from_previous(frame, add(previous.acceleration, transform(previous.spin.field, offset)))
         if folded and i == last:
             before = _rates_before_turn(frame, rates)

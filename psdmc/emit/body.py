@@ -20,7 +20,7 @@ def spread(text: str, uniform: bool) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """An input that the body reads first of all; a uniform one is the same for all states."""
+    """An input that a section reads before its steps; a uniform one is the same for all states."""
 
     name: str
     vector: str
@@ -83,9 +83,11 @@ class Angle:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Steps, then the sines and cosines of the angles that they made known; stores come with the last
-    steps."""
+    """Loads, steps, then the sines and cosines of the angles that they made known. What no angle needs is loaded behind
+    the sines, so that nothing has to be kept while they call libm. Stores come with the last steps, behind all loads: an
+    output may overwrite an input."""
 
+    loads: tuple[Load, ...]
     steps: tuple[Line, ...]
     angles: tuple[Angle, ...]
     number: int
@@ -98,7 +100,6 @@ class Body:
     unused  vectors of the signature that the PROGRAM never reads
     """
 
-    loads: tuple[Load, ...]
     sections: tuple[Section, ...]
     unused: tuple[str, ...]
 
@@ -123,7 +124,7 @@ def make_body(
     writer = _Writer(program, suffix, stores_early, groups)
     sections = writer.sections(sizes)
     read = {slot.vector for slot in program.inputs()}
-    return Body(writer.loads(), sections, tuple(name for name in inputs if name not in read))
+    return Body(sections, tuple(name for name in inputs if name not in read))
 
 
 class _Writer:
@@ -139,29 +140,33 @@ class _Writer:
             self.stores.setdefault(index, []).append(slot)
         self.done = [False] * len(program)
 
-    def loads(self) -> tuple[Load, ...]:
-        return tuple(
-            Load(_load_name(slot), slot.vector, slot.index, slot.vector in UNIFORM_VECTORS)
-            for slot in self.program.inputs()
-        )
-
     def sections(self, sizes: dict[str, int]) -> tuple[Section, ...]:
         sections: list[Section] = []
         for number, group in enumerate(_angle_groups(self.program)):
-            steps = self._steps(_cone(self.program, group))
-            sections.append(Section(steps, tuple(self._angle(a) for a in group), number))
-        rest = [*self._steps(range(len(self.program))), *self._late_stores(), *self._zeros(sizes)]
-        return (*sections, Section(tuple(rest), (), len(sections)))
+            cone = _cone(self.program, group)
+            loads, steps = self._loads(cone), self._steps(cone, False)
+            sections.append(Section(loads, steps, tuple(self._angle(a) for a in group), number))
+        everything = range(len(self.program))
+        loads, steps = self._loads(everything), self._steps(everything, self.stores_early)
+        rest = (*steps, *self._late_stores(), *self._zeros(sizes))
+        return (*sections, Section(loads, rest, (), len(sections)))
 
-    def _steps(self, wanted: range | list[int]) -> tuple[Line, ...]:
+    def _loads(self, wanted: range | list[int]) -> tuple[Load, ...]:
+        """Inputs among these values that no section before has loaded."""
+        slots = {self.program.body[i].slot for i in wanted if not self.done[i]}
+        return tuple(
+            Load(_load_name(slot), slot.vector, slot.index, slot.vector in UNIFORM_VECTORS)
+            for slot in self.program.inputs()
+            if slot in slots
+        )
+
+    def _steps(self, wanted: range | list[int], with_stores: bool) -> tuple[Line, ...]:
         lines: list[Line] = []
         for i in wanted:
-            if self.done[i]:
-                continue
-            self.done[i] = True
-            if self._has_own_line(i):
+            if not self.done[i] and self._has_own_line(i):
                 lines.append(Step(f"t{i}", self._operation(i).text, self.names.uniform[i]))
-            if self.stores_early:
+            self.done[i] = True
+            if with_stores:
                 lines += self._stores_of(i)
         return tuple(lines)
 

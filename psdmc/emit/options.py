@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from psdmc.emit.trig import Far
+
 Real = Literal["float64", "float32"]
 CReal = Literal["double", "float"]
-Trig = Literal["inline", "libm"]
+Trig = Literal["inline", "libm", "freestanding"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +17,8 @@ class EmitOptions:
     """Choices of emission.
 
     real  precision of the whole package
-    trig  'inline': psdmc's own branch-free vector sincos; 'libm': the C library's sin and cos
+    trig  'inline': psdmc's own branch-free vector sincos, libm for angles beyond its range; 'freestanding': the same without
+          a library, NaN beyond; 'libm': the C library's sin and cos
     """
 
     real: Real = "float64"
@@ -24,6 +27,11 @@ class EmitOptions:
     @property
     def c_real(self) -> CReal:
         return "double" if self.real == "float64" else "float"
+
+    @property
+    def far(self) -> Far:
+        """What becomes of angles beyond the inline sincos's range."""
+        return "nan" if self.trig == "freestanding" else "libm"
 
     @property
     def lanes(self) -> int:

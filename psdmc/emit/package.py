@@ -67,13 +67,13 @@ class PackageView:
 
     @property
     def trig_preamble(self) -> TrigPreamble:
-        return trig_preamble(self.robot, self.real)
+        return trig_preamble(self.robot, self.real, self.options.far)
 
     @property
     def trig_vectors(self) -> tuple[VectorTrig, ...]:
         """The inline sincos for each vector width that internal.h may choose."""
         return tuple(
-            vector_trig(self.robot, self.real, width.lanes, vec="lanes", ivec="lane_bits")
+            vector_trig(self.robot, self.real, width.lanes, self.options.far, vec="lanes", ivec="lane_bits")
             for width in self.widths
         )
 
@@ -88,7 +88,7 @@ class PackageView:
 
     @property
     def trig_scalar(self) -> ScalarTrig:
-        return scalar_trig(self.robot, self.real)
+        return scalar_trig(self.robot, self.real, self.options.far)
 
     @property
     def description(self) -> tuple[str, ...]:
@@ -175,7 +175,7 @@ def package_files(package: PackageView) -> dict[str, str]:
 
 def library_files(package: PackageView) -> dict[str, str]:
     """The library alone: headers and sources."""
-    trig = {"libm": "sincos_libm.h.jinja", "inline": "sincos_inline.h.jinja"}[package.options.trig]
+    trig = "sincos_libm.h.jinja" if package.options.trig == "libm" else "sincos_inline.h.jinja"
     named = {
         f"include/{package.robot}/{package.robot}.h": "header.h.jinja",
         f"include/{package.robot}/{package.robot}.hpp": "header.hpp.jinja",

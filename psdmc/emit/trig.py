@@ -49,7 +49,7 @@ MOVE_MASK: dict[tuple[Real, int], tuple[str, str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class AnySign:
-    """C test whether any lane of `beyond` is negative: `c` where `guard` is defined, else `plain` < 0."""
+    """C test whether any lane of `*bits` is negative: `c` where `guard` is defined, else `plain` < 0."""
 
     guard: str
     c: str
@@ -92,8 +92,11 @@ class VectorTrig:
 
     macro: str
     symbol: str
+    near_symbol: str
     far_symbol: str
+    any_symbol: str
     about: str
+    about_near: str
     real: Real
     integer: str
     vec: str
@@ -157,8 +160,11 @@ def vector_trig(
     return VectorTrig(
         macro=_macro(prefix),
         symbol=f"{prefix}_sincos_{suffix}",
+        near_symbol=f"{prefix}_sincos_near_{suffix}",
         far_symbol=f"{prefix}_sincos_far_{suffix}",
+        any_symbol=f"{prefix}_any_sign_{suffix}",
         about=_about(real, far),
+        about_near=f"{_accuracy(real)}; beyond, the sign bit of far. Needs round-to-nearest.",
         real=real,
         integer=SIGNED[real],
         vec=vec,
@@ -182,7 +188,7 @@ def _any_sign(real: Real, lanes: int, vec: str, ivec: str) -> AnySign:
     guard, builtin, operand = MOVE_MASK[real, lanes]
     cast = vec if operand == "real" else ivec
     return AnySign(
-        guard, f"{builtin}(({cast})beyond) != 0", " | ".join(f"beyond[{lane}]" for lane in range(lanes))
+        guard, f"{builtin}(({cast})*bits) != 0", " | ".join(f"(*bits)[{lane}]" for lane in range(lanes))
     )
 
 
@@ -201,7 +207,9 @@ def _filled(value: float, real: Real, lanes: int) -> str:
 
 def _about(real: Real, far: Far) -> str:
     beyond = "libm's sine and cosine" if far == "libm" else "NaN"
-    return (
-        f"Sine and cosine, error below 1 ulp for |x| <= {plain_number(NUMBERS[real].limit, 'double')} rad; "
-        f"beyond, {beyond}. Needs round-to-nearest."
-    )
+    return f"{_accuracy(real)}; beyond, {beyond}. Needs round-to-nearest."
+
+
+def _accuracy(real: Real) -> str:
+    limit = plain_number(NUMBERS[real].limit, "double")
+    return f"Sine and cosine, error below 1 ulp for |x| <= {limit} rad"

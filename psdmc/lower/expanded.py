@@ -22,7 +22,7 @@ from psdmc.lower.expanded_terms import (
     with_gravity,
 )
 from psdmc.lower.expanded_values import polynomial_values, row_symbols
-from psdmc.lower.solve import solve_symmetric
+from psdmc.lower.solve import factorize, solve
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.functions import BY_NAME
@@ -116,8 +116,8 @@ def _outputs(tracer: Tracer, model: DynamicsModel, function_name: str, values: d
     if function_name == "forward_dynamics":
         torque = tracer.symbols("tau", n)
         load = [tau - values.get(n * n + i, 0.0) for i, tau in enumerate(torque)]
-        acceleration, pivots = solve_symmetric(_symmetric(values, n), load)
-        return _vector("qdd", acceleration) + _vector("pivot", pivots)
+        factors = factorize(_symmetric(values, n))
+        return _vector("qdd", solve(factors, load)) + _vector("pivot", factors.pivots)
     return _vector(function.output, [values.get(i, 0.0) for i in range(function.size(n, model.l))])
 
 

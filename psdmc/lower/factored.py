@@ -5,6 +5,7 @@ One PROGRAM per generated function. What can be chosen freely is in an Arrangeme
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,7 +18,7 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
 from psdmc.lower.carriers import bodies_from_carriers
 from psdmc.lower.reframe import Reframed
-from psdmc.lower.solve import solve_symmetric
+from psdmc.lower.solve import factorize, solve
 from psdmc.program.functions import BY_NAME
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
@@ -77,7 +78,7 @@ def trace_dynamics(name: str, arrangement: Arrangement, theta_b: Array | None) -
 
 def _carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:
     if theta_b is not None:
-        return [float(value) for value in arrangement.transfer @ theta_b]
+        return [math.fsum(row * theta_b) for row in arrangement.transfer]
     theta = tracer.symbols("theta_b", arrangement.transfer.shape[1])
     values: list[Scalar] = []
     for row in arrangement.transfer.tolist():
@@ -153,11 +154,12 @@ def _coriolis_matrix(g: Ingredients) -> list[tuple[Slot, Symbol | Number]]:
 
 
 def _forward_dynamics(g: Ingredients) -> list[tuple[Slot, Symbol | Number]]:
-    rows = mass_matrix(g.reframed.frames, g.bodies, g.drives, g.inputs["q"], g.choices)
+    """The mass matrix is factorized before the bias is found: its divisions wait for each other, the recursion fills
+    the time."""
+    factors = factorize(mass_matrix(g.reframed.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     bias = _torques(g, g.inputs["qd"], _still(g), g.base)
     load = [tau - h for tau, h in zip(g.inputs["tau"], bias, strict=True)]
-    qdd, pivots = solve_symmetric(rows, load)
-    return _vector("qdd", qdd) + _vector("pivot", pivots)
+    return _vector("qdd", solve(factors, load)) + _vector("pivot", factors.pivots)
 
 
 _TRACES: dict[str, Callable[[Ingredients], list[tuple[Slot, Symbol | Number]]]] = {

@@ -25,6 +25,9 @@ ALL_FUNCTIONS = tuple(function.name for function in FUNCTIONS)
 
 REGRESSORS = ("regressor", "regressor_slotine_li")
 
+WORTH_TWO_BODIES = 1.03
+"""Lanes get a body of their own only where it saves them this much: the C of both is long."""
+
 GEOMETRY = "inverse_dynamics"
 """The function whose search decides where frames sit and the unit of length, for all functions."""
 
@@ -87,7 +90,11 @@ def _refusal(model: DynamicsModel, singular: SingularMassMatrix) -> InputError:
 
 
 def _kernel(function: Function, theta: bool, single: Program, batch: Program, lowering: str) -> Kernel:
-    return Kernel(function, theta, optimize(single), optimize(batch, lanes=True), lowering)
+    for_one, for_lanes = optimize(single), optimize(batch, lanes=True)
+    if BATCH.score(for_one) <= WORTH_TWO_BODIES * BATCH.score(for_lanes):
+        shared = optimize(single, lanes=True)
+        for_lanes = shared if shared == for_one else for_lanes
+    return Kernel(function, theta, for_one, for_lanes, lowering)
 
 
 class _Lowered:

@@ -35,6 +35,9 @@ SINCOS_LANES = 8
 SINCOS_COST = 30.0
 """Instructions of one vector sincos."""
 
+ANGLE_COST = 1.0
+"""What one angle more costs where a vector has room for it: to put it in and to take sine and cosine out."""
+
 
 @dataclass(frozen=True, slots=True)
 class Target:
@@ -48,15 +51,18 @@ class Target:
         """Operations, with half the weight off those that fuse, and trigonometry."""
         c = cost(program)
         calls = math.ceil(c.sincos / self.angles_per_sincos)
-        return c.total - 0.5 * c.fused + 0.1 * c.neg + 8.0 * c.div + SINCOS_COST * calls
+        operations = c.total - 0.5 * c.fused + 0.1 * c.neg + 8.0 * c.div
+        return operations + SINCOS_COST * calls + ANGLE_COST * c.sincos
 
 
 SINGLE = Target("single", SINCOS_LANES)
 BATCH = Target("batch", 1)
 
-ALL_CHOICES = tuple(
+CHOICES = tuple(
     Choices(compound, fold, double) for compound, fold, double in product((False, True), repeat=3)
 )
+ALL_CHOICES = (*CHOICES, *(replace(choices, add_sines=True) for choices in CHOICES if choices.compound))
+"""What `rearranged` tries; the descent leaves added sines out, which pay only where each angle has a sincos of its own."""
 
 
 class Search:
@@ -72,7 +78,7 @@ class Search:
         """The cheapest arrangement found for one function; `start` is one found for another, whose geometry stays."""
         descent = _Descent(lambda a: trace_dynamics(name, a, self.theta_b), target, self.budget)
         if start is not None:
-            descent.consider(replace(start, choices=choices) for choices in ALL_CHOICES)
+            descent.consider(replace(start, choices=choices) for choices in CHOICES)
         else:
             for candidate in all_feet(self.chain):
                 descent.consider(self.starts(candidate))
@@ -100,7 +106,7 @@ class Search:
         weights = [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
         carriers = space.lightest(weights)
         transfer = space.transfer(carriers)
-        for choices in ALL_CHOICES:
+        for choices in CHOICES:
             yield Arrangement(reframed, 1.0, carriers, transfer, choices)
 
     def _units(self, found: Arrangement) -> Iterator[Arrangement]:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from psdmc.dynamics.scalar import Scalar
+
+Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class SingularMassMatrix(Exception):
@@ -15,36 +18,55 @@ class SingularMassMatrix(Exception):
         self.joint = joint
 
 
-def solve_symmetric(
-    matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]
-) -> tuple[list[Scalar], list[Scalar]]:
-    """x and the n pivots, all positive where M is positive definite.
+@dataclass(frozen=True, slots=True)
+class Factors:
+    """M = L^T D L with L unit lower triangular and D diagonal.
 
-    M = L^T D L with L unit lower triangular: elimination starts at the tip, whose entries the composite-rigid-body sweep
-    finishes first (Featherstone 2008, section 6.5). Raises SingularMassMatrix where a pivot is a constant not above 0.
+    pivots    (n)  D, all positive where M is positive definite
+    inverses  (n)  1 / D
+    lower     row k: L's k entries left of the diagonal
+    scaled    row k: those times D's
     """
-    n = len(right)
+
+    pivots: tuple[Scalar, ...]
+    inverses: tuple[Scalar, ...]
+    lower: Rows
+    scaled: Rows
+
+
+def factorize(matrix: Sequence[Sequence[Scalar]]) -> Factors:
+    """Elimination from the tip, whose entries the composite-rigid-body sweep finishes first (Featherstone 2008,
+    section 6.5). Raises SingularMassMatrix where a pivot is a constant not above 0."""
+    n = len(matrix)
     rows = [list(row) for row in matrix]
-    load = list(right)
-    factors: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
-    pivots: list[Scalar] = [0.0] * n
-    scaled: list[Scalar] = [0.0] * n
+    inverses: list[Scalar] = [0.0] * n
+    lower: list[list[Scalar]] = [[] for _ in range(n)]
     for k in reversed(range(n)):
-        pivots[k] = rows[k][k]
-        if isinstance(pivots[k], float) and pivots[k] <= 0.0:
+        pivot = rows[k][k]
+        if isinstance(pivot, float) and pivot <= 0.0:
             raise SingularMassMatrix(k)
-        inverse = 1.0 / pivots[k]
-        scaled[k] = load[k] * inverse
-        for i in range(k):
-            factors[k][i] = rows[k][i] * inverse
+        inverses[k] = 1.0 / pivot
+        lower[k] = [rows[k][i] * inverses[k] for i in range(k)]
         for i in range(k):
             for j in range(i + 1):
-                rows[i][j] = rows[i][j] - factors[k][i] * rows[k][j]
-            load[i] = load[i] - rows[k][i] * scaled[k]
-    solution: list[Scalar] = []
-    for k in range(n):
-        value = scaled[k]
-        for i in range(k):
-            value = value - factors[k][i] * solution[i]
-        solution.append(value)
-    return solution, pivots
+                rows[i][j] = rows[i][j] - lower[k][i] * rows[k][j]
+    return Factors(
+        pivots=tuple(rows[k][k] for k in range(n)),
+        inverses=tuple(inverses),
+        lower=tuple(tuple(row) for row in lower),
+        scaled=tuple(tuple(rows[k][:k]) for k in range(n)),
+    )
+
+
+def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
+    """x of L^T D L x = right."""
+    load = list(right)
+    solution = list(right)
+    for k in reversed(range(len(load))):
+        solution[k] = load[k] * factors.inverses[k]
+        for i, entry in enumerate(factors.scaled[k]):
+            load[i] = load[i] - entry * solution[k]
+    for k, row in enumerate(factors.lower):
+        for i, entry in enumerate(row):
+            solution[k] = solution[k] - entry * solution[i]
+    return solution

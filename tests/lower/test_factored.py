@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from random_chains import Oracle, random_chain, relative_error, states
 from scipy.spatial.transform import Rotation
 
-from psdmc.lower.carriers import carrier_space
+from psdmc.lower.carriers import carrier_space, link_map
 from psdmc.lower.factored import trace_dynamics, trace_jacobian, trace_regressor
 from psdmc.lower.reframe import reframe
 from psdmc.lower.search import ALL_CHOICES, BATCH, SINGLE, Search, all_feet
-from psdmc.lower.solve import SingularMassMatrix, solve_symmetric
+from psdmc.lower.solve import SingularMassMatrix, factorize
+from psdmc.lower.tableau import Tableau
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
 from psdmc.robot.chain import Chain, Placement
@@ -123,11 +124,17 @@ def test_coriolis_matrix_leaves_the_rate_of_the_mass_matrix_skew():
 def test_carriers_are_as_many_as_the_base_parameters_and_reproduce_any_model():
     chain = random_chain(11, "RRRRRR", tidy=True)
     representative, _ = known(chain)
-    space = carrier_space(reframe(chain, ["previous"] * 6), representative)
+    reframed = reframe(chain, ["previous"] * 6)
+    space = carrier_space(reframed, representative)
     carriers = space.lightest([1.0] * space.count)
     assert len(carriers) == space.columns.shape[0] == np.linalg.matrix_rank(space.columns)
     transfer = space.transfer(carriers)
-    np.testing.assert_allclose(space.columns[:, list(carriers)] @ transfer, space.target, atol=1e-9)
+    plain = Tableau.of(space.columns.astype(np.longdouble), carriers).entries
+    lift = np.zeros((space.count, representative.shape[1]))
+    for k, place in enumerate(reframed.link_frames):
+        lift[11 * k : 11 * k + 11] = link_map(place) @ representative[11 * k : 11 * k + 11]
+    np.testing.assert_allclose(space.columns[:, list(carriers)] @ plain, space.columns, atol=1e-9)
+    np.testing.assert_allclose(space.columns[:, list(carriers)] @ transfer, space.columns @ lift, atol=1e-9)
 
 
 def test_search_never_ends_dearer_than_it_starts():
@@ -151,13 +158,32 @@ def test_lanes_of_states_pay_for_every_angle_and_one_state_does_not():
     assert one.total <= lanes.total
 
 
-def test_choices_are_all_tried():
-    assert len(set(ALL_CHOICES)) == 8
+def test_every_choice_gives_pinocchios_torques():
+    """Three parallel axes, so that compound turns and added sines have something to do."""
+    chain = random_chain(7, "RRRRR", tidy=False)
+    joints = list(chain.joints)
+    for k in (2, 3):
+        joints[k] = replace(joints[k], placement=Placement(np.eye(3), joints[k].placement.translation))
+    chain = replace(chain, joints=tuple(joints))
+    representative, theta_b = known(chain)
+    found = Search(chain, representative, theta_b, budget=20).best("inverse_dynamics", SINGLE)
+    q, qd, qdd = states(5, 50)
+    expected = Oracle(chain).rnea(q, qd, qdd)
+    sincos = {}
+    for choices in ALL_CHOICES:
+        program = trace_dynamics("inverse_dynamics", replace(found, choices=choices), theta_b)
+        torque = run(program, 5, 5, "tau", q=q, qd=qd, qdd=qdd)
+        assert relative_error(torque, expected) < 1e-12
+        sincos[choices] = cost(program).sincos
+    of_sums = [sincos[replace(choices, add_sines=False)] for choices in ALL_CHOICES if choices.add_sines]
+    assert [sincos[choices] for choices in ALL_CHOICES if choices.add_sines] == [
+        count - 2 for count in of_sums
+    ]
 
 
 def test_a_mass_matrix_without_inertia_is_named_singular():
     with pytest.raises(SingularMassMatrix) as caught:
-        solve_symmetric([[1.0, 0.0], [0.0, 0.0]], [1.0, 1.0])
+        factorize([[1.0, 0.0], [0.0, 0.0]])
     assert caught.value.joint == 1
 
 

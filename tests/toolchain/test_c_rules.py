@@ -49,6 +49,8 @@ def _compile(words: list[str]) -> None:
         (("float32", "inline"), "-march=native"),
         (("float32", "libm"), "-g0"),
         (("float64", "libm"), "-march=native"),
+        (("float64", "freestanding"), "-march=native"),
+        (("float32", "freestanding"), "-Dtest_arm_NO_VECTORS"),
     ],
 )
 @pytest.mark.parametrize("compiler", COMPILERS)
@@ -88,6 +90,22 @@ def test_without_vectors_it_is_plain_c99(compiler: str, options: tuple[str, str]
         own = _own_lines(text, tmp_path)
         assert len(own) > 10
         assert [line for line in own if re.search(GNU_C, line)] == []
+
+
+@pytest.mark.parametrize("real", ["float64", "float32"])
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_freestanding_code_needs_no_library(compiler: str, real: str, tmp_path: Path) -> None:
+    """Of what it leaves to the linker, only what a freestanding compiler itself may call."""
+    _need(compiler)
+    package = arm_package(options=EmitOptions(real, "freestanding"))  # type: ignore[arg-type]
+    write_sources(package, tmp_path)
+    sources = [str(tmp_path / source) for source in package.sources]
+    words = [compiler, "-std=c99", "-ffreestanding", "-O2", "-nostdlib", "-r", f"-I{tmp_path}/include"]
+    _compile([*words, *sources, "-o", str(tmp_path / "all.o")])
+    missing = subprocess.run(
+        ["nm", "-u", str(tmp_path / "all.o")], capture_output=True, text=True, check=True
+    )
+    assert set(missing.stdout.replace(" U ", " ").split()) <= {"memcpy", "memset", "memmove", "memcmp"}
 
 
 def _own_lines(preprocessed: str, folder: Path) -> list[str]:

@@ -26,6 +26,8 @@ BUILDS = [
     ("float64", "inline", "sse2"),
     ("float64", "inline", "plain"),
     ("float64", "libm", "widest"),
+    ("float64", "freestanding", "widest"),
+    ("float64", "freestanding", "plain"),
     ("float32", "inline", "widest"),
     ("float32", "inline", "sse2"),
 ]
@@ -92,6 +94,47 @@ def test_states_that_lie_lane_by_lane_give_what_the_program_gives(compiled: Dire
 
         rows = found.transpose(0, 2, 1).reshape(blocks * lanes, -1)[:count]
         assert error(rows, reference) < TOLERANCE[compiled.package.options.real]
+
+
+FAR = {"float64": 3e5, "float32": 3e3}
+"""rad: beyond what the inline sine reaches by itself."""
+
+
+@pytest.mark.parametrize("name", [name for name, kernel in KERNELS.items() if not kernel.theta])
+def test_an_angle_that_takes_libm_changes_no_other_lane(compiled: Direct, name: str) -> None:
+    """Far angles in some lanes, in several joints: every row as the PROGRAM has it, near ones bit for bit as without."""
+    if compiled.package.options.far == "nan":
+        pytest.skip("no libm: see the test of NaN")
+    real, lanes = compiled.package.options.real, compiled.package.lanes
+    count, far = 2 * lanes, [1, lanes + 2, lanes + 3]
+    given, _ = _given(compiled, KERNELS[name], count)
+    near = np.empty((count, KERNELS[name].function.size(N, L)), real)
+    compiled(f"{name}_batch", count, *given.values(), near)
+    given["q"][far] += np.asarray(FAR[real], real) * [[1, 0, 0, -2], [0, 1, 0, 0], [0, -1, 0, 3]]
+    reference = expected(KERNELS[name], given, N, L)
+    rows, blocks = np.empty_like(near), np.empty((2, near.shape[1], lanes), real)
+
+    compiled(f"{name}_batch", count, *given.values(), rows)
+    compiled(f"{name}_batch_soa", count, *(_lane_by_lane(v, lanes) for v in given.values()), blocks)
+
+    assert error(rows, reference) < TOLERANCE[real]
+    assert np.array_equal(blocks.transpose(0, 2, 1).reshape(count, -1), rows)
+    assert np.array_equal(np.delete(rows, far, 0), np.delete(near, far, 0))
+
+
+def test_without_libm_a_far_angle_gives_nan_in_its_own_lane(compiled: Direct) -> None:
+    if compiled.package.options.far == "libm":
+        pytest.skip("with libm: see the test of its values")
+    given, reference = _given(compiled, KERNELS["inverse_dynamics"], 20)
+    given["q"][5, 1] = 3e5
+    tau, one = np.empty((20, N)), np.empty(N)
+
+    compiled("inverse_dynamics_batch", 20, *given.values(), tau)
+    compiled("inverse_dynamics", *(v[5] for v in given.values()), one)
+
+    assert np.isnan(tau[5, :2]).all()
+    assert np.isnan(one[:2]).all()
+    assert error(np.delete(tau, 5, 0), np.delete(reference, 5, 0)) < TOLERANCE["float64"]
 
 
 def _lane_by_lane(rows: np.ndarray, lanes: int) -> np.ndarray:

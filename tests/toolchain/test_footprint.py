@@ -1,4 +1,4 @@
-"""Stack of every call of a six-joint package, as the compiler reports it."""
+"""What a six-joint package takes of a small machine: its source's size, and every call's stack as the compiler says it."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from psdmc.toolchain.compiler_command import FLAGS
 MOST = 16 * 1024
 """Bytes: what a small real-time thread has to spare."""
 MOST_OF_ONE_STATE = 2 * 1024
+LARGEST_SOURCE = 400 * 1024
 TARGETS = {"sse2": "-march=x86-64", "avx512": "-march=x86-64-v4"}
 
 PUBLIC = re.compile(r"kr6_((?!sincos_)\w+?)(?:_batch|_batch_soa)?$")
@@ -31,6 +32,11 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stack") / "kr6"
     emit_c(bundled_model("kr6"), folder)
     return folder
+
+
+def test_the_library_has_at_most_400_kib_of_source(package: Path) -> None:
+    files = [*(package / "src").iterdir(), package / "include/kr6/kr6.h"]
+    assert sum(file.stat().st_size for file in files) <= LARGEST_SOURCE
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -40,7 +40,9 @@ void two_link_coriolis_matrix_batch(size_t count, const double *q, const double 
         const size_t rows = count - first < LANES ? count - first : LANES;
         real q_block[2 * LANES] ALIGNED;
         real qd_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
+        fetch_ahead(block, count / LANES, qd, 2 * LANES);
         load_rows(2, rows, qd + first * 2, qd_block);
         real *C_row[LANES];
         find_rows(4, rows, C + first * 4, C_row);
@@ -55,7 +57,9 @@ void two_link_coriolis_matrix_batch_soa(size_t count, const double *q, const dou
     const size_t blocks = count / LANES + (count % LANES != 0);
     PARALLEL_FOR
     for (size_t block = 0; block < blocks; block++) {
+        fetch_ahead(block, blocks, q, 2 * LANES);
         const real *q_block = q + block * 2 * LANES;
+        fetch_ahead(block, blocks, qd, 2 * LANES);
         const real *qd_block = qd + block * 2 * LANES;
         real *C_block = C + block * 4 * LANES;
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
@@ -83,7 +87,9 @@ void two_link_coriolis_matrix_theta_batch(size_t count, const double *q, const d
         const size_t rows = count - first < LANES ? count - first : LANES;
         real q_block[2 * LANES] ALIGNED;
         real qd_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
+        fetch_ahead(block, count / LANES, qd, 2 * LANES);
         load_rows(2, rows, qd + first * 2, qd_block);
         real *C_row[LANES];
         find_rows(4, rows, C + first * 4, C_row);

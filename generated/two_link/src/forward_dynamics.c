@@ -51,8 +51,11 @@ size_t two_link_forward_dynamics_batch(size_t count, const double *q, const doub
         real tau_block[2 * LANES] ALIGNED;
         real qdd_block[2 * LANES] ALIGNED;
         real pivot_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
+        fetch_ahead(block, count / LANES, qd, 2 * LANES);
         load_rows(2, rows, qd + first * 2, qd_block);
+        fetch_ahead(block, count / LANES, tau, 2 * LANES);
         load_rows(2, rows, tau + first * 2, tau_block);
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
             forward_dynamics_lanes(q_block + lane, qd_block + lane, tau_block + lane, qdd_block + lane, pivot_block + lane);
@@ -72,8 +75,11 @@ size_t two_link_forward_dynamics_batch_soa(size_t count, const double *q, const 
     size_t failed = count;
     PARALLEL_FOR_FIRST(failed)
     for (size_t block = 0; block < blocks; block++) {
+        fetch_ahead(block, blocks, q, 2 * LANES);
         const real *q_block = q + block * 2 * LANES;
+        fetch_ahead(block, blocks, qd, 2 * LANES);
         const real *qd_block = qd + block * 2 * LANES;
+        fetch_ahead(block, blocks, tau, 2 * LANES);
         const real *tau_block = tau + block * 2 * LANES;
         real *qdd_block = qdd + block * 2 * LANES;
         real pivot_block[2 * LANES] ALIGNED;
@@ -92,7 +98,7 @@ size_t two_link_forward_dynamics_batch_soa(size_t count, const double *q, const 
 
 static void forward_dynamics_theta_lanes(const real *q, const real *qd, const real *tau, const real *theta_b, real *qdd, real *pivot)
 {
-#include "forward_dynamics_theta_lanes.inc"
+#include "forward_dynamics_theta.inc"
 }
 
 size_t two_link_forward_dynamics_theta_batch(size_t count, const double *q, const double *qd, const double *tau, const double *theta_b, double *qdd)
@@ -108,8 +114,11 @@ size_t two_link_forward_dynamics_theta_batch(size_t count, const double *q, cons
         real tau_block[2 * LANES] ALIGNED;
         real qdd_block[2 * LANES] ALIGNED;
         real pivot_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
+        fetch_ahead(block, count / LANES, qd, 2 * LANES);
         load_rows(2, rows, qd + first * 2, qd_block);
+        fetch_ahead(block, count / LANES, tau, 2 * LANES);
         load_rows(2, rows, tau + first * 2, tau_block);
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
             forward_dynamics_theta_lanes(q_block + lane, qd_block + lane, tau_block + lane, theta_b, qdd_block + lane, pivot_block + lane);

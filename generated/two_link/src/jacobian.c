@@ -34,6 +34,7 @@ void two_link_jacobian_batch(size_t count, const double *q, double *J)
         const size_t first = block * LANES;
         const size_t rows = count - first < LANES ? count - first : LANES;
         real q_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
         real *J_row[LANES];
         find_rows(12, rows, J + first * 12, J_row);
@@ -48,6 +49,7 @@ void two_link_jacobian_batch_soa(size_t count, const double *q, double *J)
     const size_t blocks = count / LANES + (count % LANES != 0);
     PARALLEL_FOR
     for (size_t block = 0; block < blocks; block++) {
+        fetch_ahead(block, blocks, q, 2 * LANES);
         const real *q_block = q + block * 2 * LANES;
         real *J_block = J + block * 12 * LANES;
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {

@@ -39,6 +39,7 @@ void two_link_mass_matrix_batch(size_t count, const double *q, double *M)
         const size_t first = block * LANES;
         const size_t rows = count - first < LANES ? count - first : LANES;
         real q_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
         real *M_row[LANES];
         find_rows(4, rows, M + first * 4, M_row);
@@ -53,6 +54,7 @@ void two_link_mass_matrix_batch_soa(size_t count, const double *q, double *M)
     const size_t blocks = count / LANES + (count % LANES != 0);
     PARALLEL_FOR
     for (size_t block = 0; block < blocks; block++) {
+        fetch_ahead(block, blocks, q, 2 * LANES);
         const real *q_block = q + block * 2 * LANES;
         real *M_block = M + block * 4 * LANES;
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
@@ -79,6 +81,7 @@ void two_link_mass_matrix_theta_batch(size_t count, const double *q, const doubl
         const size_t first = block * LANES;
         const size_t rows = count - first < LANES ? count - first : LANES;
         real q_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
         real *M_row[LANES];
         find_rows(4, rows, M + first * 4, M_row);

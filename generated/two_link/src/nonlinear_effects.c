@@ -18,7 +18,7 @@ void two_link_nonlinear_effects_theta(const double *q, const double *qd, const d
 
 static void nonlinear_effects_lanes(const real *q, const real *qd, real *h)
 {
-#include "nonlinear_effects_lanes.inc"
+#include "nonlinear_effects.inc"
 }
 
 void two_link_nonlinear_effects_batch(size_t count, const double *q, const double *qd, double *h)
@@ -31,7 +31,9 @@ void two_link_nonlinear_effects_batch(size_t count, const double *q, const doubl
         real q_block[2 * LANES] ALIGNED;
         real qd_block[2 * LANES] ALIGNED;
         real h_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
+        fetch_ahead(block, count / LANES, qd, 2 * LANES);
         load_rows(2, rows, qd + first * 2, qd_block);
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
             nonlinear_effects_lanes(q_block + lane, qd_block + lane, h_block + lane);
@@ -45,7 +47,9 @@ void two_link_nonlinear_effects_batch_soa(size_t count, const double *q, const d
     const size_t blocks = count / LANES + (count % LANES != 0);
     PARALLEL_FOR
     for (size_t block = 0; block < blocks; block++) {
+        fetch_ahead(block, blocks, q, 2 * LANES);
         const real *q_block = q + block * 2 * LANES;
+        fetch_ahead(block, blocks, qd, 2 * LANES);
         const real *qd_block = qd + block * 2 * LANES;
         real *h_block = h + block * 2 * LANES;
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
@@ -56,7 +60,7 @@ void two_link_nonlinear_effects_batch_soa(size_t count, const double *q, const d
 
 static void nonlinear_effects_theta_lanes(const real *q, const real *qd, const real *theta_b, real *h)
 {
-#include "nonlinear_effects_theta_lanes.inc"
+#include "nonlinear_effects_theta.inc"
 }
 
 void two_link_nonlinear_effects_theta_batch(size_t count, const double *q, const double *qd, const double *theta_b, double *h)
@@ -69,7 +73,9 @@ void two_link_nonlinear_effects_theta_batch(size_t count, const double *q, const
         real q_block[2 * LANES] ALIGNED;
         real qd_block[2 * LANES] ALIGNED;
         real h_block[2 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 2 * LANES);
         load_rows(2, rows, q + first * 2, q_block);
+        fetch_ahead(block, count / LANES, qd, 2 * LANES);
         load_rows(2, rows, qd + first * 2, qd_block);
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
             nonlinear_effects_theta_lanes(q_block + lane, qd_block + lane, theta_b, h_block + lane);

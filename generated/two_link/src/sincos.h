@@ -53,8 +53,18 @@ TWO_LINK_TRIG_RARE void two_link_sincos_far_f64x8(const lanes *x, lanes *s, lane
     }
 }
 
-/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, libm's sine and cosine. Needs round-to-nearest. */
-TWO_LINK_TRIG_INLINE void two_link_sincos_f64x8(const lanes *x_in, lanes *s, lanes *c)
+/* Whether any lane's sign bit is set. */
+TWO_LINK_TRIG_INLINE int two_link_any_sign_f64x8(const lane_bits *bits)
+{
+#if defined(__AVX512DQ__)
+    return __builtin_ia32_cvtq2mask512((lane_bits)*bits) != 0;
+#else
+    return ((*bits)[0] | (*bits)[1] | (*bits)[2] | (*bits)[3] | (*bits)[4] | (*bits)[5] | (*bits)[6] | (*bits)[7]) < 0;
+#endif
+}
+
+/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, the sign bit of far. Needs round-to-nearest. */
+TWO_LINK_TRIG_INLINE void two_link_sincos_near_f64x8(const lanes *x_in, lanes *s, lanes *c, lane_bits *far)
 {
     const lanes x = *x_in;
     /* 0x1.8p+52 is so large that its last bit is worth 1: adding it rounds, and leaves k in the low bits. */
@@ -64,6 +74,7 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x8(const lanes *x_in, lanes *s, lan
     const lane_bits index = (lane_bits)rounded;
     /* Sign bit set where |x| is too large, infinite or not a number; in integers, which no fast-math mode touches. */
     const lane_bits beyond = (lane_bits)(lanes){100000.0, 100000.0, 100000.0, 100000.0, 100000.0, 100000.0, 100000.0, 100000.0} - ((lane_bits)x & ~(lane_bits)(lanes){-0.0, -0.0, -0.0, -0.0, -0.0, -0.0, -0.0, -0.0});
+    *far = beyond;
 
     /* r - low = x - k pi/2. Each k * part is exact, so that fused and separate multiplication agree;
        r0 - r1 is exact, and what r1 - r2 (...) rounds away is kept in low. */
@@ -110,14 +121,18 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x8(const lanes *x_in, lanes *s, lan
     const lane_bits cosine_sign = ((index << 62) ^ (index << 63)) & (lane_bits)(lanes){-0.0, -0.0, -0.0, -0.0, -0.0, -0.0, -0.0, -0.0};
     sine = (lanes)((sine_bits ^ sine_sign) ^ swap);
     cosine = (lanes)((cosine_bits ^ cosine_sign) ^ swap);
+    *s = sine;
+    *c = cosine;
+}
 
-#if defined(__AVX512DQ__)
-    const int any_far = __builtin_ia32_cvtq2mask512((lane_bits)beyond) != 0;
-#else
-    const int any_far = (beyond[0] | beyond[1] | beyond[2] | beyond[3] | beyond[4] | beyond[5] | beyond[6] | beyond[7]) < 0;
-#endif
-    if (TWO_LINK_TRIG_UNLIKELY(any_far)) {
-        const lanes far_x = x;
+/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, libm's sine and cosine. Needs round-to-nearest. */
+TWO_LINK_TRIG_INLINE void two_link_sincos_f64x8(const lanes *x, lanes *s, lanes *c)
+{
+    lane_bits beyond;
+    lanes sine, cosine;
+    two_link_sincos_near_f64x8(x, &sine, &cosine, &beyond);
+    if (TWO_LINK_TRIG_UNLIKELY(two_link_any_sign_f64x8(&beyond))) {
+        const lanes far_x = *x;
         lanes far_sine = sine;
         lanes far_cosine = cosine;
         two_link_sincos_far_f64x8(&far_x, &far_sine, &far_cosine);
@@ -129,6 +144,9 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x8(const lanes *x_in, lanes *s, lan
 }
 
 #define sincos_one_vector two_link_sincos_f64x8
+#define sincos_near two_link_sincos_near_f64x8
+#define sincos_far two_link_sincos_far_f64x8
+#define sincos_any_far two_link_any_sign_f64x8
 #endif
 
 #if WIDTH == 4
@@ -144,8 +162,18 @@ TWO_LINK_TRIG_RARE void two_link_sincos_far_f64x4(const lanes *x, lanes *s, lane
     }
 }
 
-/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, libm's sine and cosine. Needs round-to-nearest. */
-TWO_LINK_TRIG_INLINE void two_link_sincos_f64x4(const lanes *x_in, lanes *s, lanes *c)
+/* Whether any lane's sign bit is set. */
+TWO_LINK_TRIG_INLINE int two_link_any_sign_f64x4(const lane_bits *bits)
+{
+#if defined(__AVX__)
+    return __builtin_ia32_movmskpd256((lanes)*bits) != 0;
+#else
+    return ((*bits)[0] | (*bits)[1] | (*bits)[2] | (*bits)[3]) < 0;
+#endif
+}
+
+/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, the sign bit of far. Needs round-to-nearest. */
+TWO_LINK_TRIG_INLINE void two_link_sincos_near_f64x4(const lanes *x_in, lanes *s, lanes *c, lane_bits *far)
 {
     const lanes x = *x_in;
     /* 0x1.8p+52 is so large that its last bit is worth 1: adding it rounds, and leaves k in the low bits. */
@@ -155,6 +183,7 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x4(const lanes *x_in, lanes *s, lan
     const lane_bits index = (lane_bits)rounded;
     /* Sign bit set where |x| is too large, infinite or not a number; in integers, which no fast-math mode touches. */
     const lane_bits beyond = (lane_bits)(lanes){100000.0, 100000.0, 100000.0, 100000.0} - ((lane_bits)x & ~(lane_bits)(lanes){-0.0, -0.0, -0.0, -0.0});
+    *far = beyond;
 
     /* r - low = x - k pi/2. Each k * part is exact, so that fused and separate multiplication agree;
        r0 - r1 is exact, and what r1 - r2 (...) rounds away is kept in low. */
@@ -201,14 +230,18 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x4(const lanes *x_in, lanes *s, lan
     const lane_bits cosine_sign = ((index << 62) ^ (index << 63)) & (lane_bits)(lanes){-0.0, -0.0, -0.0, -0.0};
     sine = (lanes)((sine_bits ^ sine_sign) ^ swap);
     cosine = (lanes)((cosine_bits ^ cosine_sign) ^ swap);
+    *s = sine;
+    *c = cosine;
+}
 
-#if defined(__AVX__)
-    const int any_far = __builtin_ia32_movmskpd256((lanes)beyond) != 0;
-#else
-    const int any_far = (beyond[0] | beyond[1] | beyond[2] | beyond[3]) < 0;
-#endif
-    if (TWO_LINK_TRIG_UNLIKELY(any_far)) {
-        const lanes far_x = x;
+/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, libm's sine and cosine. Needs round-to-nearest. */
+TWO_LINK_TRIG_INLINE void two_link_sincos_f64x4(const lanes *x, lanes *s, lanes *c)
+{
+    lane_bits beyond;
+    lanes sine, cosine;
+    two_link_sincos_near_f64x4(x, &sine, &cosine, &beyond);
+    if (TWO_LINK_TRIG_UNLIKELY(two_link_any_sign_f64x4(&beyond))) {
+        const lanes far_x = *x;
         lanes far_sine = sine;
         lanes far_cosine = cosine;
         two_link_sincos_far_f64x4(&far_x, &far_sine, &far_cosine);
@@ -220,6 +253,9 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x4(const lanes *x_in, lanes *s, lan
 }
 
 #define sincos_one_vector two_link_sincos_f64x4
+#define sincos_near two_link_sincos_near_f64x4
+#define sincos_far two_link_sincos_far_f64x4
+#define sincos_any_far two_link_any_sign_f64x4
 #endif
 
 #if WIDTH == 2
@@ -235,8 +271,18 @@ TWO_LINK_TRIG_RARE void two_link_sincos_far_f64x2(const lanes *x, lanes *s, lane
     }
 }
 
-/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, libm's sine and cosine. Needs round-to-nearest. */
-TWO_LINK_TRIG_INLINE void two_link_sincos_f64x2(const lanes *x_in, lanes *s, lanes *c)
+/* Whether any lane's sign bit is set. */
+TWO_LINK_TRIG_INLINE int two_link_any_sign_f64x2(const lane_bits *bits)
+{
+#if defined(__SSE2__)
+    return __builtin_ia32_movmskpd((lanes)*bits) != 0;
+#else
+    return ((*bits)[0] | (*bits)[1]) < 0;
+#endif
+}
+
+/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, the sign bit of far. Needs round-to-nearest. */
+TWO_LINK_TRIG_INLINE void two_link_sincos_near_f64x2(const lanes *x_in, lanes *s, lanes *c, lane_bits *far)
 {
     const lanes x = *x_in;
     /* 0x1.8p+52 is so large that its last bit is worth 1: adding it rounds, and leaves k in the low bits. */
@@ -246,6 +292,7 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x2(const lanes *x_in, lanes *s, lan
     const lane_bits index = (lane_bits)rounded;
     /* Sign bit set where |x| is too large, infinite or not a number; in integers, which no fast-math mode touches. */
     const lane_bits beyond = (lane_bits)(lanes){100000.0, 100000.0} - ((lane_bits)x & ~(lane_bits)(lanes){-0.0, -0.0});
+    *far = beyond;
 
     /* r - low = x - k pi/2. Each k * part is exact, so that fused and separate multiplication agree;
        r0 - r1 is exact, and what r1 - r2 (...) rounds away is kept in low. */
@@ -292,14 +339,18 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x2(const lanes *x_in, lanes *s, lan
     const lane_bits cosine_sign = ((index << 62) ^ (index << 63)) & (lane_bits)(lanes){-0.0, -0.0};
     sine = (lanes)((sine_bits ^ sine_sign) ^ swap);
     cosine = (lanes)((cosine_bits ^ cosine_sign) ^ swap);
+    *s = sine;
+    *c = cosine;
+}
 
-#if defined(__SSE2__)
-    const int any_far = __builtin_ia32_movmskpd((lanes)beyond) != 0;
-#else
-    const int any_far = (beyond[0] | beyond[1]) < 0;
-#endif
-    if (TWO_LINK_TRIG_UNLIKELY(any_far)) {
-        const lanes far_x = x;
+/* Sine and cosine, error below 1 ulp for |x| <= 100000.0 rad; beyond, libm's sine and cosine. Needs round-to-nearest. */
+TWO_LINK_TRIG_INLINE void two_link_sincos_f64x2(const lanes *x, lanes *s, lanes *c)
+{
+    lane_bits beyond;
+    lanes sine, cosine;
+    two_link_sincos_near_f64x2(x, &sine, &cosine, &beyond);
+    if (TWO_LINK_TRIG_UNLIKELY(two_link_any_sign_f64x2(&beyond))) {
+        const lanes far_x = *x;
         lanes far_sine = sine;
         lanes far_cosine = cosine;
         two_link_sincos_far_f64x2(&far_x, &far_sine, &far_cosine);
@@ -311,6 +362,9 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64x2(const lanes *x_in, lanes *s, lan
 }
 
 #define sincos_one_vector two_link_sincos_f64x2
+#define sincos_near two_link_sincos_near_f64x2
+#define sincos_far two_link_sincos_far_f64x2
+#define sincos_any_far two_link_any_sign_f64x2
 #endif
 
 #if WIDTH == 1
@@ -396,14 +450,30 @@ TWO_LINK_TRIG_INLINE void two_link_sincos_f64(const double *x_in, double *s, dou
 #define sincos_one_vector two_link_sincos_f64
 #endif
 
-static inline void sincos_lanes(int count, const lanes *angle, lanes *sine, lanes *cosine)
+#if WIDTH > 1
+/* Angles out of reach, one lane at a time. */
+TWO_LINK_TRIG_RARE void sincos_all_far(int count, const lanes *angle, lanes *sine, lanes *cosine)
 {
     for (int k = 0; k < count; k++) {
-        sincos_one_vector(&angle[k], &sine[k], &cosine[k]);
+        sincos_far(&angle[k], &sine[k], &cosine[k]);
     }
 }
 
-#if WIDTH > 1
+/* Without a branch between the vectors, so that one fills the waiting of another. */
+TWO_LINK_TRIG_INLINE void sincos_lanes(int count, const lanes *angle, lanes *sine, lanes *cosine)
+{
+    lane_bits any = {0};
+    UNROLL
+    for (int k = 0; k < count; k++) {
+        lane_bits far;
+        sincos_near(&angle[k], &sine[k], &cosine[k], &far);
+        any |= far;
+    }
+    if (TWO_LINK_TRIG_UNLIKELY(sincos_any_far(&any))) {
+        sincos_all_far(count, angle, sine, cosine);
+    }
+}
+
 static inline void sincos_reals(int count, const real *angle, real *sine, real *cosine)
 {
     for (int first = 0; first < count; first += WIDTH) {
@@ -418,6 +488,13 @@ static inline void sincos_reals(int count, const real *angle, real *sine, real *
     }
 }
 #else
+static inline void sincos_lanes(int count, const lanes *angle, lanes *sine, lanes *cosine)
+{
+    for (int k = 0; k < count; k++) {
+        sincos_one_vector(&angle[k], &sine[k], &cosine[k]);
+    }
+}
+
 #define sincos_reals sincos_lanes
 #endif
 

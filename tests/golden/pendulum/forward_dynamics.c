@@ -35,8 +35,11 @@ size_t pendulum_forward_dynamics_batch(size_t count, const double *q, const doub
         real tau_block[1 * LANES] ALIGNED;
         real qdd_block[1 * LANES] ALIGNED;
         real pivot_block[1 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 1 * LANES);
         load_rows(1, rows, q + first * 1, q_block);
+        fetch_ahead(block, count / LANES, qd, 1 * LANES);
         load_rows(1, rows, qd + first * 1, qd_block);
+        fetch_ahead(block, count / LANES, tau, 1 * LANES);
         load_rows(1, rows, tau + first * 1, tau_block);
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
             forward_dynamics_lanes(q_block + lane, qd_block + lane, tau_block + lane, qdd_block + lane, pivot_block + lane);
@@ -56,8 +59,11 @@ size_t pendulum_forward_dynamics_batch_soa(size_t count, const double *q, const 
     size_t failed = count;
     PARALLEL_FOR_FIRST(failed)
     for (size_t block = 0; block < blocks; block++) {
+        fetch_ahead(block, blocks, q, 1 * LANES);
         const real *q_block = q + block * 1 * LANES;
+        fetch_ahead(block, blocks, qd, 1 * LANES);
         const real *qd_block = qd + block * 1 * LANES;
+        fetch_ahead(block, blocks, tau, 1 * LANES);
         const real *tau_block = tau + block * 1 * LANES;
         real *qdd_block = qdd + block * 1 * LANES;
         real pivot_block[1 * LANES] ALIGNED;

@@ -32,8 +32,11 @@ void pendulum_inverse_dynamics_batch(size_t count, const double *q, const double
         real qd_block[1 * LANES] ALIGNED;
         real qdd_block[1 * LANES] ALIGNED;
         real tau_block[1 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 1 * LANES);
         load_rows(1, rows, q + first * 1, q_block);
+        fetch_ahead(block, count / LANES, qd, 1 * LANES);
         load_rows(1, rows, qd + first * 1, qd_block);
+        fetch_ahead(block, count / LANES, qdd, 1 * LANES);
         load_rows(1, rows, qdd + first * 1, qdd_block);
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
             inverse_dynamics_lanes(q_block + lane, qd_block + lane, qdd_block + lane, tau_block + lane);
@@ -47,8 +50,11 @@ void pendulum_inverse_dynamics_batch_soa(size_t count, const double *q, const do
     const size_t blocks = count / LANES + (count % LANES != 0);
     PARALLEL_FOR
     for (size_t block = 0; block < blocks; block++) {
+        fetch_ahead(block, blocks, q, 1 * LANES);
         const real *q_block = q + block * 1 * LANES;
+        fetch_ahead(block, blocks, qd, 1 * LANES);
         const real *qd_block = qd + block * 1 * LANES;
+        fetch_ahead(block, blocks, qdd, 1 * LANES);
         const real *qdd_block = qdd + block * 1 * LANES;
         real *tau_block = tau + block * 1 * LANES;
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
@@ -73,8 +79,11 @@ void pendulum_inverse_dynamics_theta_batch(size_t count, const double *q, const 
         real qd_block[1 * LANES] ALIGNED;
         real qdd_block[1 * LANES] ALIGNED;
         real tau_block[1 * LANES] ALIGNED;
+        fetch_ahead(block, count / LANES, q, 1 * LANES);
         load_rows(1, rows, q + first * 1, q_block);
+        fetch_ahead(block, count / LANES, qd, 1 * LANES);
         load_rows(1, rows, qd + first * 1, qd_block);
+        fetch_ahead(block, count / LANES, qdd, 1 * LANES);
         load_rows(1, rows, qdd + first * 1, qdd_block);
         for (size_t lane = 0; lane < LANES; lane += WIDTH) {
             inverse_dynamics_theta_lanes(q_block + lane, qd_block + lane, qdd_block + lane, theta_b, tau_block + lane);
