@@ -6,7 +6,8 @@ made=generated/by_hand
 mkdir -p "$made"
 psdmc derive examples/robots/kr6.toml -o "$made/kr6.npz" > "$made/log" 2>&1
 psdmc emit-c "$made/kr6.npz" -o "$made/kr6" >> "$made/log" 2>&1
-gcc -std=c11 -O3 -march=native -ffp-contract=fast -fno-math-errno -fno-trapping-math -I"$made/kr6/include" \
+gcc -std=c11 -O3 -march=native -ffp-contract=fast -fno-math-errno -fno-trapping-math \
+    -fno-tree-slp-vectorize -I"$made/kr6/include" \
     benchmarks/by_hand.c "$made"/kr6/src/[a-z]*.c -lm -o "$made/psdmc"
 prefix=$(python -c 'import pinocchio; print(pinocchio.__file__.split("/lib/python")[0])')
 g++ -std=c++17 -O3 -DNDEBUG -DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION -DBOOST_MPL_LIMIT_LIST_SIZE=30 \

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-from psdmc.bench.build import COUNTED
+from psdmc.bench.build import counted_flags
 from psdmc.bench.callgrind import instructions
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable
@@ -74,7 +74,7 @@ def enter(entrant: Entrant, case: Case, count: bool) -> list[Contestant | Unavai
 
 def _instructions(entrant: Entrant, case: Case) -> dict[tuple[str, str], float]:
     """By symbol and layout; empty where valgrind is missing or fails: the column then stays empty."""
-    entries = [entry for entry in entrant.contestants(case, COUNTED) if isinstance(entry, Contestant)]
+    entries = [entry for entry in entrant.contestants(case, counted_flags()) if isinstance(entry, Contestant)]
     try:
         found = instructions(entries, case.chain)
     except ToolchainError:

@@ -9,10 +9,7 @@ from pathlib import Path
 
 from psdmc.errors import ToolchainError
 from psdmc.toolchain.cache import cache_key, cached
-from psdmc.toolchain.compiler_command import FLAGS, find_compiler, run
-
-COUNTED = (*FLAGS, "-march=x86-64-v3")
-"""psdmc's own flags for counting instructions: valgrind knows no AVX-512, and every x86-64 runner counts alike."""
+from psdmc.toolchain.compiler_command import find_compiler, run
 
 CXX_CANDIDATES = ("c++", "g++", "clang++")
 
@@ -20,6 +17,11 @@ CXX_CANDIDATES = ("c++", "g++", "clang++")
 def native_flags() -> tuple[str, ...]:
     """psdmc's own flags on this machine, for every contestant that is compiled here."""
     return find_compiler().flags
+
+
+def counted_flags() -> tuple[str, ...]:
+    """psdmc's own flags for counting instructions: valgrind knows no AVX-512, and every x86-64 runner counts alike."""
+    return (*find_compiler().portable, "-march=x86-64-v3")
 
 
 def built(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.bench.build import COUNTED, built, cxx
+from psdmc.bench.build import built, counted_flags, cxx
 from psdmc.bench.contestant import Contestant, source
 from psdmc.bench.states import States
 from psdmc.errors import ToolchainError
@@ -33,7 +33,7 @@ def valgrind() -> str:
 def instructions(contestants: Sequence[Contestant], chain: Chain) -> dict[tuple[str, str], float]:
     """Instructions per state, the loop's own few included, by (library, symbol).
 
-    contestants  built with COUNTED flags; one run of valgrind for each of their libraries
+    contestants  built with counted_flags(); one run of valgrind for each of their libraries
     """
     states = States.random(chain, STATES, SEED)
     found: dict[tuple[str, str], float] = {}
@@ -45,7 +45,7 @@ def instructions(contestants: Sequence[Contestant], chain: Chain) -> dict[tuple[
 
 
 def _counted(library: Path, contestants: Sequence[Contestant], states: States) -> list[int]:
-    command = [cxx(), "-std=c++17", *COUNTED, "counter.cpp", "-o", "counter", "-ldl"]
+    command = [cxx(), "-std=c++17", *counted_flags(), "counter.cpp", "-o", "counter", "-ldl"]
     counter = built("counter", command, {name: source(name) for name in ("counter.cpp", "loops.hpp")})
     with tempfile.TemporaryDirectory() as folder:
         jobs = [_job(c, states, Path(folder)) for c in contestants]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from psdmc.bench.build import COUNTED
+from psdmc.bench.build import counted_flags
 from psdmc.bench.callgrind import instructions
 from psdmc.bench.case import Case
 from psdmc.bench.rivals import psdmc_c
@@ -85,7 +85,7 @@ def operations(case: Case) -> dict[str, dict[str, float]]:
 
 
 def _add_instructions(table: dict[str, dict[str, float]], case: Case) -> None:
-    contestants = psdmc_c.factored(case, COUNTED)
+    contestants = psdmc_c.factored(case, counted_flags())
     found = instructions(contestants, case.chain)
     for one in contestants:
         value = found[str(one.library), one.symbol]
