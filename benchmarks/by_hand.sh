@@ -9,7 +9,7 @@ psdmc emit-c "$made/kr6.npz" -o "$made/kr6" >> "$made/log" 2>&1
 gcc -std=c11 -O3 -march=native -ffp-contract=fast -fno-math-errno -fno-trapping-math \
     -fno-tree-slp-vectorize -I"$made/kr6/include" \
     benchmarks/by_hand.c "$made"/kr6/src/[a-z]*.c -lm -o "$made/psdmc"
-prefix=$(python -c 'import pinocchio; print(pinocchio.__file__.split("/lib/python")[0])')
+prefix=$(python -c 'import pinocchio; print(pinocchio.__file__.rsplit("/lib/python", 1)[0])')
 g++ -std=c++17 -O3 -DNDEBUG -DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION -DBOOST_MPL_LIMIT_LIST_SIZE=30 \
     -DBOOST_MPL_LIMIT_VECTOR_SIZE=30 -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12 \
     -isystem "$prefix/include" -isystem "$prefix/include/eigen3" benchmarks/by_hand_pinocchio.cpp \
