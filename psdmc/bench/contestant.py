@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from psdmc.bench.states import States, at_cache_line
+from psdmc.bench.states import States, at_cache_line, moved
 from psdmc.robot.chain import Array
 
 Layout = Literal["state", "rows", "lanes"]
@@ -93,12 +93,16 @@ class Runner:
     def __init__(self, contestant: Contestant, states: States) -> None:
         self.contestant = contestant
         self._library = ctypes.CDLL(str(contestant.library))
-        self._inputs = states.inputs(contestant.function, contestant.lanes)
         ring = min(states.count, max(TAIL_BLOCK, 1 << int(np.log2(RING_BYTES / (8 * contestant.outputs)))))
         self._output = at_cache_line(ring * contestant.outputs)
         self._block = min(BLOCK, states.count) if contestant.layout == "state" else ring
         self._states = states
+        states.inputs(contestant.function, contestant.lanes)
         self.setup()
+
+    def move(self) -> None:
+        """Put the output elsewhere in memory; see States.move."""
+        self._output = moved(self._output)
 
     def setup(self) -> None:
         """Give the library its robot; libraries of rivals hold one at a time."""
@@ -129,7 +133,8 @@ class Runner:
     def _timed(self, kind: str, output: Array, block: int, count: int | None = None) -> Array:
         """Seconds of each block from the library's loop over `count` states (all), as ns per state."""
         count = max(block, count or self._states.count)
-        q, qd, x = (vector.ctypes.data for vector in self._inputs)
+        inputs = self._states.inputs(self.contestant.function, self.contestant.lanes)
+        q, qd, x = (vector.ctypes.data for vector in inputs)
         states = self._states
         ring = len(output) // self.contestant.outputs
         work = Work(count, states.n, self.contestant.outputs, ring, q, qd, x, output.ctypes.data)

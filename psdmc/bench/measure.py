@@ -66,14 +66,18 @@ class Measured:
 
 
 def measure(
-    runners: Sequence[Runner], rounds: int, progress: Callable[[str], None] = lambda message: None
+    runners: Sequence[Runner],
+    rounds: int,
+    progress: Callable[[str], None] = lambda message: None,
+    between: Callable[[], None] = lambda: None,
 ) -> Measured:
-    """Every runner once a round, `rounds` rounds that count."""
+    """Every runner once a round, `rounds` rounds that count; `between` runs before each of them."""
     _round(runners)  # caches, branch predictors and the clock speed settle
     quiet: list[list[_Trials]] = []
     noisy: list[list[_Trials]] = []
     while len(quiet) < rounds and len(quiet) + len(noisy) < PATIENCE * rounds:
         progress(f"round {len(quiet) + 1} of {rounds}")
+        between()
         share = others_share()
         trials = _round(runners)
         (quiet if share() < IDLE_SHARE else noisy).append(trials)

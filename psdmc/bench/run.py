@@ -91,7 +91,13 @@ def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> Ca
     right, errors, wrong = checked(case, assembled.contestants, settings.seed + 1)
     states = States.random(case.chain, settings.states, settings.seed)
     runners = [Runner(contestant, states) for contestant in right]
-    measured = measure(runners, settings.rounds, lambda message: progress(f"{case.name}: {message}"))
+
+    def move() -> None:
+        states.move()
+        for runner in runners:
+            runner.move()
+
+    measured = measure(runners, settings.rounds, lambda text: progress(f"{case.name}: {text}"), move)
     return CaseResult(
         name=case.name,
         note=case.note,
