@@ -18,7 +18,12 @@ COLUMNS = (
     ("mass_matrix", "state"),
     ("regressor", "state"),
 )
-BATCH = (("inverse_dynamics", "rows"), ("forward_dynamics", "rows"), ("inverse_dynamics", "lanes"))
+BATCH = (
+    ("inverse_dynamics", "rows"),
+    ("forward_dynamics", "rows"),
+    ("inverse_dynamics", "lanes"),
+    ("forward_dynamics", "lanes"),
+)
 TITLES = (
     "robot",
     "inverse dynamics",
@@ -28,6 +33,7 @@ TITLES = (
     "inverse, batch rows",
     "forward, batch rows",
     "inverse, lane by lane",
+    "forward, lane by lane",
 )
 
 
