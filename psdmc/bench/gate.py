@@ -40,11 +40,14 @@ class Change:
         return self.after > self.before * (1.0 + slack)
 
     def __str__(self) -> str:
-        verdict = "GREW" if self.fails else "fell"
         if self.before is None:
             verdict = "NEW: not in the baseline"
-        if self.after is None:
+        elif self.after is None:
             verdict = "GONE: only in the baseline"
+        elif self.fails:
+            verdict = "GREW"
+        else:
+            verdict = "fell" if self.after < self.before else "grew by less than counts"
         return f"{self.robot} {self.function}: {self.what} {_shown(self.before)} -> {_shown(self.after)}  {verdict}"
 
 
