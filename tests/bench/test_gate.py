@@ -45,7 +45,7 @@ def test_fewer_operations_pass_and_are_said():
 def test_instructions_may_grow_by_their_slack_and_no_more():
     text, passed = compare(baseline(), baseline(instructions_state=886.0))
     assert passed
-    assert text.splitlines()[0].endswith("-> 886.0  grew by less than counts")
+    assert text.splitlines()[0].endswith("-> 886  grew by less than counts")
     assert not compare(baseline(), baseline(instructions_state=888.0))[1]
 
 
