@@ -47,7 +47,7 @@ def test_bundled_robots(name: str) -> None:
     assert relative_error(model.gravity(q), robot.gravity(q), torque) < ACCURACY
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     kinds=st.text(alphabet="RP", min_size=1, max_size=4),

@@ -41,7 +41,7 @@ def test_model_and_program(length: int, chains: int):
         tidy=st.booleans(),
         function=st.sampled_from(ALL_FUNCTIONS[1:]),
     )
-    @settings(max_examples=chains, deadline=None, derandomize=True)
+    @settings(max_examples=chains, deadline=None)
     def check(seed: int, kinds: str, tidy: bool, function: str):
         robot = drawn(seed, kinds, tidy=tidy)
         questions = Questions(robot, STATES)
