@@ -97,7 +97,6 @@ class Runner:
         self._output = at_cache_line(ring * contestant.outputs)
         self._block = min(BLOCK, states.count) if contestant.layout == "state" else ring
         self._states = states
-        states.inputs(contestant.function, contestant.lanes)
         self.setup()
 
     def move(self) -> None:

@@ -40,7 +40,7 @@ def derive_model(
     expand      False leaves E and P out: base parameters alone, for chains of any length
     progress    called with the name of each step as it begins
     provenance  plain JSON values to keep with the model; the tolerances used are added
-    memory      bytes that the expansion may take; default: what the machine has free
+    memory      bytes that the expansion may take; default: most of what the machine has free
     Raises DerivationError where the expansion does not fit, or no parameter has any effect.
     """
     tell = progress or _silent

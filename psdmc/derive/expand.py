@@ -47,8 +47,8 @@ class Expansion(NamedTuple):
 
 
 def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int | None = None) -> Expansion:
-    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: what is
-    free)."""
+    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of
+    what is free)."""
     kinds = scaled.kinds
     functions = Functions(kinds)
     available = available_memory() if memory is None else memory

@@ -82,7 +82,7 @@ def derive_from_callable(
     kinds            of the n joints, base to tip
     parameter_names  k, in the order of X, which is also the order in which pivots are chosen
     length           m, the robot's size: prismatic joints are sampled at -length, 0 and length
-    memory           bytes that the grids may take; default: what the machine has free
+    memory           bytes that the grids may take; default: most of what the machine has free
     Raises InputError where f returns something else or is no such function, DerivationError where it does not
     fit.
     """

@@ -70,7 +70,7 @@ def refuse_beyond(needed: int, available: int, functions: int, n: int) -> None:
         return
     raise DerivationError(
         f"expanding this {n}-joint robot takes up to {functions:,} functions and about "
-        f"{needed / 2**30:.1f} GiB of memory, but {available / 2**30:.1f} GiB are available",
+        f"{needed / 2**30:.1f} GiB of memory, but no more than {available / 2**30:.1f} GiB should be taken here",
         "derive with --no-expand: base parameters, regressor and generated code then come without E and P",
     )
 

@@ -143,7 +143,7 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     lift = np.zeros((PARAMETERS_PER_LINK * n, representative.shape[1]), np.longdouble)
     for k, place in enumerate(reframed.link_frames):
         rows = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
-        lift[rows] = _product(link_map(place), representative[rows])
+        lift[rows] = times(link_map(place).astype(np.longdouble), representative[rows])
     unused_drives = [
         j for j in range(DRIVE, PARAMETERS_PER_LINK * n, PARAMETERS_PER_LINK) if not np.any(lift[j])
     ]
@@ -156,17 +156,9 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     compact = u[:, :rank].T @ columns
     compact[:, np.linalg.norm(columns, axis=0) < 1e-12 * np.max(scale)] = 0.0
     basis = _lightest(compact, [1.0] * compact.shape[1])
-    target = _product(samples, lift)
+    target = times(samples, lift)
     whole = np.linalg.norm(target.astype(np.float64), axis=0)
     return CarrierSpace(compact, Tableau.of(np.hstack([samples, target]), basis), whole)
-
-
-def _product(a: Array | Long, b: Array | Long) -> Long:
-    """a @ b in extended precision, term by term in the same order everywhere."""
-    total = np.zeros((a.shape[0], b.shape[1]), np.longdouble)
-    for k in range(a.shape[1]):
-        total += np.outer(a[:, k].astype(np.longdouble), b[k])
-    return total
 
 
 def _lightest(columns: Array, weights: Sequence[float]) -> tuple[int, ...]:
@@ -200,7 +192,7 @@ def _sampled_columns(reframed: Reframed) -> Long:
         for column, value in row.items():
             standard[i, :, column] = value
     back = np.round(np.linalg.inv(pseudo_map()))  # zeros and ones
-    return np.asarray(_product(standard.reshape(-1, 11), back).reshape(n * STATES, 11 * n))
+    return np.asarray(times(standard.reshape(-1, 11), back).reshape(n * STATES, 11 * n))
 
 
 def bodies_from_carriers(

@@ -1,14 +1,14 @@
-"""Products of small matrices, the same on every processor: BLAS fuses and orders its sums as each machine likes it."""
+"""Products of small matrices, the same on every processor and in whatever precision the arrays have: BLAS fuses and
+orders its sums as each machine likes it."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 
 def times(a: Array, b: Array) -> Any:
