@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal
 
 from psdmc.errors import InputError
 from psdmc.lower.expanded import SUPPORTED, lower_expanded
 from psdmc.lower.factored import Arrangement, trace_jacobian, trace_regressor
-from psdmc.lower.search import BATCH, SINGLE, Search, Target, all_feet
+from psdmc.lower.search import BATCH, SINGLE, Search, Spaces, Target, all_feet
 from psdmc.lower.solve import SingularMassMatrix
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.functions import BY_NAME, FUNCTIONS, Function
 from psdmc.program.kernel import Kernel
-from psdmc.program.pipeline import optimize
+from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
 
 Lowering = Literal["auto", "expanded", "factored"]
@@ -90,10 +90,12 @@ def _refusal(model: DynamicsModel, singular: SingularMassMatrix) -> InputError:
 
 
 def _kernel(function: Function, theta: bool, single: Program, batch: Program, lowering: str) -> Kernel:
-    for_one, for_lanes = optimize(single), optimize(batch, lanes=True)
-    if BATCH.score(for_one) <= WORTH_TWO_BODIES * BATCH.score(for_lanes):
-        shared = optimize(single, lanes=True)
-        for_lanes = shared if shared == for_one else for_lanes
+    for_one, shared = ordered(shortened(single))
+    if batch == single:
+        return Kernel(function, theta, for_one, shared, lowering)
+    for_lanes = ordered(shortened(batch))[1]
+    if shared == for_one and BATCH.score(for_one) <= WORTH_TWO_BODIES * BATCH.score(for_lanes):
+        for_lanes = shared
     return Kernel(function, theta, for_one, for_lanes, lowering)
 
 
@@ -102,8 +104,10 @@ class _Lowered:
 
     def __init__(self, model: DynamicsModel, lowering: Lowering) -> None:
         self.model, self.lowering = model, lowering
+        self._spaces: Spaces = {}
         self._searches: dict[bool, Search] = {}
         self._arrangements: dict[tuple[str, bool], Arrangement] = {}
+        self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
 
     def kernel(self, function: Function, theta: bool) -> Kernel:
         candidates: list[Kernel] = []
@@ -122,20 +126,26 @@ class _Lowered:
         return self.lowering == "expanded" or self.model.p <= EXPANDED_LIMIT
 
     def _factored(self, name: str, theta: bool, target: Target) -> Program:
+        return min(self._candidates(name, theta), key=target.score)
+
+    def _candidates(self, name: str, theta: bool) -> tuple[Program, ...]:
+        """What the targets choose from; traced once for all of them."""
+        if (name, theta) not in self._traced:
+            self._traced[name, theta] = tuple(self._traces(name, theta))
+        return self._traced[name, theta]
+
+    def _traces(self, name: str, theta: bool) -> Iterator[Program]:
         search = self._search(theta)
-        if name == "jacobian":
-            programs = [trace_jacobian(search.space(feet)[0]) for feet in all_feet(self.model.chain)]
-            return min(programs, key=target.score)
-        if name in REGRESSORS:
-            return min(
-                (
-                    trace_regressor(name, search.space(feet)[0], self.model.representative)
-                    for feet in all_feet(self.model.chain)
-                ),
-                key=target.score,
-            )
-        arrangement = self._arrangement(SHARED.get(name, name), theta)
-        return search.rearranged(name, arrangement, target)
+        if name == "jacobian" or name in REGRESSORS:
+            for feet in all_feet(self.model.chain):
+                reframed, _ = search.space(feet)
+                yield (
+                    trace_jacobian(reframed)
+                    if name == "jacobian"
+                    else trace_regressor(name, reframed, self.model.representative)
+                )
+        else:
+            yield from search.rearrangements(name, self._arrangement(SHARED.get(name, name), theta))
 
     def _arrangement(self, name: str, theta: bool) -> Arrangement:
         if (name, theta) not in self._arrangements:
@@ -146,5 +156,5 @@ class _Lowered:
     def _search(self, theta: bool) -> Search:
         if theta not in self._searches:
             baked = None if theta else self.model.theta_b
-            self._searches[theta] = Search(self.model.chain, self.model.representative, baked)
+            self._searches[theta] = Search(self.model.chain, self.model.representative, baked, spaces=self._spaces)
         return self._searches[theta]

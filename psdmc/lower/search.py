@@ -65,20 +65,34 @@ ALL_CHOICES = (*CHOICES, *(replace(choices, add_sines=True) for choices in CHOIC
 """What `rearranged` tries; the descent leaves added sines out, which pay only where each angle has a sincos of its own."""
 
 
+DISTINCT = {
+    "mass_matrix": tuple(Choices(fold_double_angle=double) for double in (False, True)),
+}
+"""Functions to which few choices make a difference: one of each kind, the first of its kind in ALL_CHOICES."""
+
+Spaces = dict[tuple[Foot, ...], tuple[Reframed, CarrierSpace]]
+"""A model's geometry by where frames sit, and what can carry the model there."""
+
+
 class Search:
-    """The descent for one model; geometry is shared between functions."""
+    """The descent for one model; geometry is shared between functions, and through `spaces` between searches."""
 
     def __init__(
-        self, chain: Chain, representative: Array, theta_b: Array | None, budget: int = BUDGET
+        self,
+        chain: Chain,
+        representative: Array,
+        theta_b: Array | None,
+        budget: int = BUDGET,
+        spaces: Spaces | None = None,
     ) -> None:
         self.chain, self.representative, self.theta_b, self.budget = chain, representative, theta_b, budget
-        self._spaces: dict[tuple[Foot, ...], tuple[Reframed, CarrierSpace]] = {}
+        self._spaces: Spaces = {} if spaces is None else spaces
 
     def best(self, name: str, target: Target, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function; `start` is one found for another, whose geometry stays."""
         descent = _Descent(lambda a: trace_dynamics(name, a, self.theta_b), target, self.budget)
         if start is not None:
-            descent.consider(replace(start, choices=choices) for choices in CHOICES)
+            descent.consider(replace(start, choices=choices) for choices in DISTINCT.get(name, CHOICES))
         else:
             for candidate in all_feet(self.chain):
                 descent.consider(self.starts(candidate))
@@ -90,10 +104,12 @@ class Search:
     def rearranged(self, name: str, found: Arrangement, target: Target) -> Program:
         """The PROGRAM of a function in an arrangement found for another function or target: only the choices within
         the recursion are made anew."""
-        programs = (
-            trace_dynamics(name, replace(found, choices=choices), self.theta_b) for choices in ALL_CHOICES
-        )
-        return min(programs, key=target.score)
+        return min(self.rearrangements(name, found), key=target.score)
+
+    def rearrangements(self, name: str, found: Arrangement) -> Iterator[Program]:
+        """The PROGRAMs that `rearranged` chooses from."""
+        for choices in DISTINCT.get(name, ALL_CHOICES):
+            yield trace_dynamics(name, replace(found, choices=choices), self.theta_b)
 
     def space(self, feet: tuple[Foot, ...]) -> tuple[Reframed, CarrierSpace]:
         if feet not in self._spaces:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 from psdmc.program.program import Op, Program
@@ -12,7 +11,8 @@ from psdmc.program.program import Op, Program
 class Cost:
     """Operation counts. add includes subtractions; negations are free in most places and stand apart.
 
-    fused   multiplications that a fused multiply-add can absorb: used once, by an addition or subtraction
+    fused   multiplications that a fused multiply-add can absorb: used once, by an addition or subtraction, each of which
+            absorbs one
     sincos  distinct angles whose sine or cosine is taken
     """
 
@@ -34,23 +34,19 @@ class Cost:
 
 
 def cost(program: Program) -> Cost:
-    ops = Counter(instr.op for instr in program.body)
-    angles = {instr.args[0] for instr in program.body if instr.op in (Op.SIN, Op.COS)}
-    return Cost(
-        mul=ops[Op.MUL],
-        add=ops[Op.ADD] + ops[Op.SUB],
-        div=ops[Op.DIV],
-        neg=ops[Op.NEG],
-        sincos=len(angles),
-        fused=_fusable(program),
-    )
-
-
-def _fusable(program: Program) -> int:
-    """Each addition can absorb one product that nothing else needs."""
-    uses = program.uses()
-    count = 0
-    for instr in program.body:
-        if instr.op in (Op.ADD, Op.SUB):
-            count += any(program.body[a].op is Op.MUL and uses[a] == 1 for a in instr.args)
-    return count
+    body, uses = program.body, program.uses()
+    mul = add = div = neg = fused = 0
+    angles: set[int] = set()
+    for op, args, _, _ in body:
+        if op is Op.MUL:
+            mul += 1
+        elif op is Op.ADD or op is Op.SUB:
+            add += 1
+            fused += any(body[a][0] is Op.MUL and uses[a] == 1 for a in args)
+        elif op is Op.DIV:
+            div += 1
+        elif op is Op.NEG:
+            neg += 1
+        elif op is Op.SIN or op is Op.COS:
+            angles.add(args[0])
+    return Cost(mul, add, div, neg, len(angles), fused)

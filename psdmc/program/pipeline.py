@@ -46,16 +46,24 @@ def optimize(program: Program, *, lanes: bool = False) -> Program:
 
     InternalError, naming the pass, where one breaks a PROGRAM's rules.
     """
+    return ordered(shortened(program))[1 if lanes else 0]
+
+
+def shortened(program: Program) -> Program:
+    """The same function in fewer operations, before its instructions are put in order."""
     for _ in range(LONGEST):
         shorter = _applied(ROUND, program)
         if _operations(shorter) >= _operations(program):
             break
         program = shorter
-    for_one = _applied(LAST_FOR_ONE_STATE, program)
-    if not lanes:
-        return for_one
-    for_lanes = _applied(LAST_FOR_LANES, program)
-    return for_lanes if live_values(for_one) > CROWDED * live_values(for_lanes) else for_one
+    return program
+
+
+def ordered(short: Program) -> tuple[Program, Program]:
+    """A shortened PROGRAM in the order for one state a call, and in that for one state per SIMD lane: the first again
+    where it serves both."""
+    for_one, for_lanes = _applied(LAST_FOR_ONE_STATE, short), _applied(LAST_FOR_LANES, short)
+    return for_one, for_lanes if live_values(for_one) > CROWDED * live_values(for_lanes) else for_one
 
 
 def _applied(passes: tuple[Pass, ...], program: Program) -> Program:
