@@ -10,17 +10,17 @@ from psdmc.program.program import ARITY, Op, Program
 
 def check(program: Program, after: str = "tracing") -> Program:
     """The same program; InternalError where a rule is broken, naming the pass that broke it."""
-    for i, instr in enumerate(program.body):
-        if len(instr.args) != ARITY[instr.op]:
-            raise InternalError(f"after {after}: t{i} = {instr.op.value} has {len(instr.args)} arguments")
-        if any(not 0 <= a < i for a in instr.args):
+    for i, (op, args, slot, value) in enumerate(program.body):
+        if len(args) != ARITY[op]:
+            raise InternalError(f"after {after}: t{i} = {op.value} has {len(args)} arguments")
+        if args and not (0 <= min(args) and max(args) < i):
             raise InternalError(f"after {after}: t{i} uses a value that is not defined before it")
-        if (instr.op is Op.LOAD) != (instr.slot is not None):
+        if (op is Op.LOAD) != (slot is not None):
             raise InternalError(f"after {after}: t{i}: loads, and only loads, have a slot")
-        if (instr.op is Op.CONST) != (instr.value is not None):
+        if (op is Op.CONST) != (value is not None):
             raise InternalError(f"after {after}: t{i}: constants, and only constants, have a value")
-        if instr.value is not None and not math.isfinite(instr.value):
-            raise InternalError(f"after {after}: t{i} is the constant {instr.value}")
+        if value is not None and not math.isfinite(value):
+            raise InternalError(f"after {after}: t{i} is the constant {value}")
     slots = [slot for slot, _ in program.outputs]
     if len(set(slots)) != len(slots):
         raise InternalError(f"after {after}: an output is stored twice")

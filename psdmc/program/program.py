@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
@@ -52,8 +52,13 @@ class Instr(NamedTuple):
     slot: Slot | None = None
     value: float | None = None
 
-    def renumbered(self, new_index: list[int] | dict[int, int]) -> Instr:
-        return Instr(self.op, tuple([new_index[a] for a in self.args])) if self.args else self
+    def renumbered(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
+        """The same operation on the values that its arguments have become; itself where none has moved."""
+        args = self.args
+        if not args:
+            return self
+        moved = (new_index[args[0]], new_index[args[1]]) if len(args) == 2 else (new_index[args[0]],)
+        return self if moved == args else Instr(self.op, moved)
 
     def canonical(self) -> Instr:
         """The same instruction with commutative arguments in ascending order."""

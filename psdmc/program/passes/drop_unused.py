@@ -19,7 +19,9 @@ def drop_unused(program: Program) -> Program:
         if needed[i]:
             for a in program.body[i].args:
                 needed[a] = True
-    new_index: dict[int, int] = {}
+    if all(needed):
+        return program
+    new_index = [0] * len(program.body)
     body: list[Instr] = []
     for i, instr in enumerate(program.body):
         if needed[i]:
