@@ -156,5 +156,7 @@ class _Lowered:
     def _search(self, theta: bool) -> Search:
         if theta not in self._searches:
             baked = None if theta else self.model.theta_b
-            self._searches[theta] = Search(self.model.chain, self.model.representative, baked, spaces=self._spaces)
+            self._searches[theta] = Search(
+                self.model.chain, self.model.representative, baked, spaces=self._spaces
+            )
         return self._searches[theta]

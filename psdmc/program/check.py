@@ -13,7 +13,7 @@ def check(program: Program, after: str = "tracing") -> Program:
     for i, (op, args, slot, value) in enumerate(program.body):
         if len(args) != ARITY[op]:
             raise InternalError(f"after {after}: t{i} = {op.value} has {len(args)} arguments")
-        if args and not (0 <= min(args) and max(args) < i):
+        if args and (min(args) < 0 or max(args) >= i):
             raise InternalError(f"after {after}: t{i} uses a value that is not defined before it")
         if (op is Op.LOAD) != (slot is not None):
             raise InternalError(f"after {after}: t{i}: loads, and only loads, have a slot")
