@@ -56,7 +56,7 @@ OUTSIDE = {
     "cli": {"typer", "rich", "numpy"},
 }
 
-SHARED = {"errors", "version"}
+SHARED = {"errors", "version", "atomic"}
 ENTRY_POINTS = {"__init__", "__main__"}
 
 

@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+from psdmc.atomic import write_whole
 from psdmc.bench.cases import standard_cases
 from psdmc.bench.rivals import EVERYONE
 from psdmc.bench.run import ROUNDS, Settings, run
@@ -34,12 +35,12 @@ def main() -> int:
         cases = list(standard_cases(options.names or None, progress=_tell))
         scaling = list(scaling_cases(progress=_tell)) if full and not options.names else []
         result = run(cases, settings, _tell, scaling)
+        print(as_text(result))
+        if options.json:
+            write_whole(options.json, result.to_json())
     except PsdmcError as error:
         print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
         return error.exit_status
-    print(as_text(result))
-    if options.json:
-        options.json.write_text(result.to_json())
     return 1 if result.wrong else 0
 
 

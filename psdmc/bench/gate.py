@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from psdmc.atomic import make_folder, write_whole
 from psdmc.bench.cases import standard_cases
 from psdmc.bench.counts import Baseline, count
 from psdmc.errors import PsdmcError
@@ -113,8 +114,8 @@ def _save(path: Path, names: list[str]) -> int:
     kept = Baseline.read(path).counts if names and path.is_file() else {}
     if after.without is not None:
         print(f"warning: instructions were not counted: {after.without}", file=sys.stderr)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(Baseline(after.compiler, {**kept, **after.counts}).to_json())
+    make_folder(path.parent)
+    write_whole(path, Baseline(after.compiler, {**kept, **after.counts}).to_json())
     print(f"wrote {path}")
     return 0
 

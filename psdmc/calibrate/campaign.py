@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from psdmc.atomic import write_whole
 from psdmc.calibrate.excite import Excitation, ExciteOptions, excite, require_limits
 from psdmc.calibrate.excite_poses import motor_poses
 from psdmc.calibrate.four_steps import Runs
@@ -158,11 +159,9 @@ def write_campaign(folder: str | Path, runs: Sequence[PlannedRun], found: Excita
             lines.append(f"load = {{ mass = {run.load.mass!r}, com = {list(run.load.com)!r} }}")
         lines.append(f"trajectory = {json.dumps(written[id(run.motion)])}")
         lines += [f"log = {json.dumps(f'logs/{run.name}.{table}')}", ""]
-    (root / "excitation.json").write_text(
-        json.dumps(excitation_json(found), indent=1) + "\n", encoding="utf-8"
-    )
+    write_whole(root / "excitation.json", json.dumps(excitation_json(found), indent=1) + "\n")
     path = root / FILE
-    path.write_text("\n".join(lines), encoding="utf-8")
+    write_whole(path, "\n".join(lines))
     return path
 
 

@@ -7,14 +7,13 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from psdmc.atomic import make_folder, whole_file
 from psdmc.calibrate.log import Array, Log, Quantity
 from psdmc.calibrate.log_bag import read_bag
 from psdmc.errors import InputError
@@ -141,15 +140,9 @@ def write_columns(columns: Mapping[str, Array], path: Path) -> None:
     """Write named columns of equal length as .csv, .parquet or .npz; a reader never sees half a file."""
     if path.suffix not in _WRITERS:
         raise InputError(f"{path}: cannot write '{path.suffix}'", f"known are {', '.join(_WRITERS)}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, own = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    try:
-        _WRITERS[path.suffix](columns, Path(own))
-        Path(own).chmod(0o644)  # mkstemp's files are for their owner alone
-        Path(own).replace(path)
-    finally:
-        Path(own).unlink(missing_ok=True)
+    make_folder(path.parent)
+    with whole_file(path) as own:
+        _WRITERS[path.suffix](columns, own)
 
 
 def read_columns(path: Path) -> dict[str, Array]:

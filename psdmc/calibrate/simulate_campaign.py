@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from psdmc.atomic import make_folder, write_whole
 from psdmc.calibrate import virtual_robot
 from psdmc.calibrate.campaign import ListedRun, listed_runs
 from psdmc.calibrate.log_files import write_log
@@ -72,9 +73,9 @@ def simulate_campaign(
     else:
         for job in stale:
             progress(_simulated(job))
-    index_path.parent.mkdir(parents=True, exist_ok=True)
     index = {Path(name).name: key for name, key in sorted(keys.items())}
-    index_path.write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
+    make_folder(index_path.parent)
+    write_whole(index_path, json.dumps(index, indent=1) + "\n")
     return len(stale)
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from psdmc.atomic import write_whole
 from psdmc.bench.case import Case
 from psdmc.bench.run import Settings, run
 from psdmc.bench.table import as_text
@@ -40,16 +41,9 @@ def bench(
     if report is not None:
         write_page(result, report, "psdmc bench " + " ".join(path.name for path in models))
     if json is not None:
-        _write(json, result.to_json())
+        write_whole(json, result.to_json())
     if result.wrong:
         raise typer.Exit(WRONG_STATUS)
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}", "choose another place") from error
 
 
 def excite(

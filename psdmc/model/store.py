@@ -10,9 +10,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import struct
-import tempfile
 import tokenize
 import zipfile
 import zlib
@@ -24,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from psdmc.atomic import write_whole
 from psdmc.errors import InputError
 from psdmc.model.chain_json import chain_from_json, chain_to_json
 from psdmc.model.dynamics_model import DynamicsModel
@@ -58,25 +57,9 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 def save(model: DynamicsModel, path: str | Path) -> None:
-    """Write a model file, whole or not at all; InputError where the folder does not admit it."""
-    target = Path(path)
-    data = file_bytes(model)
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    except OSError as error:
-        raise _unwritable(target, error) from error
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(name).chmod(0o644)
-        Path(name).replace(target)
-    except OSError as error:
-        Path(name).unlink(missing_ok=True)
-        raise _unwritable(target, error) from error
-
-
-def _unwritable(target: Path, error: OSError) -> InputError:
-    return InputError(f"{target}: cannot be written: {error.strerror}", "give a folder that you may write to")
+    """Write a model file, whole or not at all; InputError where the place does not admit it, ToolchainError
+    where the disk does not."""
+    write_whole(path, file_bytes(model))
 
 
 def file_bytes(model: DynamicsModel) -> bytes:

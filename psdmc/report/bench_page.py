@@ -10,6 +10,7 @@ from pathlib import Path
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
+from psdmc.atomic import write_whole
 from psdmc.bench.results import BenchResult
 from psdmc.errors import InputError, PsdmcError
 from psdmc.report import bench_plots
@@ -40,11 +41,8 @@ class RobotSection:
 
 
 def write_page(result: BenchResult, path: Path, command: str = COMMAND) -> None:
-    """The page at `path`; InputError where it cannot be written."""
-    try:
-        path.write_text(page(result, command), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}", "choose another place") from error
+    """The page at `path`; errors as psdmc.atomic.write_whole."""
+    write_whole(path, page(result, command))
 
 
 def page(result: BenchResult, command: str = COMMAND) -> str:

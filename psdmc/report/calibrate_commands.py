@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from psdmc.atomic import write_together, write_whole
 from psdmc.calibrate.actuators import actuator_files, calibrated_actuators
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
 from psdmc.calibrate.campaign import CampaignOptions, plan_campaign, write_campaign
@@ -38,7 +39,7 @@ def excite_command(
     one_period = found.motion.sampled(known.joint_names, options.sweep.period)
     write_trajectory(one_period, campaign.parent / "excitation.csv")
     picture = excitation_figure(found, known.joint_names)
-    (campaign.parent / "excitation.svg").write_text(picture, encoding="utf-8")
+    write_whole(campaign.parent / "excitation.svg", picture)
     return found
 
 
@@ -91,13 +92,9 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
     if found is None:
         raise InputError(f"{model.chain.name}: not calibrated", "run `psdmc calibrate` first")
     view = calibrated_actuators(model.chain.name, model.joint_names, found)
-    written = []
-    for path, text in actuator_files(view).items():
-        target = Path(folder) / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text, encoding="utf-8", newline="\n")
-        written.append(target)
-    return written
+    files = actuator_files(view)
+    write_together(Path(folder), files)
+    return [Path(folder) / path for path in files]
 
 
 def regressor_of(model: DynamicsModel, progress: Progress = silent) -> Regressor:

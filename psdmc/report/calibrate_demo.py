@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from psdmc.atomic import write_whole
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
 from psdmc.calibrate.campaign import CampaignOptions, excitation_json, plan_campaign, write_campaign
 from psdmc.calibrate.record import Calibration
@@ -77,7 +78,7 @@ def run_demo(
         step(f"{name}: report in {page}")
     summary = {name: result.as_json() for name, result in results.items()}
     text = json.dumps({"excitation": excitation_json(found), "truth": summary}, indent=1)
-    (folder / "truth.json").write_text(text + "\n", encoding="utf-8")
+    write_whole(folder / "truth.json", text + "\n")
     return results
 
 

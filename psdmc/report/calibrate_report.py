@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from psdmc.atomic import write_together
 from psdmc.calibrate.excite import Excitation
 from psdmc.calibrate.quality import Quality
 from psdmc.calibrate.record import Calibration, NumberRow
@@ -51,10 +52,9 @@ class ReportView:
 def write_report(record: Calibration, path: str | Path, found: Excitation | None = None) -> tuple[Path, Path]:
     """Write the page and, beside it, its numbers as JSON; returns both paths."""
     page = Path(path)
-    page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text(report_html(record, found), encoding="utf-8")
     numbers = page.with_suffix(".json")
-    numbers.write_text(json.dumps(record.as_json(), indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    text = json.dumps(record.as_json(), indent=1, sort_keys=True) + "\n"
+    write_together(page.parent, {page.name: report_html(record, found), numbers.name: text})
     return page, numbers
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 from pathlib import Path
 
 import pytest
 from small import pendulum, pendulum_info
 
-from psdmc.emit import write
+from psdmc.emit.manifest import digest
 from psdmc.emit.options import EmitOptions
+from psdmc.emit.own_files import OWN_NAME, edited_files
 from psdmc.emit.package import package_files
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError, ToolchainError
@@ -62,7 +64,7 @@ def test_files_of_another_function_set_are_removed(tmp_path: Path) -> None:
 
 def _with(files: dict[str, str], path: str, text: str) -> str:
     content = json.loads(files["manifest.json"])
-    content["files"][path] = write.digest(text)
+    content["files"][path] = digest(text)
     return json.dumps(content)
 
 
@@ -95,7 +97,7 @@ def test_a_forged_manifest_cannot_reach_out_of_its_folder(tmp_path: Path) -> Non
     victim.write_text("keep")
     forged = {
         "generator": "psdmc",
-        "files": {"../victim": write.digest("keep"), str(victim): write.digest("keep")},
+        "files": {"../victim": digest("keep"), str(victim): digest("keep")},
     }
     (tmp_path / "arm").mkdir()
     (tmp_path / "arm" / "manifest.json").write_text(json.dumps(forged))
@@ -103,12 +105,138 @@ def test_a_forged_manifest_cannot_reach_out_of_its_folder(tmp_path: Path) -> Non
     assert victim.read_text() == "keep"
 
 
+def test_a_forged_manifest_below_a_link_deletes_nothing(tmp_path: Path) -> None:
+    """`src` leads to another folder of the user's; the manifest lists a file there with its true digest."""
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "x.c").write_text("keep")
+    arm = tmp_path / "arm"
+    arm.mkdir()
+    (arm / "src").symlink_to(outside)
+    forged = {"generator": "psdmc", "files": {"src/x.c": digest("keep")}}
+    (arm / "manifest.json").write_text(json.dumps(forged))
+
+    for force in (False, True):
+        with pytest.raises(InputError, match="a symbolic link stands there"):
+            write_package(arm, FILES, force=force)
+
+    assert _stamps(outside).keys() == {"x.c"}, "psdmc wrote or deleted through a link"
+    top = {path: text for path, text in FILES.items() if not path.startswith("src/")}
+    write_package(arm, top, force=True)
+    assert (outside / "x.c").read_text() == "keep"
+
+
+def test_only_names_that_psdmc_gives_are_deleted(tmp_path: Path) -> None:
+    theirs = ["notes.txt", ".git/config", "src/deep/x.c", "Makefile.am", "build/arm.so", "manifest.json.c"]
+    for name in theirs:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("keep")
+    forged = {"generator": "psdmc", "files": {name: digest("keep") for name in theirs}}
+    (tmp_path / "manifest.json").write_text(json.dumps(forged))
+
+    write_package(tmp_path, FILES, force=True)
+
+    assert all((tmp_path / name).read_text() == "keep" for name in theirs)
+
+
+def test_every_name_of_a_package_is_one_that_psdmc_gives() -> None:
+    for path in FILES:
+        assert path == "manifest.json" or OWN_NAME.fullmatch(path), path
+
+
+def test_what_is_no_file_is_foreign(tmp_path: Path) -> None:
+    (tmp_path / "src" / "tables.c").mkdir(parents=True)
+    os.mkfifo(tmp_path / "Makefile")
+    with pytest.raises(InputError, match=r"not overwriting src/tables\.c, Makefile"):
+        write_package(tmp_path, FILES)
+    with pytest.raises(InputError, match="cannot be written"):
+        write_package(tmp_path, FILES, force=True)
+    assert (tmp_path / "src" / "tables.c").is_dir()
+
+
+OTHER = package_files(pendulum(pendulum_info(joint="elbow"), options=EmitOptions(real="float32")))
+
+
+def killed_at(operation: int, folder: Path, files: dict[str, str]) -> bool:
+    """Write a package in a process that is killed before that file operation; whether it came that far."""
+    child = os.fork()
+    if child == 0:
+        count = 0
+
+        def counted(call):
+            def step(*given, **named):
+                nonlocal count
+                count += 1
+                if count == operation:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                return call(*given, **named)
+
+            return step
+
+        for name in ("open", "replace", "unlink", "fsync", "mkdir"):
+            setattr(os, name, counted(getattr(os, name)))
+        try:
+            write_package(folder, files)
+        finally:
+            os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 0
+
+
+@pytest.mark.parametrize("before", [{}, FILES], ids=["empty", "another package"])
+def test_an_emission_killed_at_any_step_is_not_blamed_on_the_user(
+    before: dict[str, str], tmp_path: Path
+) -> None:
+    """Every file is old or new, and the next emission, of whatever, ends in its own files alone."""
+    killed = 0
+    for operation in range(1, 2000, 7):
+        folder = tmp_path / str(operation)
+        if before:
+            write_package(folder, before)
+        was_killed = killed_at(operation, folder, OTHER)
+        for path in OTHER:
+            if (folder / path).exists():
+                assert (folder / path).read_text() in (before.get(path), OTHER[path]), path
+        after = FILES if operation % 2 else OTHER
+        write_package(folder, after)
+        assert {name: (folder / name).read_text() for name in _stamps(folder)} == after
+        if not was_killed:
+            break
+        killed += 1
+    assert killed > 10
+
+
+def test_a_full_disk_leaves_the_old_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_package(tmp_path, FILES)
+    calls = []
+
+    def full(handle: int) -> None:
+        calls.append(handle)
+        if len(calls) > 5:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("psdmc.atomic.os.fsync", full)
+    with pytest.raises(ToolchainError, match="No space left") as caught:
+        write_package(tmp_path, OTHER)
+    assert "\n" not in caught.value.message
+    assert {name: (tmp_path / name).read_text() for name in _stamps(tmp_path)} == FILES
+
+
+def test_edited_files_are_known(tmp_path: Path) -> None:
+    assert edited_files(tmp_path) is None
+    write_package(tmp_path, FILES)
+    assert edited_files(tmp_path) == []
+
+    (tmp_path / "src" / "tables.c").write_text("edited")
+    (tmp_path / "README.md").unlink()
+    assert sorted(edited_files(tmp_path)) == ["README.md", "src/tables.c"]
+
+
 def test_a_folder_that_cannot_be_made_is_one_clear_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(ToolchainError, match="cannot be written") as caught:
+    with pytest.raises(InputError, match="cannot be written") as caught:
         write_package(tmp_path / "file" / "arm", FILES)
     assert "\n" not in caught.value.message
-    assert "-o" in str(caught.value.hint)
+    assert "place" in str(caught.value.hint)
 
 
 def test_an_interrupted_write_leaves_the_old_file_whole(
@@ -120,7 +248,7 @@ def test_an_interrupted_write_leaves_the_old_file_whole(
     def interrupted(source: str, target: object) -> None:
         raise OSError(28, "No space left on device", str(target))
 
-    monkeypatch.setattr("psdmc.emit.write.os.replace", interrupted)
+    monkeypatch.setattr("psdmc.atomic.os.replace", interrupted)
     with pytest.raises(ToolchainError, match="No space left"):
         write_package(tmp_path, other)
     assert {path: (tmp_path / path).read_text() for path in FILES} == FILES

@@ -1,0 +1,198 @@
+"""Files written whole or not at all: the one way in which psdmc writes.
+
+A file is written under a temporary name in its own folder, put to disk, and renamed into place: a reader sees
+the old content or the new, whatever happens in between. A process that is killed leaves its temporary file,
+which is known by its name and by the lock that died with the process; whoever writes into that folder next
+removes it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import re
+import secrets
+import stat
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from psdmc.errors import InputError, PsdmcError, ToolchainError
+
+if sys.platform != "win32":
+    import fcntl
+
+_TEMPORARY = re.compile(r"\.psdmc-[0-9a-f]{16}\.part(\.[a-z]{1,8})?")
+
+_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE)
+"""What no other name would help against."""
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write one file, text as UTF-8 with the line ends that it has.
+
+    An existing file's mode is kept, a new one's is the umask's; a symbolic link's target is replaced, not the
+    link; what is no regular file, such as /dev/null, is written to. InputError where the path does not admit a
+    file, ToolchainError where the disk does not.
+    """
+    with whole_file(path) as temporary:
+        _fill(temporary, content)
+
+
+@contextlib.contextmanager
+def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A name to write to, renamed to `path` at the end and removed after an error; errors as write_whole."""
+    with one_line(path):
+        target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
+        if _is_stream(target):
+            yield target
+            return
+        with _temporary(target) as own:
+            yield own
+            _settle(own, target)
+            os.replace(own, target)
+            _settle_folder(target.parent)
+
+
+def write_together(root: Path, files: Mapping[str, str]) -> None:
+    """Write files (path under root -> text) that belong together: all content is on disk before any is renamed,
+    in the given order. Errors as write_whole."""
+    with one_line(root), contextlib.ExitStack() as all_of_them:
+        ready = []
+        for path, text in files.items():
+            target = root / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            own = all_of_them.enter_context(_temporary(target))
+            _fill(own, text)
+            _settle(own, target)
+            ready.append((own, target))
+        for own, target in ready:
+            os.replace(own, target)
+        for folder in dict.fromkeys(target.parent for _, target in ready):
+            _settle_folder(folder)
+
+
+def make_folder(path: str | os.PathLike[str]) -> None:
+    """Make a folder and those above it where they are missing; errors as write_whole."""
+    with one_line(path):
+        Path(path).mkdir(parents=True, exist_ok=True)
+
+
+def check_place(path: str | os.PathLike[str]) -> None:
+    """InputError where no file can be written at `path`: to be said before hours of work, not after."""
+    target = Path(path)
+    with one_line(path):
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+        if not target.parent.is_dir():
+            code = errno.ENOTDIR if target.parent.exists() else errno.ENOENT
+            raise OSError(code, os.strerror(code), str(target.parent))
+        if not os.access(target.parent, os.W_OK | os.X_OK) and not _is_stream(target):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target.parent))
+
+
+@contextlib.contextmanager
+def one_line(path: str | os.PathLike[str]) -> Iterator[None]:
+    """An OSError as the error of psdmc that says what would help; it names `path`, not a temporary file."""
+    try:
+        yield
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+def unwritable(path: str | os.PathLike[str], error: OSError) -> PsdmcError:
+    """That `path` cannot be written, and whether another place or another disk would help."""
+    what = f"{os.fspath(path)}: cannot be written: {error.strerror or error}"
+    if error.errno in _THE_DISK:
+        return ToolchainError(what, "make room there, or write to another disk")
+    return InputError(what, "give a place that exists and that you may write to")
+
+
+def _is_stream(target: Path) -> bool:
+    """Whether a device, a pipe or a socket stands there: renaming a file onto it would destroy it."""
+    try:
+        mode = target.stat().st_mode
+    except FileNotFoundError:
+        return False
+    return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
+
+
+@contextlib.contextmanager
+def _temporary(target: Path) -> Iterator[Path]:
+    """An empty locked file beside `target`, removed at the end unless it was renamed."""
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    remove_leftovers(target.parent)
+    handle, own = _locked_new_file(target)
+    try:
+        yield own
+    finally:
+        own.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _locked_new_file(target: Path) -> tuple[int, Path]:
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
+    suffix = target.suffix if re.fullmatch(r"\.[a-z]{1,8}", target.suffix) else ""
+    while True:
+        own = target.parent / f".psdmc-{secrets.token_hex(8)}.part{suffix}"
+        handle = os.open(own, flags, 0o666)
+        lock(handle)
+        if sys.platform == "win32" or os.fstat(handle).st_nlink:
+            return handle, own
+        os.close(handle)  # somebody took it for a leftover before it was locked
+
+
+def lock(handle: int, wait: bool = True) -> bool:
+    """Lock an open file or folder until it is closed or the process ends; whether that was possible."""
+    if sys.platform == "win32":
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        return False
+    return True
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of processes that are gone; nobody else's files, and no error where that fails."""
+    with contextlib.suppress(OSError):
+        for name in os.listdir(folder):
+            if _TEMPORARY.fullmatch(name):
+                _remove_if_dead(folder / name)
+
+
+def _remove_if_dead(path: Path) -> None:
+    with contextlib.suppress(OSError):
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+        try:
+            if stat.S_ISREG(os.fstat(handle).st_mode) and lock(handle, wait=False):
+                path.unlink()
+        finally:
+            os.close(handle)
+
+
+def _fill(own: Path, content: str | bytes) -> None:
+    own.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+
+
+def _settle(own: Path, target: Path) -> None:
+    """Onto the disk, with the mode that the file had: a full disk says so here at the latest."""
+    handle = os.open(own, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+    with contextlib.suppress(FileNotFoundError):
+        own.chmod(target.stat().st_mode & 0o777)
+
+
+def _settle_folder(folder: Path) -> None:
+    """The renaming too, where the file system can; the file is whole in any case."""
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
