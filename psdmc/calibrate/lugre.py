@@ -139,4 +139,4 @@ def _compiled() -> tuple[Any, Any]:
         "void psdmc_lugre_simulate(size_t count, const double *qd, double dt, const double *parameters, double z, "
         "double *tau);"
     )
-    return ffi, ffi.dlopen(str(cached(key, build) / "lugre.so"))
+    return ffi, ffi.dlopen(str(cached(key, build, ["lugre.so"]) / "lugre.so"))

@@ -1,8 +1,9 @@
-"""Compiled libraries by content: what was compiled once is found again, whoever compiled it.
+"""Compiled libraries by content: what was compiled once is found again.
 
 The key holds everything that decides the binary: sources, flags, compiler, CPU features, psdmc's version and
-the platform. Two processes may race: each builds in a folder of its own and renames it into place, and the
-loser takes the winner's.
+the platform. An entry is believed while its files have the digests that they were sealed with, and is built
+again where they do not. Two processes may race: each builds in a folder of its own and renames it into place,
+and the loser takes the winner's.
 """
 
 from __future__ import annotations
@@ -12,25 +13,13 @@ import os
 import shutil
 import sys
 import sysconfig
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from psdmc.errors import ToolchainError
-
-VARIABLE = "PSDMC_CACHE_DIR"
-
-
-def cache_directory() -> Path:
-    """PSDMC_CACHE_DIR, else the platform's place for caches."""
-    chosen = os.environ.get(VARIABLE)
-    if chosen:
-        return Path(chosen)
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "psdmc"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", str(Path.home()))) / "psdmc" / "cache"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "psdmc"
+from psdmc.toolchain.cache_entry import is_sound, seal, touch
+from psdmc.toolchain.cache_place import cache_limit, open_cache, unusable
+from psdmc.toolchain.cache_room import hold, make_room, new_folder, remove, sweep
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
@@ -44,31 +33,47 @@ def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
     return digest.hexdigest()
 
 
-def cached(key: str, build: Callable[[Path], None]) -> Path:
-    """The folder that `build` filled for this key, now or earlier; ToolchainError where no folder can be
-    made."""
-    final = cache_directory() / key
-    if final.is_dir():
+def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()) -> Path:
+    """The folder that `build` filled for this key, now or earlier, unaltered since.
+
+    products  files that it must have made
+
+    ToolchainError where the cache cannot be written or is not this user's alone, or where a product is missing.
+    """
+    place = open_cache()
+    final = place / key
+    if is_sound(final):
+        touch(final)
         return final
+    limit = cache_limit()
     try:
-        final.parent.mkdir(parents=True, exist_ok=True)
-        own = Path(tempfile.mkdtemp(prefix=f".{key[:16]}-", dir=final.parent))
+        sweep(place)
+        _build(place, final, build, products)
+        make_room(place, final, limit)
     except OSError as error:
-        raise ToolchainError(
-            f"{final.parent}: cannot write to the compile cache: {error.strerror}",
-            f"set {VARIABLE} to a folder of yours",
-        ) from error
-    try:
-        build(own)
-        _rename(own, final)
-    finally:
-        shutil.rmtree(own, ignore_errors=True)
+        raise unusable(place, error) from error
     return final
 
 
-def _rename(own: Path, final: Path) -> None:
+def _build(place: Path, final: Path, build: Callable[[Path], None], products: Sequence[str]) -> None:
+    handle, own = new_folder(place)
     try:
+        build(own)
+        for product in products:
+            if not (own / product).is_file() or not (own / product).stat().st_size:
+                raise ToolchainError(f"the compiler made no {product}", "set CC to a C compiler, or unset it")
+        seal(own)
+        _install(own, final)
+    finally:
+        shutil.rmtree(own, ignore_errors=True)
+        os.close(handle)
+
+
+def _install(own: Path, final: Path) -> None:
+    """Into place, over whatever is damaged or foreign there; a sound entry of another process stays."""
+    with hold(final.parent):
+        if is_sound(final):
+            return
+        if os.path.lexists(final):
+            remove(final)
         own.rename(final)
-    except OSError as error:
-        if not final.is_dir():
-            raise ToolchainError(f"{final}: cannot write to the compile cache: {error.strerror}") from error

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.emit.package import PackageView
-from psdmc.errors import InputError
+from psdmc.errors import InputError, ToolchainError
 from psdmc.program.functions import BY_NAME
 
 Array = NDArray[Any]
@@ -30,7 +30,7 @@ class CompiledRobot:
     def __init__(self, package: PackageView, library: Path) -> None:
         self._ffi = cffi.FFI()
         self._ffi.cdef(package.cdef)
-        self._library = self._ffi.dlopen(str(library))
+        self._library = _opened(self._ffi, library, package.robot)
         self._robot = package.robot
         self._n, self._l = package.n, package.l
         self._dtype = np.dtype(package.options.real)
@@ -128,6 +128,16 @@ class CompiledRobot:
 
     def _address(self, array: Array) -> Any:
         return self._ffi.from_buffer(self._pointer, array)
+
+
+def _opened(ffi: cffi.FFI, library: Path, robot: str) -> Any:
+    try:
+        return ffi.dlopen(str(library))
+    except OSError as error:
+        raise ToolchainError(
+            f"{robot}: the compiled library cannot be loaded: {error}",
+            "set CC to a compiler that makes libraries for this machine, or unset it",
+        ) from error
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,8 @@ LIBRARY = "library.so"
 def compile_library(package: PackageView) -> Path:
     """The shared library of a package, from the cache or compiled now.
 
-    ToolchainError where there is no compiler, it fails, or the cache cannot be written.
+    ToolchainError where there is no compiler, it fails or makes no library, or the cache cannot be written or is not
+    this user's alone.
     """
     files = library_files(package)
     compiler = find_compiler()
@@ -27,8 +28,8 @@ def compile_library(package: PackageView) -> Path:
         *compiler.flags,
         package.info.psdmc_version,
     )
-    folder = cached(cache_key(files, parts), lambda own: _build(package, files, compiler, own))
-    return folder / LIBRARY
+    key = cache_key(files, parts)
+    return cached(key, lambda own: _build(package, files, compiler, own), [LIBRARY]) / LIBRARY
 
 
 def _build(package: PackageView, files: dict[str, str], compiler: Compiler, folder: Path) -> None:
@@ -38,11 +39,21 @@ def _build(package: PackageView, files: dict[str, str], compiler: Compiler, fold
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8", newline="\n")
     commands = [_compile_command(compiler, source) for source in package.sources]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(lambda words: run(words, package.robot, str(folder)), commands))
+    _run_all(commands, package.robot, folder)
     objects = [_object(source) for source in package.sources]
     link = [*compiler.command, "-shared", "-o", LIBRARY, *objects, "-lm"]
     run(link, package.robot, str(folder))
+    for name in objects:
+        (folder / name).unlink(missing_ok=True)
+
+
+def _run_all(commands: list[list[str]], robot: str, folder: Path) -> None:
+    """Several at a time; after an error or Ctrl-C no further one is started."""
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
+        list(pool.map(lambda words: run(words, robot, str(folder)), commands))
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _compile_command(compiler: Compiler, source: str) -> list[str]:

@@ -6,6 +6,7 @@ import contextlib
 import os
 import shlex
 import shutil
+import signal
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -48,13 +49,8 @@ def find_compiler() -> Compiler:
 
 
 def _command(wanted: str) -> tuple[str, ...]:
-    if wanted:
-        words = tuple(shlex.split(wanted))
-        if words and shutil.which(words[0]):
-            return words
-        raise ToolchainError(
-            f"C compiler {wanted!r} (from CC) was not found", "set CC to a compiler, or unset it"
-        )
+    if wanted.strip():
+        return _named(wanted)
     for name in CANDIDATES:
         if shutil.which(name):
             return (name,)
@@ -64,11 +60,28 @@ def _command(wanted: str) -> tuple[str, ...]:
     )
 
 
+def _named(wanted: str) -> tuple[str, ...]:
+    """The words of CC, a path among them made absolute: compilers run in folders of their own."""
+    hint = "set CC to a compiler, or unset it"
+    try:
+        program, *options = shlex.split(wanted)
+    except ValueError as error:
+        raise ToolchainError(f"C compiler {wanted!r} (from CC) is no command: {error}", hint) from None
+    if not shutil.which(program):
+        raise ToolchainError(f"C compiler {wanted!r} (from CC) was not found", hint)
+    return (os.path.abspath(program) if os.path.dirname(program) else program, *options)
+
+
 @cache
 def _described(command: tuple[str, ...]) -> Compiler:
     version = run([*command, "--version"], "C compiler")
     portable = (*FLAGS, *GCC_FLAGS) if "Free Software Foundation" in version else FLAGS
     flags, macros = _native(command, portable)
+    if "__STDC__" not in macros:
+        raise ToolchainError(
+            f"{shlex.join(command)} is no C compiler: it predefines no macros",
+            "set CC to a compiler, or unset it",
+        )
     return Compiler(command, version, portable, flags, "\n".join(sorted(macros.splitlines())))
 
 
@@ -92,6 +105,11 @@ def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise ToolchainError(f"{what}: {words[0]} could not be run: {error}") from error
+    if done.returncode < 0:
+        raise ToolchainError(
+            f"{what}: {words[0]} was killed by {_signal_name(-done.returncode)}",
+            "is there memory enough? run it to see: " + shlex.join(words),
+        )
     if done.returncode != 0:
         complaint = _complaint(done.stderr, done.stdout)
         raise ToolchainError(
@@ -99,6 +117,13 @@ def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
             f"run it to see everything: {shlex.join(words)}",
         )
     return done.stdout
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _complaint(*texts: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,9 @@ from racing import race
 from traced import arm_package
 
 from psdmc.errors import ToolchainError
-from psdmc.toolchain.cache import cache_directory, cache_key, cached
+from psdmc.toolchain.cache import cache_key, cached
+from psdmc.toolchain.cache_place import cache_directory
+from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
 from psdmc.toolchain.compiler_command import find_compiler
 
@@ -113,3 +116,136 @@ def test_a_compiler_that_fails_says_why(monkeypatch: pytest.MonkeyPatch, fresh_c
     monkeypatch.setenv("CC", "false")
     with pytest.raises(ToolchainError, match="false failed with status 1"):
         compile_library(arm_package(names=["gravity"]))
+
+
+def damage_by_truncation(library: Path) -> None:
+    library.write_bytes(library.read_bytes()[:5000])
+
+
+def damage_by_flipping(library: Path) -> None:
+    data = bytearray(library.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    library.write_bytes(bytes(data))
+
+
+def damage_by_emptying(library: Path) -> None:
+    library.write_bytes(b"")
+
+
+def damage_by_removal(library: Path) -> None:
+    library.unlink()
+
+
+def damage_by_replacing_with_a_link(library: Path) -> None:
+    library.rename(library.parent / "elsewhere.so")
+    library.symlink_to("elsewhere.so")
+
+
+def damage_to_the_seal(library: Path) -> None:
+    (library.parent / "entry.json").write_text('{"files": [1]}')
+
+
+def damage_by_forging_the_seal(library: Path) -> None:
+    (library.parent / "entry.json").write_text('{"files": {"../../../etc/hostname": "0"}, "bytes": 0}')
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        damage_by_truncation,
+        damage_by_flipping,
+        damage_by_emptying,
+        damage_by_removal,
+        damage_by_replacing_with_a_link,
+        damage_to_the_seal,
+        damage_by_forging_the_seal,
+    ],
+)
+def test_a_damaged_entry_is_built_again(damage: Callable[[Path], None], fresh_cache: Path) -> None:
+    package = arm_package(names=["gravity"])
+    library = compile_library(package)
+    sound = library.read_bytes()
+    damage(library)
+
+    assert compile_library(package) == library
+    assert library.read_bytes() == sound
+    assert not library.is_symlink()
+    assert CompiledRobot(package, library).gravity([0.1, 0.2, 0.3, 0.4]).shape == (4,)
+    assert [path.name for path in fresh_cache.iterdir()] == [library.parent.name]
+
+
+def test_a_compiler_that_makes_nothing_leaves_no_entry(
+    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """`true` succeeds at everything; so does a program that knows a compiler's macros and writes no file."""
+    lazy = tmp_path / "lazy"
+    lazy.write_text("#!/bin/sh\necho '#define __STDC__ 1'\n")
+    lazy.chmod(0o755)
+    package = arm_package(names=["gravity"])
+    for command, complaint in (("true", "is no C compiler"), (str(lazy), "made no library.so")):
+        monkeypatch.setenv("CC", command)
+        with pytest.raises(ToolchainError, match=complaint):
+            compile_library(package)
+        assert not fresh_cache.exists() or list(fresh_cache.iterdir()) == []
+    monkeypatch.delenv("CC")
+    assert compile_library(package).stat().st_size > 0
+
+
+def test_a_library_for_another_machine_is_one_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "library.so").write_bytes(b"\x7fELF" + bytes(200))
+    with pytest.raises(ToolchainError, match="cannot be loaded") as caught:
+        CompiledRobot(arm_package(names=["gravity"]), tmp_path / "library.so")
+    assert "CC" in str(caught.value.hint)
+
+
+@pytest.mark.parametrize(
+    ("command", "complaint"),
+    [("gcc '", "is no command: No closing quotation"), ("./no-such-cc", "was not found")],
+)
+def test_a_cc_that_is_no_command(command: str, complaint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", command)
+    with pytest.raises(ToolchainError, match=complaint) as caught:
+        find_compiler()
+    assert "\n" not in caught.value.message
+
+
+def test_cc_may_have_options_and_spaces(
+    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Also as a path from here: the compiler runs in a folder of its own."""
+    folder = tmp_path / "my tools"
+    folder.mkdir()
+    (folder / "cc").write_text('#!/bin/sh\nexec gcc "$@"\n')
+    (folder / "cc").chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CC", "'my tools/cc' -DUNUSED -O2")
+    assert compile_library(arm_package(names=["gravity"])).is_file()
+
+
+def test_a_compiler_that_is_killed_says_so(
+    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    dying = tmp_path / "dying"
+    dying.write_text('#!/bin/sh\ncase "$*" in *-shared*) kill -9 $$;; esac\nexec gcc "$@"\n')
+    dying.chmod(0o755)
+    monkeypatch.setenv("CC", str(dying))
+    with pytest.raises(ToolchainError, match="was killed by SIGKILL"):
+        compile_library(arm_package(names=["gravity"]))
+    assert list(fresh_cache.iterdir()) == []
+
+
+def test_a_failing_source_stops_the_others(
+    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    log = tmp_path / "log"
+    failing = tmp_path / "failing"
+    failing.write_text(
+        f'#!/bin/sh\ncase "$*" in *"-c src"*) echo x >> {log}; sleep 0.2; exit 1;; esac\nexec gcc "$@"\n'
+    )
+    failing.chmod(0o755)
+    monkeypatch.setenv("CC", str(failing))
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    package = arm_package()
+    with pytest.raises(ToolchainError, match="failed with status 1"):
+        compile_library(package)
+    assert len(log.read_text().split()) < len(package.sources)

@@ -1,0 +1,85 @@
+"""One entry of the compile cache: a folder with the digests of its files, believed only while they agree."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+from psdmc.toolchain.cache_place import is_private
+
+SEAL = "entry.json"
+"""Lists an entry's files with their SHA-256; its time is that of the entry's last use."""
+
+LARGEST_SEAL = 1 << 20
+"""Bytes; a six-joint arm's has 6 kB."""
+
+
+def seal(folder: Path) -> None:
+    """List every file with its digest, and let nobody else write them."""
+    files: dict[str, str] = {}
+    size = 0
+    for path in sorted(folder.rglob("*")):
+        if path.is_symlink():
+            continue
+        path.chmod(path.stat().st_mode & ~0o022)
+        if path.is_file():
+            files[str(path.relative_to(folder))] = _digest(path)
+            size += path.stat().st_size
+    text = json.dumps({"files": files, "bytes": size}, indent=1) + "\n"
+    (folder / SEAL).write_text(text, encoding="utf-8")
+    (folder / SEAL).chmod(0o600)
+
+
+def is_sound(folder: Path) -> bool:
+    """Whether an entry is whole, unaltered and nobody else's: what may be opened."""
+    try:
+        if not _is_own(folder, stat.S_ISDIR):
+            return False
+        files = _sealed(folder)["files"]
+        return bool(files) and all(
+            _is_own(folder / name, stat.S_ISREG) and _digest(folder / name) == value
+            for name, value in files.items()
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return False
+
+
+def touch(folder: Path) -> None:
+    """Note that an entry was used now; a cache that cannot be written does without."""
+    with contextlib.suppress(OSError):
+        os.utime(folder / SEAL)
+
+
+def used_and_size(folder: Path) -> tuple[float, int]:
+    """When an entry was last used (s since 1970) and its bytes; of one without seal, when it was made."""
+    try:
+        return (folder / SEAL).lstat().st_mtime, int(_sealed(folder)["bytes"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        sizes = (Path(top, name).lstat().st_size for top, _, names in os.walk(folder) for name in names)
+        return folder.lstat().st_mtime, sum(sizes)
+
+
+def _is_own(path: Path, kind: object) -> bool:
+    """Whether there is a file or folder of that kind, not a link to one, that no other user may write."""
+    status = path.lstat()
+    return bool(kind(status.st_mode)) and is_private(status)  # type: ignore[operator]
+
+
+def _sealed(folder: Path) -> dict[str, Any]:
+    path = folder / SEAL
+    if not _is_own(path, stat.S_ISREG) or path.lstat().st_size > LARGEST_SEAL:
+        raise ValueError(f"{path} is no seal")
+    content = json.loads(path.read_bytes())
+    if any(Path(name).is_absolute() or ".." in Path(name).parts for name in content["files"]):
+        raise ValueError(f"{path} names files elsewhere")
+    return dict(content)
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
