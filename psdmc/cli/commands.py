@@ -182,11 +182,16 @@ def emit_c(
 
 
 @app.command()
-def build(directory: Annotated[Path, typer.Argument(metavar="DIR", help="folder made by emit-c")]) -> None:
+def build(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="folder made by emit-c")],
+    edited: Annotated[
+        bool, typer.Option("--edited", help="build although files are not as emit-c wrote them")
+    ] = False,
+) -> None:
     """Build an emitted package through its own build files and run its self-test."""
     with steps() as progress:
         progress("building")
-        build_package(directory)
+        build_package(directory, edited)
     print(f"{directory}: built, self-test passed")
 
 

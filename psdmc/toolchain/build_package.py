@@ -2,28 +2,65 @@
 
 from __future__ import annotations
 
+import contextlib
+import shlex
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
+from psdmc.atomic import make_folder, one_line
+from psdmc.emit.own_files import edited_files
 from psdmc.errors import InputError, ToolchainError
 from psdmc.toolchain.compiler_command import find_compiler, run
 
+UNFINISHED = ".psdmc-unfinished"
+"""Stands in a build folder while psdmc builds there, and after it was killed or failed."""
 
-def build_package(directory: str | Path) -> str:
+
+def build_package(directory: str | Path, edited: bool = False) -> str:
     """Build under DIR/build, run the self-test, and return what the tools printed.
 
-    CMake where there is one, else make. InputError where DIR holds no package; ToolchainError where a tool is
-    missing or fails.
+    edited  build although files are missing or not as emit-c wrote them
+
+    CMake where there is one, else make. InputError where DIR holds no package, or an edited one; ToolchainError
+    where a tool is missing or fails.
     """
     root = Path(directory)
-    if not (root / "manifest.json").is_file() or not (root / "CMakeLists.txt").is_file():
-        raise InputError(f"{root}: no emitted package (no manifest.json)", "make one with psdmc emit-c")
+    _check_files(root, edited)
     compiler = find_compiler().command
     if shutil.which("cmake"):
-        return _with_cmake(root)
+        with _own_build(root / "build"):
+            return _with_cmake(root)
     if shutil.which("make"):
-        return _with_make(root, compiler)
+        with _own_build(root / "build"):
+            return _with_make(root, compiler)
     raise ToolchainError("neither cmake nor make was found", "install one (Debian: apt install cmake)")
+
+
+def _check_files(root: Path, edited: bool) -> None:
+    """The manifest says what the files were when they were checked against the model."""
+    found = edited_files(root)
+    if found is None:
+        raise InputError(
+            f"{root}: no emitted package (no manifest.json of psdmc's)", "make one with psdmc emit-c"
+        )
+    if found and not edited:
+        raise InputError(
+            f"{root}: not as emit-c wrote it: {', '.join(found[:3])}{' ...' if len(found) > 3 else ''}",
+            "emit it again, or build it all the same with --edited",
+        )
+
+
+@contextlib.contextmanager
+def _own_build(folder: Path) -> Iterator[None]:
+    """Nothing is built on what an interrupted build left: it may hold half an object file."""
+    with one_line(folder):
+        if (folder / UNFINISHED).is_file() and not folder.is_symlink():
+            shutil.rmtree(folder)
+        make_folder(folder)
+        (folder / UNFINISHED).touch()
+    yield
+    (folder / UNFINISHED).unlink(missing_ok=True)
 
 
 def _with_cmake(root: Path) -> str:
@@ -38,4 +75,5 @@ def _with_cmake(root: Path) -> str:
 
 
 def _with_make(root: Path, compiler: tuple[str, ...]) -> str:
-    return run(["make", "-C", str(root), f"CC={' '.join(compiler)}", "all", "check"], str(root))
+    command = shlex.join(compiler).replace("$", "$$")
+    return run(["make", "-C", str(root), f"CC={command}", "all", "check"], str(root))

@@ -16,7 +16,7 @@ from psdmc.emit.package import package_files
 from psdmc.emit.references import References
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError, ToolchainError
-from psdmc.toolchain.build_package import build_package
+from psdmc.toolchain.build_package import UNFINISHED, build_package
 
 NAMES = ["inverse_dynamics", "forward_dynamics"]
 
@@ -176,3 +176,63 @@ def test_openmp_gives_the_same_results(tmp_path: Path) -> None:
     folder = _emit(tmp_path / "arm")
     report = _run(["make", "-C", str(folder), "CFLAGS=-O2 -fopenmp -Dtest_arm_OPENMP", "check"])
     assert report.count(": ok") == 8
+
+
+def test_an_edited_package_is_named_and_built_only_on_request(tmp_path: Path) -> None:
+    folder = _emit(tmp_path / "arm")
+    with open(folder / "src" / "tables.c", "a", encoding="utf-8") as stream:
+        stream.write("/* edited */\n")
+    (folder / "README.md").unlink()
+
+    with pytest.raises(InputError, match=r"not as emit-c wrote it: .*src/tables\.c") as caught:
+        build_package(folder)
+    assert "README.md" in caught.value.message
+    assert "--edited" in str(caught.value.hint)
+    assert not (folder / "build").exists()
+    assert ": ok" in build_package(folder, edited=True)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", '{"generator": "psdmc"}', '{"generator": "psdmc", "files": {}}', "{" * 9000]
+)
+def test_a_manifest_that_is_none(text: str, tmp_path: Path) -> None:
+    folder = _emit(tmp_path / "arm")
+    (folder / "manifest.json").write_text(text)
+    with pytest.raises(InputError, match=r"no emitted package \(no manifest\.json of psdmc's\)"):
+        build_package(folder)
+
+
+@pytest.mark.parametrize("tool", ["cmake", "make"])
+def test_what_a_killed_build_left_is_not_built_on(
+    tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An object file cut short is younger than its source: build tools take it for finished."""
+    _need(tool)
+    which = shutil.which
+    monkeypatch.setattr("shutil.which", lambda name: None if name == "cmake" != tool else which(name))
+    folder = _emit(tmp_path / "arm")
+    build_package(folder)
+    for path in folder.glob("build/**/*.o"):
+        path.write_bytes(path.read_bytes()[:100])
+    for path in (*folder.glob("build/**/*.a"), *folder.glob("build/**/*.so*")):
+        path.unlink()
+    (folder / "build" / UNFINISHED).touch()
+
+    assert ": ok" in build_package(folder)
+    assert not (folder / "build" / UNFINISHED).exists()
+
+
+@pytest.mark.parametrize("tool", ["cmake", "make"])
+def test_spaces_and_letters_in_paths_and_compilers(
+    tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _need(tool, "gcc")
+    which = shutil.which
+    monkeypatch.setattr("shutil.which", lambda name: None if name == "cmake" != tool else which(name))
+    own = tmp_path / "my $tools"
+    own.mkdir()
+    (own / "gcc").write_text('#!/bin/sh\nexec gcc "$@"\n')
+    (own / "gcc").chmod(0o755)
+    if tool == "make":  # CMake takes no such path from CC
+        monkeypatch.setenv("CC", f"'{own / 'gcc'}' -O1")
+    assert ": ok" in build_package(_emit(tmp_path / "mein Röboter 'x'"))
