@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Limits, Placement
+from psdmc.model.json_values import entries, number, numbers, part, text, whole
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Limits, Placement
+
+MOST_JOINTS = 256
+"""Joints of a model file: its span alone takes 0.5 kB times the square of that, 64 MB."""
+MOST_NOTES = 100_000
+ORTHONORMAL = 1e-6
+"""Largest entry of R R^T - 1 of a rotation: rounding leaves 1e-15, and files' own matrices are made exact."""
 
 _NO_LIMIT = {"lower": -math.inf, "upper": math.inf, "speed": math.inf, "acceleration": math.inf}
 _NO_LIMIT["effort"] = math.inf
@@ -38,32 +45,70 @@ def chain_to_json(chain: Chain) -> dict[str, Any]:
     }
 
 
-def chain_from_json(data: dict[str, Any]) -> Chain:
-    """KeyError, TypeError or ValueError where the values are not a chain's."""
-    joints = tuple(_joint_from_json(joint) for joint in data["joints"])
-    span = np.zeros((PARAMETERS_PER_LINK * len(joints), data["parameter_span"]["columns"]))
-    entries = data["parameter_span"]
-    span[entries["rows"], entries["in_columns"]] = entries["values"]
+def chain_from_json(data: object) -> Chain:
+    """The chain; ValueError says which value is not a chain's."""
+    listed = entries(part(data, "joints", "the chain"), "the chain's joints", MOST_JOINTS)
+    if not listed:
+        raise ValueError("the chain has no joints")
+    convention = text(part(data, "convention", "the chain"), "the chain's convention")
+    if convention not in ("urdf", "standard", "modified"):
+        raise ValueError(f"the chain's convention is {convention!r}")
     return Chain(
-        name=data["name"],
-        convention=data["convention"],
-        base_name=data["base_name"],
-        tip_name=data["tip_name"],
-        joints=joints,
-        parameters=np.array([[math.nan if v is None else v for v in row] for row in data["parameters"]]),
-        parameter_span=span,
-        gravity=np.array(data["gravity"]),
-        tip=_placement_from_json(data["tip"]),
-        notes=tuple(data["notes"]),
+        name=text(part(data, "name", "the chain"), "the chain's name"),
+        convention=convention,  # type: ignore[arg-type]
+        base_name=text(part(data, "base_name", "the chain"), "the chain's base"),
+        tip_name=text(part(data, "tip_name", "the chain"), "the chain's tip"),
+        joints=tuple(_joint_from_json(joint) for joint in listed),
+        parameters=_parameters(part(data, "parameters", "the chain"), len(listed)),
+        parameter_span=_span(part(data, "parameter_span", "the chain"), len(listed)),
+        gravity=numbers(part(data, "gravity", "the chain"), "the chain's gravity", 3),
+        tip=_placement_from_json(part(data, "tip", "the chain"), "the tip"),
+        notes=tuple(
+            text(note, "a note") for note in entries(part(data, "notes", "the chain"), "notes", MOST_NOTES)
+        ),
     )
+
+
+def _parameters(rows: object, n: int) -> Array:
+    """Numbers, NaN for null."""
+    table = [
+        entries(row, "a link's parameters", PARAMETERS_PER_LINK) for row in entries(rows, "parameters", n)
+    ]
+    return np.array([[math.nan if v is None else number(v, "a parameter") for v in row] for row in table])
+
+
+def _span(data: object, n: int) -> Array:
+    """The span's columns; each leads with a one in a row where all others are zero."""
+    size = PARAMETERS_PER_LINK * n
+    columns = whole(part(data, "columns", "the span"), "the span's columns", 0, size)
+    rows, places, values = (
+        entries(part(data, name, "the span"), f"the span's {name}", size * max(columns, 1))
+        for name in ("rows", "in_columns", "values")
+    )
+    if not len(rows) == len(places) == len(values):
+        raise ValueError("the span's rows, in_columns and values are not equally many")
+    span = np.zeros((size, columns))
+    for row, place, value in zip(rows, places, values, strict=True):
+        where = (
+            whole(row, "a row of the span", 0, size - 1),
+            whole(place, "a column of the span", 0, columns - 1),
+        )
+        span[where] = number(value, "an entry of the span")
+    leads = np.argmax(span != 0.0, axis=0)
+    if columns and not np.array_equal(span[leads], np.eye(columns)):
+        raise ValueError("the span is not in reduced column echelon form")
+    return span
 
 
 def _placement_to_json(placement: Placement) -> dict[str, Any]:
     return {"rotation": placement.rotation.tolist(), "translation": placement.translation.tolist()}
 
 
-def _placement_from_json(data: dict[str, Any]) -> Placement:
-    return Placement(np.array(data["rotation"]), np.array(data["translation"]))
+def _placement_from_json(data: object, what: str) -> Placement:
+    rotation = numbers(part(data, "rotation", what), f"{what}'s rotation", 3, 3)
+    if not np.allclose(rotation @ rotation.T, np.eye(3), rtol=0.0, atol=ORTHONORMAL):
+        raise ValueError(f"{what}'s rotation is none")
+    return Placement(rotation, numbers(part(data, "translation", what), f"{what}'s translation", 3))
 
 
 def _joint_to_json(joint: Joint) -> dict[str, Any]:
@@ -78,18 +123,17 @@ def _joint_to_json(joint: Joint) -> dict[str, Any]:
     }
 
 
-def _joint_from_json(data: dict[str, Any]) -> Joint:
-    limits = {
-        name: absent if data["limits"][name] is None else float(data["limits"][name])
-        for name, absent in _NO_LIMIT.items()
-    }
-    if data["kind"] not in ("revolute", "prismatic"):
-        raise ValueError(f"joint kind {data['kind']!r}")
+def _joint_from_json(data: object) -> Joint:
+    limits = part(data, "limits", "a joint")
+    found = {name: part(limits, name, "a joint's limits") for name in _NO_LIMIT}
+    kind = text(part(data, "kind", "a joint"), "a joint's kind")
+    if kind not in ("revolute", "prismatic"):
+        raise ValueError(f"joint kind {kind!r}")
     return Joint(
-        data["name"],
-        data["link_name"],
-        data["kind"],
-        _placement_from_json(data["placement"]),
-        _placement_from_json(data["link_frame"]),
-        Limits(**limits),
+        text(part(data, "name", "a joint"), "a joint's name"),
+        text(part(data, "link_name", "a joint"), "a link's name"),
+        kind,  # type: ignore[arg-type]
+        _placement_from_json(part(data, "placement", "a joint"), "a joint"),
+        _placement_from_json(part(data, "link_frame", "a joint"), "a link frame"),
+        Limits(**{k: _NO_LIMIT[k] if v is None else number(v, f"a joint's {k}") for k, v in found.items()}),
     )

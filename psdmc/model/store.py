@@ -10,10 +10,8 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import struct
-import tokenize
+import reprlib
 import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -24,8 +22,10 @@ from scipy import sparse
 
 from psdmc.atomic import write_whole
 from psdmc.errors import InputError
-from psdmc.model.chain_json import chain_from_json, chain_to_json
+from psdmc.model.archive import LARGEST, BrokenArchiveError, opened, read_arrays
+from psdmc.model.chain_json import MOST_JOINTS, chain_to_json
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.from_parts import model_from
 from psdmc.version import psdmc_version
 
 SCHEMA = 1
@@ -38,20 +38,8 @@ _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
 _NO_DATE = (1980, 1, 1, 0, 0, 0)
 """Zip's earliest date: a file's bytes must not tell when it was written."""
 
-_BROKEN_ARCHIVE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    struct.error,
-    EOFError,
-    KeyError,
-    NotImplementedError,
-    RuntimeError,
-    OverflowError,
-    MemoryError,
-    SyntaxError,
-    tokenize.TokenError,
-)
-"""What zipfile and NumPy's header parser raise on altered bytes; found by altering every byte of a file."""
+LARGEST_MANIFEST = 64 << 20
+"""Bytes of the manifest's text, at four a letter; a nine-joint arm's has 0.1 MB beside its source."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -59,6 +47,11 @@ Arrays = Mapping[str, NDArray[Any]]
 def save(model: DynamicsModel, path: str | Path) -> None:
     """Write a model file, whole or not at all; InputError where the place does not admit it, ToolchainError
     where the disk does not."""
+    if model.n > MOST_JOINTS:
+        raise InputError(
+            f"{path}: {model.n} joints, model files hold up to {MOST_JOINTS}",
+            "cut the chain with --base and --tip",
+        )
     write_whole(path, file_bytes(model))
 
 
@@ -127,45 +120,70 @@ def _hash(arrays: Arrays, manifest: Mapping[str, Any]) -> str:
 
 
 def load(path: str | Path) -> DynamicsModel:
-    """Read a model file; InputError where it is missing, damaged, foreign or of a newer psdmc."""
+    """Read a model file; InputError where it is missing, damaged, forged, foreign or of a newer psdmc."""
     source = Path(path)
-    arrays, manifest = _read(source)
-    if manifest.get("content_hash") != _hash(arrays, manifest):
-        raise _damaged(source, "its content does not match its hash")
-    manifest = _migrated(manifest)
     try:
-        return _model(arrays, manifest)
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+        arrays, manifest = _read(source)
+        if manifest.get("content_hash") != _hash(arrays, manifest):
+            raise BrokenArchiveError("its content does not match its hash")
+        return model_from(arrays, _migrated(manifest))
+    except BrokenArchiveError as error:
+        raise _damaged(source, str(error)) from error
+    except (ValueError, RecursionError) as error:
         raise _damaged(source, f"its parts do not fit together ({error})") from error
 
 
 def _read(source: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Arrays and manifest, the manifest known to be psdmc's and of no newer schema."""
+    data = _bytes_of(source)
     try:
-        with np.load(io.BytesIO(source.read_bytes()), allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile) or "manifest" not in file.files:
-                raise _foreign(source)
-            manifest = json.loads(str(file["manifest"]))
-            _check_schema(source, manifest)
-            return {name: file[name] for name in ARRAYS}, manifest
+        archive = opened(data)
+        manifest = json.loads(_manifest_text(archive, len(data)))
+    except BrokenArchiveError as error:
+        raise _damaged(source, "it is truncated or altered") from error
+    except (ValueError, RecursionError) as error:
+        raise _foreign(source) from error
+    _check_schema(source, manifest)
+    try:
+        return read_arrays(archive, ARRAYS, len(data)), manifest
+    except BrokenArchiveError as error:
+        raise _damaged(source, "it is truncated or altered") from error
+
+
+def _bytes_of(source: Path) -> bytes:
+    try:
+        if source.stat().st_size > LARGEST:
+            raise InputError(f"{source}: larger than any model file ({LARGEST >> 30} GiB)")
+        return source.read_bytes()
     except FileNotFoundError as error:
         raise InputError(f"{source}: no such file", "psdmc derive ROBOT -o MODEL.npz makes one") from error
     except OSError as error:
-        raise InputError(f"{source}: cannot be read: {error.strerror or error}") from error
-    except _BROKEN_ARCHIVE as error:
-        raise _damaged(source, "it is truncated or altered") from error
-    except (ValueError, TypeError, AttributeError) as error:
-        raise _foreign(source) from error
+        raise InputError(
+            f"{source}: cannot be read: {error.strerror or error}", "give a model file (.npz)"
+        ) from error
+
+
+def _manifest_text(archive: zipfile.ZipFile, size: int) -> str:
+    array = read_arrays(archive, ["manifest"], size)["manifest"]
+    if array.ndim or array.dtype.kind != "U" or array.itemsize > LARGEST_MANIFEST:
+        raise ValueError("the manifest is no text")
+    try:
+        letters = array.astype(array.dtype.newbyteorder("<")).tobytes()
+        return letters.decode("utf-32-le").rstrip("\0")
+    except UnicodeDecodeError as error:
+        raise BrokenArchiveError(str(error)) from error
 
 
 def _check_schema(source: Path, manifest: Any) -> None:
-    schema = manifest.get("schema")
-    if manifest.get("format") != FORMAT or not isinstance(schema, int):
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise _foreign(source)
+    schema = manifest.get("schema")
+    if not isinstance(schema, int) or isinstance(schema, bool) or schema < 1:
+        raise _damaged(source, f"its schema is {reprlib.repr(schema)}, expected 1 to {SCHEMA}")
     if schema > SCHEMA:
         raise InputError(
-            f"{source}: model schema {schema}, this psdmc reads up to {SCHEMA}",
-            f"install psdmc {manifest.get('psdmc', '')} or newer, or derive the model again",
+            f"{source}: model schema {reprlib.repr(schema)}, this psdmc reads up to {SCHEMA}",
+            f"install psdmc {reprlib.repr(manifest.get('psdmc', ''))} or newer, or derive the model again",
         )
 
 
@@ -181,27 +199,3 @@ def _damaged(source: Path, why: str) -> InputError:
 
 def _foreign(source: Path) -> InputError:
     return InputError(f"{source}: not a psdmc model file", "psdmc derive ROBOT -o MODEL.npz makes one")
-
-
-def _model(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
-    chain = chain_from_json(manifest["chain"])
-    is_expanded = manifest["expanded"]
-    shape = (arrays["E"].shape[1], arrays["B"].shape[0])
-    return DynamicsModel(
-        E=arrays["E"] if is_expanded else None,
-        P=_matrices(arrays, len(chain), shape) if is_expanded else None,
-        theta_b=arrays["theta_b"] if manifest["theta_b_known"] else None,
-        B=arrays["B"],
-        chain=chain,
-        certificate=np.array(manifest["certificate"]),
-        provenance=manifest["provenance"],
-    )
-
-
-def _matrices(arrays: Arrays, n: int, shape: tuple[int, int]) -> tuple[sparse.csr_array, ...]:
-    matrices = []
-    for joint in range(n):
-        own = arrays["P_joint"] == joint
-        entries = (arrays["P_value"][own], (arrays["P_row"][own], arrays["P_col"][own]))
-        matrices.append(sparse.csr_array(entries, shape=shape))
-    return tuple(matrices)

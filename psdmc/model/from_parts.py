@@ -1,0 +1,153 @@
+"""A model from the arrays and the manifest of a file, each held against the others: the file may be forged.
+
+What is checked is what every stage relies on without looking: kinds, shapes, ranges, finite numbers, and that
+the base parameters have pivots within the chain's span.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from psdmc.model import json_values as json
+from psdmc.model.chain_json import chain_from_json
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
+from psdmc.robot.load import LoadOptions
+
+Arrays = Mapping[str, NDArray[Any]]
+
+KINDS = {
+    "E": (np.uint8, 2),
+    "theta_b": (np.float64, 1),
+    "P_joint": (np.int32, 1),
+    "P_row": (np.int32, 1),
+    "P_col": (np.int32, 1),
+    "P_value": (np.float64, 1),
+    "B": (np.float64, 2),
+}
+"""Type and axes of each array."""
+
+MOST_ROWS = 1_000_000
+"""Rows of a table in the provenance; a campaign's friction has seven per joint."""
+
+
+def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
+    """The model; ValueError says which part is wrong, what was found and what was expected."""
+    _check_kinds(arrays)
+    chain = chain_from_json(json.part(manifest, "chain", "the manifest"))
+    n, l = len(chain), arrays["B"].shape[0]
+    is_expanded = json.flag(json.part(manifest, "expanded", "the manifest"), "'expanded'")
+    is_known = json.flag(json.part(manifest, "theta_b_known", "the manifest"), "'theta_b_known'")
+    certificate = json.part(manifest, "certificate", "the manifest")
+    _check_base_parameters(arrays, chain, l, is_known)
+    return DynamicsModel(
+        E=_exponents(arrays["E"], n) if is_expanded else None,
+        P=_matrices(arrays, n, (arrays["E"].shape[1], l)) if is_expanded else None,
+        theta_b=arrays["theta_b"] if is_known else None,
+        B=arrays["B"],
+        chain=chain,
+        certificate=json.numbers(certificate, "the certificate", n),
+        provenance=_provenance(json.part(manifest, "provenance", "the manifest"), n),
+    )
+
+
+def _check_kinds(arrays: Arrays) -> None:
+    for name, (dtype, axes) in KINDS.items():
+        found = arrays[name]
+        if found.dtype != dtype or found.ndim != axes:
+            raise ValueError(
+                f"{name} has type {found.dtype} and {found.ndim} axes, expected {np.dtype(dtype)} and {axes}"
+            )
+
+
+def _check_base_parameters(arrays: Arrays, chain: Chain, l: int, is_known: bool) -> None:
+    B, span = arrays["B"], chain.parameter_span
+    if B.shape[1] != PARAMETERS_PER_LINK * len(chain) or l > B.shape[1]:
+        raise ValueError(f"B has shape {B.shape} for {len(chain)} joints")
+    if not np.isfinite(B).all() or (is_known and not np.isfinite(arrays["theta_b"]).all()):
+        raise ValueError("B or theta_b is not finite")
+    alone = (B != 0.0).sum(axis=0) == 1
+    first = np.argmax(alone & (B == 1.0), axis=1) if B.shape[1] else np.zeros(0, int)
+    if not (alone[first] & (B[np.arange(l), first] == 1.0)).all():
+        raise ValueError("a base parameter has no standard parameter of its own")
+    leads = np.argmax(span != 0.0, axis=0) if span.size else np.zeros(0, int)
+    if not np.isin(first, leads).all():
+        raise ValueError("a base parameter lies outside the parameters' span")
+
+
+def _exponents(E: NDArray[Any], n: int) -> NDArray[np.uint8]:
+    if E.shape[0] != 5 * n:
+        raise ValueError(f"E has {E.shape[0]} rows for {n} joints")
+    return E
+
+
+def _matrices(arrays: Arrays, n: int, shape: tuple[int, int]) -> tuple[sparse.csr_array, ...]:
+    ranges = {"P_joint": n, "P_row": shape[0], "P_col": shape[1]}
+    values = arrays["P_value"]
+    for name, count in ranges.items():
+        if arrays[name].shape != values.shape:
+            raise ValueError(f"{name} has {len(arrays[name])} entries, P_value {len(values)}")
+        if values.size and not 0 <= arrays[name].min() <= arrays[name].max() < count:
+            raise ValueError(f"{name} has entries outside 0 to {count - 1}")
+    if not np.isfinite(values).all():
+        raise ValueError("P is not finite")
+    starts = np.searchsorted(arrays["P_joint"], np.arange(n + 1))
+    if (np.diff(arrays["P_joint"]) < 0).any():
+        raise ValueError("P_joint is not in order")
+    return tuple(
+        sparse.csr_array((values[a:b], (arrays["P_row"][a:b], arrays["P_col"][a:b])), shape=shape)
+        for a, b in pairwise(starts)
+    )
+
+
+def _provenance(value: object, n: int) -> dict[str, Any]:
+    """Where the model came from, as far as psdmc reads it again."""
+    found = json.record(value, "the provenance")
+    for name in ("source_text", "source_sha256", "source_name"):
+        if found.get(name) is not None:
+            json.text(found[name], f"the provenance's {name}")
+    if found.get("source_format", "urdf") not in ("urdf", "dh"):
+        raise ValueError("the provenance's source_format is neither urdf nor dh")
+    if "options" in found:
+        _check_options(json.record(found["options"], "the provenance's options"), n)
+    for snap in json.entries(found.get("snapped", []), "the provenance's snapped", MOST_ROWS):
+        json.text(json.part(snap, "where", "a snapped rotation"), "a snapped rotation's place")
+        json.number(json.part(snap, "angle_rad", "a snapped rotation"), "a snapped rotation's angle")
+    if found.get("snap_torque_change") is not None:
+        json.numbers(found["snap_torque_change"], "the provenance's snap_torque_change", n)
+    if "calibration" in found:
+        _check_calibration(json.record(found["calibration"], "the calibration"))
+    return found
+
+
+def _check_options(options: dict[str, Any], n: int) -> None:
+    """Keyword arguments of load_robot: their names, and kinds that it takes or refuses in words."""
+    foreign = [name for name in options if name not in {field.name for field in fields(LoadOptions)}]
+    if foreign:
+        raise ValueError(f"the provenance has an option '{foreign[0]}'")
+    for name in ("base", "tip"):
+        if options.get(name) is not None:
+            json.text(options[name], f"the option {name}")
+    if options.get("gravity") is not None:
+        json.numbers(options["gravity"], "the option gravity", 3)
+    if not isinstance(options.get("drive_inertia", False), bool):
+        json.numbers(options["drive_inertia"], "the option drive_inertia", n)
+    for statement in json.entries(options.get("assume_zero", []), "the option assume_zero", MOST_ROWS):
+        json.text(statement, "an entry of the option assume_zero")
+    json.number(options.get("snap", 0.0), "the option snap")
+
+
+def _check_calibration(calibration: dict[str, Any]) -> None:
+    for table in ("friction", "motors"):
+        for row in json.entries(calibration.get(table, []), f"the calibration's {table}", MOST_ROWS):
+            json.text(json.part(row, "joint", table), f"a joint of the calibration's {table}")
+            json.text(json.part(row, "name", table), f"a name of the calibration's {table}")
+            if json.part(row, "value", table) is not None:
+                json.number(row["value"], f"a value of the calibration's {table}")
