@@ -1,0 +1,74 @@
+"""Kernels as JSON text and back: what a cache keeps of a lowering."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from psdmc.errors import InternalError
+from psdmc.program.check import check
+from psdmc.program.functions import BY_NAME
+from psdmc.program.kernel import Kernel
+from psdmc.program.program import Instr, Op, Program, Slot
+
+FORMAT = 1
+"""Grows where the text's form changes."""
+
+
+def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
+    """The text of kernels in their order; constants read back bit for bit."""
+    entries = [
+        {
+            "function": kernel.function.name,
+            "theta": kernel.theta,
+            "lowering": kernel.lowering,
+            "single": _program_to_plain(kernel.single),
+            "batch": None if kernel.batch is kernel.single else _program_to_plain(kernel.batch),
+        }
+        for kernel in kernels.values()
+    ]
+    return json.dumps({"format": FORMAT, "kernels": entries}, separators=(",", ":"), allow_nan=False)
+
+
+def kernels_from_json(text: str) -> dict[str, Kernel]:
+    """Kernels by name, in the order of `kernels_to_json`; InternalError where the text is not of its making."""
+    try:
+        whole = json.loads(text)
+        if whole["format"] != FORMAT:
+            raise ValueError(f"format {whole['format']}, expected {FORMAT}")
+        kernels = [_kernel_from_plain(entry) for entry in whole["kernels"]]
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise InternalError(f"kept kernels cannot be read: {error}") from error
+    return {kernel.name: kernel for kernel in kernels}
+
+
+def _kernel_from_plain(entry: Mapping[str, Any]) -> Kernel:
+    single = _program_from_plain(entry["single"])
+    batch = single if entry["batch"] is None else _program_from_plain(entry["batch"])
+    return Kernel(BY_NAME[entry["function"]], entry["theta"], single, batch, entry["lowering"])
+
+
+def _program_to_plain(program: Program) -> list[Any]:
+    """[[operation, its arguments ...] ...], with vector and index for loads and the value for constants; outputs."""
+    body: list[list[Any]] = []
+    for op, args, slot, value in program.body:
+        body.append([op.value, *args] if args else [op.value, *slot] if slot else [op.value, value])
+    return [body, [[*slot, index] for slot, index in program.outputs]]
+
+
+def _program_from_plain(plain: Any) -> Program:
+    body, outputs = plain
+    slots: dict[tuple[str, int], Slot] = {}
+
+    def slot_of(vector: str, index: int) -> Slot:
+        return slots.setdefault((vector, index), Slot(vector, index))
+
+    def instruction(word: str, *rest: Any) -> Instr:
+        op = Op(word)
+        if op is Op.LOAD:
+            return Instr(op, slot=slot_of(*rest))
+        return Instr(op, value=float(rest[0])) if op is Op.CONST else Instr(op, rest)
+
+    stored = tuple((slot_of(vector, index), value) for vector, index, value in outputs)
+    return check(Program(tuple(instruction(*entry) for entry in body), stored), after="reading kept kernels")

@@ -1,0 +1,72 @@
+"""Kernels kept as text come back as they were, and nothing else is taken for them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from psdmc.errors import InternalError
+from psdmc.program.functions import BY_NAME
+from psdmc.program.kernel import Kernel
+from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
+from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.text import parse
+
+GRAVITY = parse("""
+    a = load q[0]
+    s = sin a
+    c = const 0.1
+    x = mul c s
+    y = neg x
+    out g[0] = y
+""")
+
+
+def kernels() -> dict[str, Kernel]:
+    other = parse("a = load q[0]\nout g[0] = a")
+    made = (
+        Kernel(BY_NAME["gravity"], False, GRAVITY, GRAVITY, "factored"),
+        Kernel(BY_NAME["gravity"], True, GRAVITY, other, "expanded"),
+    )
+    return {kernel.name: kernel for kernel in made}
+
+
+def test_kernels_come_back_equal_and_in_order():
+    found = kernels_from_json(kernels_to_json(kernels()))
+
+    assert found == kernels()
+    assert list(found) == ["gravity", "gravity_theta"]
+    assert found["gravity"].batch is found["gravity"].single
+
+
+@pytest.mark.parametrize("value", [5e-324, 1.7976931348623157e308, 0.1 + 0.2, -0.0, 1 / 3])
+def test_constants_come_back_bit_for_bit(value: float):
+    program = Program((Instr(Op.CONST, value=value),), ((Slot("g", 0), 0),))
+    kept = Kernel(BY_NAME["gravity"], False, program, program, "factored")
+
+    (found,) = kernels_from_json(kernels_to_json({kept.name: kept})).values()
+
+    constant = found.single.body[0].value
+    assert constant == value
+    assert math.copysign(1.0, constant) == math.copysign(1.0, value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text[: len(text) // 2],
+        lambda text: text.replace('"format":1', '"format":2'),
+        lambda text: text.replace('"mul"', '"pow"'),
+        lambda text: text.replace('"gravity"', '"weight"'),
+        lambda text: text.replace('["mul",2,1]', '["mul",2,9]'),
+        lambda text: text.replace('["mul",2,1]', '["mul",2]'),
+        lambda text: "[]",
+    ],
+)
+def test_a_changed_text_is_refused(change):
+    text = kernels_to_json(kernels())
+    assert change(text) != text
+
+    with pytest.raises(InternalError):
+        kernels_from_json(change(text))
