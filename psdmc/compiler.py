@@ -22,6 +22,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import DEFAULT_SNAP, LoadedRobot, load_robot
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
+from psdmc.toolchain.kept_kernels import lowered_once
 
 Progress = Callable[[str], None]
 
@@ -131,7 +132,10 @@ def _package(
     _choose("lowering", lowering, ("auto", "expanded", "factored"))
     _choose("real", options.real, ("float64", "float32"))
     _choose("trig", options.trig, ("inline", "libm", "freestanding"))
-    kernels = lower(model, lowering, functions, progress)
+    wanted = ("all",) if functions is None else ("some", *functions)
+    kernels = lowered_once(
+        (model.content_hash, lowering, *wanted), lambda: lower(model, lowering, functions, progress)
+    )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     return package_view(package_info(model, name, shown), kernels, options, references(model))
 

@@ -1,12 +1,14 @@
 """Shared set-up: test helpers beside this file can be imported by name; hypothesis draws the same examples every time,
-or, with HYPOTHESIS_PROFILE=explore, new ones."""
+or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -14,3 +16,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("explore", derandomize=False)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compile_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Shared by all workers: each robot is lowered and compiled once a run."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if base.name.startswith("popen-gw") else base) / "compile-cache"
+    patch = pytest.MonkeyPatch()
+    patch.setenv("PSDMC_CACHE_DIR", str(folder))
+    yield folder
+    patch.undo()

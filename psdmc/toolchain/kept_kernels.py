@@ -1,0 +1,50 @@
+"""Lowerings kept in the compile cache: a model is lowered once for its options and this psdmc."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import psdmc
+from psdmc.errors import InternalError, ToolchainError
+from psdmc.program.kernel import Kernel
+from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
+from psdmc.toolchain.cache import cache_key, cached
+
+KERNELS = "kernels.json"
+
+DECIDES = ("dynamics", "lower", "model", "program", "robot")
+"""Folders of psdmc whose sources decide what a lowering gives."""
+
+
+def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -> dict[str, Kernel]:
+    """What `lower` gives, from the compile cache where an equal call was made before.
+
+    parts  everything that decides the result besides psdmc's own sources: the model's hash, the options
+
+    A cache that cannot be used costs time, not the result: `lower` is then called and nothing is kept.
+    """
+    made: dict[str, Kernel] = {}
+
+    def build(folder: Path) -> None:
+        made.update(lower())
+        (folder / KERNELS).write_text(kernels_to_json(made), encoding="utf-8")
+
+    key = cache_key({}, ("kernels", *sources_digests(), *parts))
+    try:
+        kept = cached(key, build, [KERNELS]) / KERNELS
+        return made or kernels_from_json(kept.read_text(encoding="utf-8"))
+    except (ToolchainError, InternalError, OSError):
+        return made or lower()
+
+
+@cache
+def sources_digests() -> tuple[str, ...]:
+    """NumPy's version and the digests of the sources that lowering runs: an edited psdmc lowers anew."""
+    root = Path(psdmc.__file__).parent
+    files = [path for folder in DECIDES for path in sorted((root / folder).rglob("*.py"))]
+    return (np.__version__, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in files))
