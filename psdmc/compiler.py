@@ -19,7 +19,8 @@ from psdmc.emit.write import write_package
 from psdmc.errors import InputError
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.load import DEFAULT_SNAP, LoadedRobot, load_robot
+from psdmc.robot.load import LoadedRobot, load_robot
+from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
 from psdmc.toolchain.kept_kernels import lowered_once

@@ -15,7 +15,8 @@ from psdmc.errors import InputError
 from psdmc.lower.kernels import Lowering
 from psdmc.model.check import check_model
 from psdmc.model.store import load
-from psdmc.robot.load import DEFAULT_SNAP, load_robot
+from psdmc.robot.load import load_robot
+from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.build_package import build_package
 from psdmc.version import psdmc_version
 

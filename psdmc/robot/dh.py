@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 from psdmc.errors import InputError
+from psdmc.robot import limits
 from psdmc.robot.chain import JointKind, Limits
 from psdmc.robot.inertia import INERTIA_NAMES
-from psdmc.robot.names import naming_faults
+from psdmc.robot.limits import MOST_FAULTS, Range, shown
+from psdmc.robot.names import name_faults, naming_faults
+from psdmc.robot.numerals import WHITE_SPACE, decimal
 from psdmc.robot.zeros import ZERO_NAMES
 
 Convention = Literal["standard", "modified"]
@@ -62,35 +67,58 @@ class DhRobot:
 
 def read_dh(text: str, source: str) -> DhRobot:
     """The file's content; InputError names everything that is wrong with it at once."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}: not a TOML file: {error}", "give a URDF or a DH .toml file") from None
     problems: list[str] = []
-    robot = _robot(table, problems)
+    robot = _robot(_parsed(text, source), problems)
     if problems or robot is None:
-        raise InputError(f"{source}: " + "; ".join(problems), "see the DH format in docs/notation.md")
+        more = [f"and {len(problems) - MOST_FAULTS} more"] if len(problems) > MOST_FAULTS else []
+        said = "; ".join([*problems[:MOST_FAULTS], *more])
+        raise InputError(f"{source}: {said}", "see the DH format in docs/notation.md")
     return robot
 
 
-def angle(value: object) -> float:
+def _parsed(text: str, source: str) -> object:
+    """What TOML's parser makes of it; ValueError is its word for integers of thousands of digits."""
+    hint = "give a URDF or a DH .toml file"
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{source}: not a TOML file: nested too deeply", hint) from None
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{source}: not a TOML file: {reason}", hint) from None
+
+
+def angle(value: object, accepted: Range = limits.ANGLE) -> float:
     """rad, from a number (rad) or a text such as "90 deg" or "1.5 rad"; ValueError on anything else."""
     if not isinstance(value, str):
-        return finite(value)
-    number_text, unit = value.strip()[:-3], value.strip()[-3:]
-    if unit not in ("deg", "rad"):
-        raise ValueError(f"'{value}' is no angle: write radians, or \"90 deg\"")
-    try:
-        number = finite(float(number_text))
-    except ValueError:
-        raise ValueError(f"'{value}' is no angle: write radians, or \"90 deg\"") from None
-    return math.radians(number) if unit == "deg" else number
+        return within(accepted)(value)
+    plain = value.strip(WHITE_SPACE)
+    number, unit = decimal(plain[:-3].strip(WHITE_SPACE)), plain[-3:]
+    if number is None or unit not in ("deg", "rad"):
+        raise ValueError(f'{shown(value)} is no angle: write radians, or "90 deg"')
+    return within(accepted)(math.radians(number) if unit == "deg" else number)
 
 
 def finite(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"found {value!r}, expected a finite number")
+    """A number that is one, and neither infinite nor beyond what 64 bits hold; ValueError on anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"found {shown(value)}, expected a finite number")
+    if not abs(value) <= sys.float_info.max:
+        raise ValueError(f"found {shown(value)}, expected a finite number")
     return float(value)
+
+
+def within(accepted: Range) -> Callable[[object], float]:
+    """A reader of finite numbers whose magnitude is in the range; ValueError says which is."""
+
+    def convert(value: object) -> float:
+        number = finite(value)
+        fault = accepted.fault(number)
+        if fault:
+            raise ValueError(f"{number:g} {fault}")
+        return number
+
+    return convert
 
 
 class _Table:
@@ -100,10 +128,10 @@ class _Table:
         self.where, self.problems = where, problems
         self.table: Mapping[str, Any] = value if isinstance(value, dict) else {}
         if not isinstance(value, dict):
-            problems.append(f"{where}: found {value!r}, expected a table")
+            problems.append(f"{where}: found {shown(value)}, expected a table")
         for key in self.table:
             if key not in keys:
-                problems.append(f"{where}: unknown key '{key}' (known: {', '.join(keys)})")
+                problems.append(f"{where}: unknown key {shown(key)} (known: {', '.join(keys)})")
 
     def read(self, key: str, convert: Callable[[Any], Any], default: Any) -> Any:
         """The converted value, or `default` where it is missing or wrong."""
@@ -122,28 +150,43 @@ def _robot(value: object, problems: list[str]) -> DhRobot | None:
     if not rows:
         problems.append("no [[joint]] in it")
         return None
+    if len(rows) > limits.MAX_JOINTS:
+        problems.append(f"{len(rows)} joints, psdmc reads at most {limits.MAX_JOINTS}")
+        return None
     joints = tuple(_joint(row, number, problems) for number, row in enumerate(rows, start=1))
-    problems += naming_faults([joint.name for joint in joints], "joint")
+    name = table.read("name", _text, "robot")
+    problems += name_faults(name, "robot") + naming_faults([joint.name for joint in joints], "joint")
+    lengths = [x for joint in joints for x in (joint.a, joint.d, *joint.link.com) if not math.isnan(x)]
+    fault = limits.scale_fault(lengths)
+    problems += [fault] if fault else []
     return DhRobot(
-        name=table.read("name", _text, "robot"),
+        name=name,
         convention=table.read("convention", _one_of("standard", "modified"), "standard"),
-        gravity=table.read("gravity", _triple, (0.0, 0.0, -9.81)),
+        gravity=table.read("gravity", _gravity, (0.0, 0.0, -9.81)),
         joints=joints,
     )
+
+
+def _gravity(value: object) -> Triple:
+    gravity = _triple_of(finite)(value)
+    fault = limits.gravity_fault(gravity)
+    if fault:
+        raise ValueError(f"{list(gravity)} {fault}")
+    return gravity
 
 
 def _joint(value: object, number: int, problems: list[str]) -> DhJoint:
     given = value.get("name") if isinstance(value, dict) else None
     name = given if isinstance(given, str) and given else f"joint{number}"
-    table = _Table(value, f"joint '{name}'", JOINT_KEYS, problems)
+    table = _Table(value, f"joint {shown(name)}", JOINT_KEYS, problems)
     table.read("name", _text, "")
     kind: JointKind = table.read("type", _one_of("revolute", "prismatic"), "revolute")
     return DhJoint(
         name=name,
         kind=kind,
-        a=table.read("a", finite, 0.0),
+        a=table.read("a", LENGTH, 0.0),
         alpha=table.read("alpha", angle, 0.0),
-        d=table.read("d", finite, 0.0),
+        d=table.read("d", LENGTH, 0.0),
         theta=table.read("theta", angle, 0.0),
         limits=_limits(table.read("limits", _same, {}), kind, f"{table.where} limits", problems),
         drive_inertia=table.read("drive_inertia", _drive_inertia, None),
@@ -153,7 +196,7 @@ def _joint(value: object, number: int, problems: list[str]) -> DhJoint:
 
 def _limits(value: object, kind: JointKind, where: str, problems: list[str]) -> Limits:
     table = _Table(value, where, LIMIT_KEYS, problems)
-    convert = angle if kind == "revolute" else finite
+    convert = partial(angle, accepted=limits.ANY) if kind == "revolute" else finite
     lower, upper = table.read("position", _range_of(convert), (-math.inf, math.inf))
     speed, acceleration, effort = (
         table.read(key, reader, math.inf)
@@ -166,11 +209,19 @@ def _link(value: object, where: str, problems: list[str]) -> DhLink:
     table = _Table(value, where, LINK_KEYS, problems)
     inertia = _Table(table.read("inertia_com", _same, {}), f"{where} inertia_com", INERTIA_NAMES, problems)
     return DhLink(
-        mass=table.read("mass", _not_negative, UNKNOWN),
-        com=table.read("com", _triple, (UNKNOWN,) * 3),
-        inertia_com=tuple(inertia.read(name, finite, UNKNOWN) for name in INERTIA_NAMES),
+        mass=table.read("mass", _not_negative(limits.MASS), UNKNOWN),
+        com=table.read("com", _triple_of(LENGTH), (UNKNOWN,) * 3),
+        inertia_com=tuple(inertia.read(name, within(limits.INERTIA), UNKNOWN) for name in INERTIA_NAMES),
         zero=table.read("zero", _zero_names, ()),
     )
+
+
+LENGTH = within(limits.LENGTH)
+
+
+def _plain(name: str) -> str:
+    """A short name as it stands, another as messages show texts."""
+    return name if name.isidentifier() and len(name) < limits.SHOWN else shown(name)
 
 
 def _same(value: object) -> object:
@@ -179,47 +230,53 @@ def _same(value: object) -> object:
 
 def _text(value: object) -> str:
     if not isinstance(value, str) or not value:
-        raise ValueError(f"found {value!r}, expected a text")
+        raise ValueError(f"found {shown(value)}, expected a text")
     return value
 
 
 def _list(value: object) -> list[object]:
     if not isinstance(value, list):
-        raise ValueError(f"found {value!r}, expected a list")
+        raise ValueError(f"found {shown(value)}, expected a list")
     return value
 
 
-def _triple(value: object) -> Triple:
-    values = _list(value)
-    if len(values) != 3:
-        raise ValueError(f"found {value!r}, expected three numbers")
-    x, y, z = (finite(v) for v in values)
-    return (x, y, z)
+def _triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
+    def read(value: object) -> Triple:
+        values = _list(value)
+        if len(values) != 3:
+            raise ValueError(f"found {shown(value)}, expected three numbers")
+        x, y, z = (convert(v) for v in values)
+        return (x, y, z)
+
+    return read
 
 
-def _not_negative(value: object) -> float:
-    number = finite(value)
-    if number < 0.0:
-        raise ValueError(f"found {number:g}, expected no less than zero")
-    return number
+def _not_negative(accepted: Range) -> Callable[[object], float]:
+    def read(value: object) -> float:
+        number = within(accepted)(value)
+        if number < 0.0:
+            raise ValueError(f"found {number:g}, expected no less than zero")
+        return number
+
+    return read
 
 
 def _drive_inertia(value: object) -> float:
-    return UNKNOWN if value == "unknown" else _not_negative(value)
+    return UNKNOWN if value == "unknown" else _not_negative(limits.DRIVE_INERTIA)(value)
 
 
 def _zero_names(value: object) -> tuple[str, ...]:
     names = tuple(_text(name) for name in _list(value))
     unknown = [name for name in names if name not in ZERO_NAMES]
     if unknown:
-        raise ValueError(f"unknown {', '.join(unknown)} (known: {', '.join(ZERO_NAMES)})")
+        raise ValueError(f"unknown {', '.join(map(_plain, unknown))} (known: {', '.join(ZERO_NAMES)})")
     return names
 
 
 def _one_of(*words: str) -> Callable[[object], str]:
     def convert(value: object) -> str:
-        if value not in words:
-            raise ValueError(f"found {value!r}, expected one of {', '.join(words)}")
+        if not isinstance(value, str) or value not in words:
+            raise ValueError(f"found {shown(value)}, expected one of {', '.join(words)}")
         return str(value)
 
     return convert
@@ -229,7 +286,7 @@ def _range_of(convert: Callable[[Any], float]) -> Callable[[object], tuple[float
     def read(value: object) -> tuple[float, float]:
         values = _list(value)
         if len(values) != 2 or convert(values[0]) > convert(values[1]):
-            raise ValueError(f"found {value!r}, expected [lower, upper]")
+            raise ValueError(f"found {shown(value)}, expected [lower, upper]")
         return convert(values[0]), convert(values[1])
 
     return read

@@ -53,6 +53,11 @@ def inertia_matrix(six: Array) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
+def six_of(matrix: Array) -> Array:
+    """(6,) components (INERTIA_NAMES) of a symmetric matrix, from its upper triangle."""
+    return matrix[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
+
+
 def physical_fault(mass: float, inertia_com: Array) -> str | None:
     """What forbids a body with this mass (kg) and inertia (6,) about its centre, or None; unknowns pass.
 

@@ -3,49 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from psdmc.errors import InputError
+from psdmc.robot import limits
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import PRODUCT_NOISE
+from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
 
 SourceFormat = Literal["urdf", "dh"]
 
-DEFAULT_SNAP = 1e-5
-"""rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
-
 DRIVE = PARAMETERS_PER_LINK - 1
-
-
-@dataclass(frozen=True, slots=True)
-class LoadOptions:
-    """What, besides the file, decides the chain; plain values, so that a saved model can be read again.
-
-    base, tip      link names of a URDF; None: the root, the end of the longest chain
-    gravity        m/s^2 in the URDF's root or the DH base frame; None: the file's own, or (0, 0, -9.81)
-    drive_inertia  True: drive inertias are parameters; numbers: with these values, one a joint, kg m^2 (kg)
-    assume_zero    texts such as "link5:mx" or "link5:Ixz@com"
-    snap           rad; 0 keeps the file's rotations but for floating-point noise
-    """
-
-    base: str | None = None
-    tip: str | None = None
-    gravity: tuple[float, float, float] | None = None
-    drive_inertia: bool | tuple[float, ...] = False
-    assume_zero: tuple[str, ...] = ()
-    snap: float = DEFAULT_SNAP
-
-    def as_json(self) -> dict[str, Any]:
-        """Keyword arguments of load_robot_text as plain JSON values."""
-        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,9 +86,8 @@ def load_robot_text(
     snap: float = DEFAULT_SNAP,
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
-    options = LoadOptions(
-        base, tip, _gravity(gravity), _drive_option(drive_inertia), tuple(assume_zero), _snap(snap)
-    )
+    _refuse_size(len(text.encode(errors="replace")), source_name)
+    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap)
     if not text.strip():
         raise InputError(f"{source_name}: the file is empty", "give a URDF or a DH .toml file")
     draft = _draft(text, source_format, source_name, options)
@@ -120,15 +95,27 @@ def load_robot_text(
     return LoadedRobot(chain, text, source_format, source_name, draft.snaps, options)
 
 
+def _refuse_size(size: int, source: str) -> None:
+    if size > limits.MAX_BYTES:
+        raise InputError(
+            f"{source}: more than {limits.MAX_BYTES // 2**20} MiB, which is the most that psdmc reads",
+            "give a URDF or a DH .toml file",
+        )
+
+
 def _text_of(file: Path) -> str:
     try:
-        return file.read_bytes().decode("utf-8-sig")
+        with file.open("rb") as opened:
+            data = opened.read(limits.MAX_BYTES + 1)
+        _refuse_size(len(data), str(file))
+        return data.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{file}: no such file", "give the path of a URDF or DH .toml file") from None
     except UnicodeDecodeError:
         raise InputError(f"{file}: not a UTF-8 text", "give a URDF or a DH .toml file") from None
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}", "check its path and rights") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{file}: cannot be read: {reason}", "check its path and rights") from None
 
 
 def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> Draft:
@@ -200,29 +187,3 @@ def _zero_notes(draft: Draft, said: Sequence[Sequence[str]], values: Sequence[Ar
         ending = "; the file's values there are dropped" if changed else ""
         notes.append(f"link '{joint.link_name}': assumed zero: {', '.join(names)}{ending}")
     return notes
-
-
-def _gravity(gravity: Sequence[float] | None) -> tuple[float, float, float] | None:
-    if gravity is None:
-        return None
-    values = [float(g) for g in gravity]
-    if len(values) != 3 or not np.isfinite(values).all():
-        raise InputError(
-            f"gravity {list(gravity)} is not three finite numbers", "for example --gravity 0 0 -9.81"
-        )
-    return (values[0], values[1], values[2])
-
-
-def _drive_option(drive_inertia: bool | Sequence[float]) -> bool | tuple[float, ...]:
-    if isinstance(drive_inertia, bool):
-        return drive_inertia
-    values = tuple(float(value) for value in drive_inertia)
-    if not all(np.isfinite(value) and value >= 0.0 for value in values):
-        raise InputError(f"drive inertias {list(values)} are not all finite and positive", "in kg m^2 (kg)")
-    return values
-
-
-def _snap(snap: float) -> float:
-    if not 0.0 <= snap <= 0.1:
-        raise InputError(f"snap is {snap} rad, expected 0 to 0.1", "the default is 1e-5")
-    return float(snap)

@@ -6,14 +6,25 @@ import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 
+from psdmc.robot.limits import MAX_NAME, shown
+
 
 def naming_faults(names: Sequence[str], what: str) -> list[str]:
     """What is wrong with the names of a robot's links or joints, one sentence each."""
     counts = Counter(names)
     faults = [f"a {what} has no name"] if counts[""] else []
-    faults += [f"{what} name {name!r} has control characters" for name in counts if _has_control(name)]
-    return faults + [f"{n} {what}s are called '{name}'" for name, n in counts.items() if n > 1 and name]
+    faults += [fault for name in counts for fault in name_faults(name, what)]
+    return faults + [f"{n} {what}s are called {shown(name)}" for name, n in counts.items() if n > 1 and name]
+
+
+def name_faults(name: str, what: str) -> list[str]:
+    """What is wrong with one name, one sentence each."""
+    faults = [f"{what} name {shown(name)} has control characters"] if _has_control(name) else []
+    if len(name) > MAX_NAME:
+        faults.append(f"{what} name {shown(name)}: expected at most {MAX_NAME}")
+    return faults
 
 
 def _has_control(name: str) -> bool:
-    return any(unicodedata.category(letter) in ("Cc", "Zl", "Zp") for letter in name)
+    """Control characters, line and paragraph separators, and halves of a character that no file can hold."""
+    return any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in name)

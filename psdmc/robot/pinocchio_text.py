@@ -1,47 +1,75 @@
-"""A URDF's text as Pinocchio is to read it: dynamics only, and every movable joint with one coordinate."""
+"""A URDF's text as Pinocchio is to read it: links, inertials and joints only, in the author's own digits.
+
+What has nothing to do with dynamics is left out (a missing mesh is none of our business, and urdfdom complains on
+standard error about much that psdmc has accepted or refused by then), and white space around numbers goes, which
+urdfdom takes for a fault and reads as zero.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import pinocchio
 
 from psdmc.errors import InputError
+from psdmc.robot.numerals import words
+from psdmc.robot.urdf_words import ATTRIBUTES
 from psdmc.robot.xml_text import parse_xml
 
-JOINT_PREFIX = "joint:"
-"""Put before every joint's name: Pinocchio cannot lock a joint that shares its name with a link."""
+JOINT_PREFIX = "joint\t"
+"""Put before every joint's name: Pinocchio cannot lock a joint that shares its name with a link. No name of a file
+has a tab in it."""
+
+VERSION = "1.1"
+"""The first one with quat_xyzw, which urdfdom ignores before; 1.2 asks for limits that older files need not have."""
 
 
-def pinocchio_model(text: str, source: str, movable: Collection[str] | None = None) -> pinocchio.Model:
-    """Pinocchio's model of the URDF, joints called JOINT_PREFIX + name.
+def pinocchio_model(
+    text: str, source: str, movable: Collection[str] | None = None, kinds: Mapping[str, str] | None = None
+) -> pinocchio.Model:
+    """Pinocchio's model of a URDF that read_urdf has accepted, joints called JOINT_PREFIX + name.
 
     movable   names of joints; every other one is fixed, so that its bodies are merged (None: all stay)
+    kinds     types of joints that replace the file's, by type
 
-    A continuous joint becomes a revolute one (Pinocchio would give it a cosine and a sine), pictures are
-    left out (a missing mesh is none of our business). InputError where Pinocchio refuses what is left.
+    A continuous joint becomes a revolute one (Pinocchio would give it a cosine and a sine). InputError where
+    Pinocchio refuses the text all the same.
     """
     root = parse_xml(text, source, "robot")
-    for link in root.findall("link"):
-        for picture in [*link.findall("visual"), *link.findall("collision")]:
-            link.remove(picture)
-    for joint in root.findall("joint"):
-        if movable is not None and joint.get("name") not in movable:
-            joint.set("type", "fixed")
-        elif joint.get("type") == "continuous":
-            joint.set("type", "revolute")
-        _complete_limit(joint)
-        joint.set("name", JOINT_PREFIX + joint.get("name", ""))
+    wanted = tostring(
+        _dynamics_of(root, movable, {"continuous": "revolute", **(kinds or {})}), encoding="unicode"
+    )
     try:
-        return pinocchio.buildModelFromXML(tostring(root, encoding="unicode"))
-    except ValueError as error:
-        raise InputError(f"{source}: Pinocchio cannot read it: {error}", "check_urdf may say more") from None
+        return pinocchio.buildModelFromXML(wanted)
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{source}: Pinocchio cannot read it: {reason}", "check_urdf may say more") from None
 
 
-def _complete_limit(joint: Element) -> None:
-    """Pinocchio refuses a joint without effort and velocity limits, which no dynamics needs."""
-    limit = joint.find("limit")
-    limit = SubElement(joint, "limit") if limit is None else limit
-    for name in ("effort", "velocity"):
-        limit.set(name, limit.get(name, "0"))
+def _dynamics_of(root: Element, movable: Collection[str] | None, kinds: Mapping[str, str]) -> Element:
+    robot = Element("robot", name=root.get("name") or "robot", version=VERSION)
+    for link in root.findall("link"):
+        copy = SubElement(robot, "link", name=link.get("name", ""))
+        inertial = link.find("inertial")
+        if inertial is not None:
+            _copy(inertial, SubElement(copy, "inertial"), ("origin", "mass", "inertia"))
+    for joint in root.findall("joint"):
+        name, kind = joint.get("name", ""), joint.get("type", "")
+        is_locked = movable is not None and name not in movable
+        copy = SubElement(
+            robot, "joint", name=JOINT_PREFIX + name, type="fixed" if is_locked else kinds.get(kind, kind)
+        )
+        _copy(joint, copy, ("origin", "parent", "child", "axis"))
+        # Pinocchio refuses a joint without these limits, which no dynamics needs.
+        SubElement(copy, "limit", effort="0", velocity="0")
+    return robot
+
+
+def _copy(element: Element, target: Element, tags: Collection[str]) -> None:
+    """Children with the attributes that carry dynamics, white space around numbers made one blank."""
+    for child in element:
+        if child.tag in tags:
+            kept = {name: child.attrib[name] for name in ATTRIBUTES[child.tag] if name in child.attrib}
+            trimmed = {name: text if name == "link" else " ".join(words(text)) for name, text in kept.items()}
+            SubElement(target, child.tag, trimmed)

@@ -28,3 +28,14 @@ def roll_pitch_yaw(angles: tuple[float, float, float], snap: float = 0.0) -> Arr
     """
     roll, pitch, yaw = (snap_rotation(about(axis, angle), snap)[0] for axis, angle in enumerate(angles))
     return np.asarray(times(times(yaw, pitch), roll))
+
+
+def from_quaternion(x: float, y: float, z: float, w: float) -> Array:
+    """(3, 3) rotation of a unit quaternion whose real part is w."""
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )

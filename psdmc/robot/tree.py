@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from psdmc.errors import InputError
-from psdmc.robot.urdf import MOVABLE, UrdfJoint, UrdfRobot
+from psdmc.robot.limits import MAX_JOINTS, shown
+from psdmc.robot.urdf import LOCKABLE, MOVABLE, UrdfJoint, UrdfRobot
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,18 +40,32 @@ def find_route(robot: UrdfRobot, base: str | None, tip: str | None, source: str)
     end, notes = (tip, ()) if tip is not None else default_tip(robot, start, source)
     path = joints_between(robot, start, end)
     if path is None:
-        raise InputError(
-            f"{source}: tip link '{end}' is not below base link '{start}'",
-            f"below it: {listed(_below(robot, start))}",
-        )
+        raise InputError(f"{source}: " + _not_below(robot, start, end), _way_out(robot, start, end))
     to_base = joints_between(robot, robot.root, start) or ()
     route = Route(start, end, to_base, path, notes)
+    _refuse_many(route, source)
     if not route.movable:
         raise InputError(
             f"{source}: no movable joint between '{start}' and '{end}'", "choose other --base or --tip"
         )
-    _refuse_unsupported(route, source)
+    _refuse_unsupported(robot, route, source)
     return Route(start, end, to_base, path, (*notes, *_locked_note(robot, route)))
+
+
+def _not_below(robot: UrdfRobot, start: str, end: str) -> str:
+    above = " but above it" if joints_between(robot, end, start) is not None else ""
+    return f"tip link '{end}' is not below base link '{start}'{above}"
+
+
+def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
+    if joints_between(robot, end, start) is not None:
+        return f"a chain runs from its base to its tip: swap them, --base '{end}' --tip '{start}'"
+    below = _below(robot, start)
+    return (
+        f"links below '{start}': {listed(below)}"
+        if below
+        else f"no link is below '{start}': choose another --base"
+    )
 
 
 def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, ...] | None:
@@ -136,11 +151,21 @@ def _parting_link(robot: UrdfRobot, base: str, ends: Sequence[str]) -> str:
     return shared
 
 
-def _refuse_unsupported(route: Route, source: str) -> None:
+def _refuse_many(route: Route, source: str) -> None:
+    if len(route.movable) > MAX_JOINTS:
+        raise InputError(
+            f"{source}: {len(route.movable)} movable joints from '{route.base}' to '{route.tip}', psdmc reads at"
+            f" most {MAX_JOINTS}",
+            "choose a shorter chain with --base and --tip",
+        )
+
+
+def _refuse_unsupported(robot: UrdfRobot, route: Route, source: str) -> None:
+    on_chain = {joint.name for joint in route.movable}
     problems = [
-        f"joint '{joint.name}': type '{joint.type}' is not supported"
-        for joint in route.movable
-        if joint.type not in MOVABLE
+        f"joint '{joint.name}': type {shown(joint.type)} is not supported"
+        for joint in robot.joints
+        if joint.type not in (*MOVABLE, "fixed") and (joint.name in on_chain or joint.type not in LOCKABLE)
     ]
     problems += [f"joint '{joint.name}': mimics another joint" for joint in route.movable if joint.is_mimic]
     if problems:

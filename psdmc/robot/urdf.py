@@ -3,43 +3,73 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 from xml.etree.ElementTree import Element
 
 from psdmc.errors import InputError
+from psdmc.robot import limits
 from psdmc.robot.chain import Limits
 from psdmc.robot.inertia import INERTIA_NAMES
-from psdmc.robot.names import naming_faults
-from psdmc.robot.xml_text import number, numbers, parse_xml, required_number
+from psdmc.robot.names import name_faults, naming_faults
+from psdmc.robot.urdf_tree import tree_faults
+from psdmc.robot.urdf_words import (
+    VERSIONS,
+    has_dynamics,
+    joint_faults,
+    link_faults,
+    robot_faults,
+    unread_words,
+)
+from psdmc.robot.xml_text import number, numbers, only, parse_xml, required_number
 
 Triple = tuple[float, float, float]
+Quadruple = tuple[float, float, float, float]
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 """Joint types that psdmc models; fixed ones are merged, all others refused on the chain."""
 
+LOCKABLE = (*MOVABLE, "fixed", "floating", "planar")
+"""Joint types that have a neutral position, where those beside the chain are locked."""
+
+UNIT_SLACK = 1e-2
+"""A quaternion of two digits, such as 0.71 0 0 0.71, has a length that far from one; it is made one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a frame sits in another: xyz (m), and either rpy (rad) or a unit quaternion (x, y, z, w)."""
+
+    xyz: Triple = (0.0, 0.0, 0.0)
+    rpy: Triple = (0.0, 0.0, 0.0)
+    quaternion: Quadruple | None = None
+
 
 @dataclass(frozen=True, slots=True)
 class UrdfInertial:
-    """mass kg; inertia kg m^2 (INERTIA_NAMES) about the centre of mass, along the inertial frame's axes."""
+    """mass kg; inertia kg m^2 (INERTIA_NAMES) about the centre of mass, along the inertial frame's axes; origin
+    places that frame, whose origin is the centre of mass, in the link."""
 
     mass: float
     inertia: tuple[float, ...]
+    origin: Origin
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """One <joint>. xyz (m) and rpy (rad) place the child link in the parent at q = 0; axis in the child."""
+    """One <joint>. origin places the child link in the parent at q = 0; axis in the child; has_dynamics: it writes
+    of friction, damping or a spring."""
 
     name: str
     type: str
     parent: str
     child: str
-    xyz: Triple
-    rpy: Triple
+    origin: Origin
     axis: Triple
     limits: Limits
     is_mimic: bool
+    has_dynamics: bool
 
     @property
     def is_movable(self) -> bool:
@@ -48,12 +78,16 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class UrdfRobot:
-    """A tree of links. `inertials` has every link in the file's order, None where it has no <inertial>."""
+    """A tree of links. `inertials` has every link in the file's order, None where it has no <inertial>.
+
+    notes   what the file says and no chain holds, one sentence each
+    """
 
     name: str
     root: str
     inertials: dict[str, UrdfInertial | None]
     joints: tuple[UrdfJoint, ...]
+    notes: tuple[str, ...]
 
     def joints_below(self, link: str) -> tuple[UrdfJoint, ...]:
         return tuple(joint for joint in self.joints if joint.parent == link)
@@ -62,73 +96,151 @@ class UrdfRobot:
 def read_urdf(text: str, source: str) -> UrdfRobot:
     """The file's content; InputError names everything that is wrong with its links and joints at once."""
     root = parse_xml(text, source, "robot")
-    problems: list[str] = []
+    hint = f"psdmc reads URDF {VERSIONS[0]} to {VERSIONS[-1]}; see docs/notation.md"
+    _refuse(robot_faults(root), source, hint)
+    _refuse_sizes(root, source)
+    problems = name_faults(root.get("name", ""), "robot")
     for tag in ("link", "joint"):
         problems += naming_faults([element.get("name", "") for element in root.findall(tag)], tag)
     _refuse(problems, source, "names tell links and joints apart: correct them")
-    inertials: dict[str, UrdfInertial | None] = {}
-    joints: list[UrdfJoint] = []
-    for element in root.findall("link"):
-        try:
-            inertials[element.get("name", "")] = _inertial(element)
-        except ValueError as error:
-            problems.append(f"link '{element.get('name', '')}': {error}")
-    for element in root.findall("joint"):
-        try:
-            joints.append(_joint(element))
-        except ValueError as error:
-            problems.append(f"joint '{element.get('name', '')}': {error}")
-    _refuse(problems, source, "correct the file")
+    problems = []
+    bodies = _each(root, "link", lambda link: (link.get("name", ""), _inertial(link)), problems)
+    joints = _each(root, "joint", _joint, problems)
+    _refuse(problems, source, "correct the file; docs/notation.md says what it may hold")
+    inertials = dict(bodies)
     if not inertials:
         raise InputError(f"{source}: no <link> in it", "give a URDF with links and joints")
-    _refuse(_tree_faults(inertials, joints), source, "a robot is a tree: one root, one parent joint per link")
+    ends = [(joint.name, joint.parent, joint.child) for joint in joints]
+    _refuse(
+        tree_faults(list(inertials), ends), source, "a robot is a tree: one root, one parent joint per link"
+    )
+    _refuse(_scale_faults(inertials, joints), source, "lengths are in metres")
     children = {joint.child for joint in joints}
     base = next(name for name in inertials if name not in children)
-    return UrdfRobot(root.get("name", "robot"), base, inertials, tuple(joints))
+    return UrdfRobot(
+        root.get("name") or "robot", base, inertials, tuple(joints), _notes(root, inertials, joints)
+    )
+
+
+Made = TypeVar("Made")
+
+
+def _each(root: Element, tag: str, read: Callable[[Element], Made], problems: list[str]) -> list[Made]:
+    """Every element of that name read; what is wrong goes to `problems`, under the element's name."""
+    found = []
+    for element in root.findall(tag):
+        try:
+            found.append(read(element))
+        except ValueError as error:
+            problems.append(f"{tag} '{element.get('name', '')}': {error}")
+    return found
 
 
 def _refuse(problems: Sequence[str], source: str, hint: str) -> None:
     if problems:
-        raise InputError(f"{source}: " + "; ".join(problems), hint)
+        more = (
+            [f"and {len(problems) - limits.MOST_FAULTS} more"] if len(problems) > limits.MOST_FAULTS else []
+        )
+        raise InputError(f"{source}: " + "; ".join([*problems[: limits.MOST_FAULTS], *more]), hint)
+
+
+def _refuse_sizes(root: Element, source: str) -> None:
+    count = len(root.findall("link"))
+    if count > limits.MAX_LINKS:
+        raise InputError(
+            f"{source}: {count} links, psdmc reads at most {limits.MAX_LINKS}",
+            "merge links that fixed joints hold together, or leave out what the chain does not need",
+        )
+
+
+def _notes(
+    root: Element, inertials: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]
+) -> tuple[str, ...]:
+    notes = [] if root.get("name") else ["the file names no robot: called 'robot'"]
+    origins = [joint.origin for joint in joints] + [body.origin for body in inertials.values() if body]
+    if root.get("version", "1.0").strip() == "1.0" and any(origin.quaternion for origin in origins):
+        notes.append(
+            "quat_xyzw is read as a rotation, though the file does not say version 1.1: others ignore it"
+        )
+    return (*notes, *unread_words(root))
+
+
+def _scale_faults(inertials: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]) -> list[str]:
+    places = [joint.origin.xyz for joint in joints] + [b.origin.xyz for b in inertials.values() if b]
+    fault = limits.scale_fault(length for xyz in places for length in xyz)
+    return [fault] if fault else []
 
 
 def _inertial(link: Element) -> UrdfInertial | None:
-    element = link.find("inertial")
+    _raise(link_faults(link))
+    element = only(link, "inertial")
     if element is None:
         return None
-    numbers(element.find("origin"), "xyz", (0.0, 0.0, 0.0))
-    numbers(element.find("origin"), "rpy", (0.0, 0.0, 0.0))
-    mass = required_number(element.find("mass"), "mass", "value")
-    inertia = element.find("inertia")
-    six = tuple(required_number(inertia, "inertia", f"i{name}") for name in INERTIA_NAMES)
+    mass = required_number(only(element, "mass"), "mass", "value", limits.MASS)
+    inertia = only(element, "inertia")
+    six = tuple(required_number(inertia, "inertia", f"i{name}", limits.INERTIA) for name in INERTIA_NAMES)
     if mass < 0.0:
         raise ValueError(f"<mass> is {mass:g} kg, expected no less than zero")
-    return UrdfInertial(mass, six)
+    return UrdfInertial(mass, six, _origin(element))
 
 
 def _joint(element: Element) -> UrdfJoint:
+    _raise(joint_faults(element))
     kind = element.get("type", "")
-    axis = numbers(element.find("axis"), "xyz", (1.0, 0.0, 0.0))
-    if kind in (*MOVABLE, "planar") and not any(axis):
-        raise ValueError("<axis> is zero, expected a direction")
-    origin = element.find("origin")
-    x, y, z = numbers(origin, "xyz", (0.0, 0.0, 0.0))
-    roll, pitch, yaw = numbers(origin, "rpy", (0.0, 0.0, 0.0))
+    dynamics = only(element, "dynamics")
+    for name in () if dynamics is None else dynamics.attrib:
+        number(dynamics, name, 0.0, limits.ANY)
     return UrdfJoint(
         name=element.get("name", ""),
         type=kind,
         parent=_link_of(element, "parent"),
         child=_link_of(element, "child"),
-        xyz=(x, y, z),
-        rpy=(roll, pitch, yaw),
-        axis=(axis[0], axis[1], axis[2]),
+        origin=_origin(element),
+        axis=_axis(element, kind),
         limits=_limits(element, kind),
-        is_mimic=element.find("mimic") is not None,
+        is_mimic=only(element, "mimic") is not None,
+        has_dynamics=has_dynamics(element),
     )
 
 
+def _raise(faults: Sequence[str]) -> None:
+    if faults:
+        raise ValueError("; ".join(faults))
+
+
+def _axis(joint: Element, kind: str) -> Triple:
+    element = only(joint, "axis")
+    if element is not None and element.get("xyz") is None:
+        raise ValueError("<axis> has no xyz")
+    x, y, z = numbers(element, "xyz", (1.0, 0.0, 0.0), limits.DIRECTION)
+    if kind not in (*MOVABLE, "planar"):
+        return (x, y, z)
+    if not any((x, y, z)):
+        raise ValueError("<axis> is zero, expected a direction")
+    fault = limits.AXIS_LENGTH.fault(math.hypot(x, y, z))
+    if fault:
+        raise ValueError(f"length of <axis>, {math.hypot(x, y, z):g}, {fault}")
+    return (x, y, z)
+
+
+def _origin(parent: Element) -> Origin:
+    element = only(parent, "origin")
+    x, y, z = numbers(element, "xyz", (0.0, 0.0, 0.0), limits.LENGTH)
+    roll, pitch, yaw = numbers(element, "rpy", (0.0, 0.0, 0.0), limits.ANGLE)
+    if element is None or element.get("quat_xyzw") is None:
+        return Origin((x, y, z), (roll, pitch, yaw))
+    if element.get("rpy") is not None:
+        raise ValueError("<origin> has both rpy and quat_xyzw, expected one of them")
+    quaternion = numbers(element, "quat_xyzw", (0.0, 0.0, 0.0, 1.0), limits.QUATERNION)
+    length = math.hypot(*quaternion)
+    if abs(length - 1.0) > UNIT_SLACK:
+        raise ValueError(f"<origin> quat_xyzw has length {length:.6g}, expected one")
+    i, j, k, w = (part / length for part in quaternion)
+    return Origin((x, y, z), quaternion=(i, j, k, w))
+
+
 def _link_of(joint: Element, tag: str) -> str:
-    element = joint.find(tag)
+    element = only(joint, tag)
     if element is None or element.get("link") is None:
         raise ValueError(f"<{tag} link=...> is missing")
     return element.get("link", "")
@@ -136,51 +248,16 @@ def _link_of(joint: Element, tag: str) -> str:
 
 def _limits(joint: Element, kind: str) -> Limits:
     """Position limits only where the file writes one: URDF's default, 0 to 0, would be a joint stuck."""
-    element = joint.find("limit")
+    element = only(joint, "limit")
     if element is None:
         return Limits()
-    speed = number(element, "velocity", math.inf)
-    effort = number(element, "effort", math.inf)
+    speed, effort, acceleration = (
+        number(element, name, math.inf, limits.ANY) for name in ("velocity", "effort", "acceleration")
+    )
     written = element.get("lower") is not None or element.get("upper") is not None
-    lower, upper = number(element, "lower", 0.0), number(element, "upper", 0.0)
+    lower, upper = (number(element, name, 0.0, limits.ANY) for name in ("lower", "upper"))
     if kind == "continuous" or not written:
-        return Limits(speed=speed, effort=effort)
+        return Limits(speed=speed, effort=effort, acceleration=acceleration)
     if lower > upper:
         raise ValueError(f"<limit> lower {lower:g} is above upper {upper:g}")
-    return Limits(lower=lower, upper=upper, speed=speed, effort=effort)
-
-
-def _tree_faults(links: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]) -> list[str]:
-    faults = []
-    for joint in joints:
-        for role, link in (("parent", joint.parent), ("child", joint.child)):
-            if link not in links:
-                faults.append(f"joint '{joint.name}': {role} link '{link}' does not exist")
-    parents: dict[str, list[str]] = {}
-    for joint in joints:
-        parents.setdefault(joint.child, []).append(joint.name)
-    for link, above in parents.items():
-        if len(above) > 1:
-            quoted = " and ".join(f"'{name}'" for name in above)
-            faults.append(f"link '{link}' is the child of joints {quoted}: a loop")
-    roots = [name for name in links if name not in parents]
-    if not faults and len(roots) > 1:
-        faults.append("links " + ", ".join(f"'{name}'" for name in roots) + " all have no parent joint")
-    return faults or _cycle_faults(links, joints, roots)
-
-
-def _cycle_faults(
-    links: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint], roots: Sequence[str]
-) -> list[str]:
-    """Links that no root reaches hang in a ring."""
-    below: dict[str, list[str]] = {}
-    for joint in joints:
-        below.setdefault(joint.parent, []).append(joint.child)
-    reached = dict.fromkeys(roots)
-    queue = list(roots)
-    while queue:
-        for child in below.get(queue.pop(), []):
-            reached[child] = None
-            queue.append(child)
-    ring = [name for name in links if name not in reached]
-    return ["links " + ", ".join(f"'{name}'" for name in ring) + " form a loop"] if ring else []
+    return Limits(lower=lower, upper=upper, speed=speed, effort=effort, acceleration=acceleration)

@@ -1,4 +1,4 @@
-"""From a URDF to a serial robot: joints placed by the file's own numbers, bodies merged by Pinocchio."""
+"""From a URDF to a serial robot: joints placed and bodies merged by the file's own numbers."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ import numpy as np
 
 from psdmc.robot.chain import Array, Joint, Placement
 from psdmc.robot.draft import Draft, Snap
-from psdmc.robot.inertia import physical_fault, without_noise
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
-from psdmc.robot.rotation import roll_pitch_yaw
+from psdmc.robot.inertia import physical_fault
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, snap_translation
-from psdmc.robot.tree import Route, find_route
+from psdmc.robot.tree import Route, find_route, listed
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
+from psdmc.robot.urdf_bodies import hold_against_pinocchio, merged_parameters, placement_of
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""
@@ -29,7 +28,8 @@ def urdf_draft(
     joints, tip_frame, snaps = _placed_joints(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)
     root_gravity = np.array(STANDARD_GRAVITY) if gravity is None else gravity
-    bodies = merged_parameters(text, source, [joint.name for joint in route.movable])
+    bodies = merged_parameters(robot, route)
+    hold_against_pinocchio(robot, route, bodies, text, source)
     bare = [joint.link_name for joint, x in zip(joints, bodies, strict=True) if not x.any()]
     return Draft(
         name=robot.name,
@@ -44,18 +44,13 @@ def urdf_draft(
         tip=tip_frame,
         snaps=(*base_snaps, *snaps),
         notes=(
+            *robot.notes,
             *route.notes,
             *(f"link '{link}' has no inertia: none assumed" for link in bare),
+            *_unmodelled(route),
             *_faults(robot),
         ),
     )
-
-
-def merged_parameters(text: str, source: str, movable: list[str]) -> list[Array]:
-    """Ten standard parameters per movable joint, of all that moves with it, about its child link's frame."""
-    model = pinocchio_model(text, source, movable)
-    bodies = [model.inertias[model.getJointId(JOINT_PREFIX + name)] for name in movable]
-    return [without_noise(body.toDynamicParameters()) for body in bodies]
 
 
 def link_rotation(axis: Array) -> Array:
@@ -77,7 +72,7 @@ def _placed_joints(route: Route, snap: float) -> tuple[tuple[Joint, ...], Placem
     several merged ones came to.
     """
     snaps: list[Snap] = []
-    reach = sum(math.hypot(*joint.xyz) for joint in route.path)
+    reach = sum(math.hypot(*joint.origin.xyz) for joint in route.path)
     joints: list[Joint] = []
     so_far = Placement.identity()
     for joint in route.path:
@@ -112,9 +107,11 @@ def _base_rotation(route: Route, snap: float) -> tuple[Array, list[Snap]]:
 
 def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap]) -> Placement:
     """Where the child link's frame sits in the parent's at q = 0."""
-    rotation = roll_pitch_yaw(joint.rpy, snap)
-    _record(snaps, f"joint '{joint.name}'", angle_between(rotation, roll_pitch_yaw(joint.rpy)))
-    return Placement(rotation, np.array(joint.xyz))
+    place = placement_of(joint.origin, snap)
+    _record(
+        snaps, f"joint '{joint.name}'", angle_between(place.rotation, placement_of(joint.origin).rotation)
+    )
+    return place
 
 
 def _merged(place: Placement, where: str, snap: float, snaps: list[Snap], reach: float) -> Placement:
@@ -126,6 +123,12 @@ def _merged(place: Placement, where: str, snap: float, snaps: list[Snap], reach:
 def _record(snaps: list[Snap], where: str, angle: float) -> None:
     if angle > ROUNDING:
         snaps.append(Snap(where, angle))
+
+
+def _unmodelled(route: Route) -> list[str]:
+    """A note that names the chain's joints with friction, damping or springs: rigid bodies have none of them."""
+    names = [joint.name for joint in route.movable if joint.has_dynamics]
+    return [f"<dynamics> (damping, friction) of joints is not modelled: {listed(names)}"] if names else []
 
 
 def _faults(robot: UrdfRobot) -> list[str]:

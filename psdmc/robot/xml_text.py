@@ -9,6 +9,8 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from psdmc.errors import InputError
+from psdmc.robot.limits import MAX_CHARACTERS, Range, shown
+from psdmc.robot.numerals import decimal, words
 
 
 def parse_xml(text: str, source: str, root_tag: str) -> Element:
@@ -20,12 +22,13 @@ def parse_xml(text: str, source: str, root_tag: str) -> Element:
         raise InputError(
             f"{source}: XML entities are not allowed ({kind})", "remove the <!DOCTYPE> with its entities"
         ) from None
-    except (ParseError, ValueError) as error:
+    except (ParseError, ValueError, LookupError) as error:
         raise InputError(
             f"{source}: not well-formed XML: {error}", "give a URDF or a DH .toml file"
         ) from None
     if root.tag != root_tag:
-        raise InputError(f"{source}: the root element is <{root.tag}>, expected <{root_tag}>", "give a URDF")
+        found = root.tag if str(root.tag).isidentifier() and len(root.tag) < 50 else shown(root.tag)
+        raise InputError(f"{source}: the root element is <{found}>, expected <{root_tag}>", "give a URDF")
     if any("xacro" in str(element.tag) for element in root.iter()):
         raise InputError(
             f"{source}: this is a xacro file, not a URDF", "expand it first: xacro FILE > robot.urdf"
@@ -33,35 +36,53 @@ def parse_xml(text: str, source: str, root_tag: str) -> Element:
     return root
 
 
-def numbers(element: Element | None, attribute: str, default: tuple[float, ...]) -> tuple[float, ...]:
-    """Finite numbers from an attribute, as many as `default` has; ValueError says what was found."""
+def only(parent: Element, tag: str) -> Element | None:
+    """The child element of that name, None where there is none; ValueError where there are several."""
+    found = parent.findall(tag)
+    if len(found) > 1:
+        raise ValueError(f"{len(found)} <{tag}> elements, expected one")
+    return found[0] if found else None
+
+
+def numbers(
+    element: Element | None, attribute: str, default: tuple[float, ...], accepted: Range
+) -> tuple[float, ...]:
+    """Numbers from an attribute, as many as `default` has, each in its range; ValueError says what was found."""
     text = None if element is None else element.get(attribute)
     if element is None or text is None:
         return default
-    values = [_number(word) for word in text.split()]
+    written = f"<{element.tag}> {attribute}={_quoted(text)}"
+    values = [decimal(word) for word in words(text)]
     finite = [value for value in values if value is not None]
     if len(finite) != len(values) or len(values) != len(default):
         wanted = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers"
-        raise ValueError(f"<{element.tag}> {attribute}='{text}', expected {wanted}")
+        long = f" of at most {MAX_CHARACTERS} characters" if _is_long(text) else ""
+        raise ValueError(f"{written}, expected {wanted}{long}")
+    for value in finite:
+        fault = accepted.fault(value)
+        if fault:
+            raise ValueError(f"{written} {fault}")
     return tuple(finite)
 
 
-def number(element: Element | None, attribute: str, default: float) -> float:
-    return numbers(element, attribute, (default,))[0]
+def number(element: Element | None, attribute: str, default: float, accepted: Range) -> float:
+    return numbers(element, attribute, (default,), accepted)[0]
 
 
-def required_number(element: Element | None, tag: str, attribute: str) -> float:
+def required_number(element: Element | None, tag: str, attribute: str, accepted: Range) -> float:
     """A number that must be there; ValueError where it is not."""
     if element is None:
         raise ValueError(f"<{tag}> is missing")
     if element.get(attribute) is None:
         raise ValueError(f"<{tag}> has no {attribute}")
-    return number(element, attribute, math.nan)
+    return number(element, attribute, math.nan, accepted)
 
 
-def _number(word: str) -> float | None:
-    try:
-        value = float(word)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) and "_" not in word else None
+def _is_long(text: str) -> bool:
+    return any(len(word) > MAX_CHARACTERS for word in words(text))
+
+
+def _quoted(text: str) -> str:
+    """Printable ASCII as it stands; else with escapes, because what is wrong may be what cannot be seen."""
+    plain = text.isascii() and text.isprintable() and "'" not in text
+    return shown(text) if len(text) > MAX_CHARACTERS else f"'{text}'" if plain else ascii(text)

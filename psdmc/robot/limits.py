@@ -1,0 +1,109 @@
+"""What a robot file may hold: declared bounds of sizes and magnitudes, said in every message that refuses one.
+
+Numbers beyond them are no robot's; below and above, squares and products of lengths and masses would leave what
+64-bit numbers hold, and the first thing to notice would be a sum far from its cause.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+MAX_BYTES = 4 * 2**20
+"""Bytes of a robot file: the largest one known to us has 0.2 MB."""
+
+MAX_LINKS = 1000
+"""Links of a URDF: urdfdom and Pinocchio go down the tree by recursion and end the process beyond a few thousand."""
+
+MAX_JOINTS = 200
+"""Movable joints of a chain: the longest serial robots have a few dozen."""
+
+MAX_CHARACTERS = 100
+"""Characters of a number: 17 digits tell every 64-bit number from the next."""
+
+MAX_NAME = 1000
+"""Characters of a name."""
+
+MOST_FAULTS = 20
+"""Faults of one file that a message names."""
+
+SHOWN = 60
+"""Characters of a file's text that a message repeats."""
+
+TINIEST = 1e-300
+"""A number nearer to zero than this, but not zero, is about to lose digits (denormal) or lost them all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Accepted magnitudes of one quantity: zero, or from `least` to `most`, in `unit`."""
+
+    least: float
+    most: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"0, or {self.least:g} to {self.most:g} {self.unit} in magnitude".replace("  ", " ")
+
+    def fault(self, value: float) -> str | None:
+        """What is wrong with a finite number, or None."""
+        if value == 0.0 or self.least <= abs(value) <= self.most:
+            return None
+        return f"is out of range, expected {self}"
+
+
+LENGTH = Range(1e-60, 1e4, "m")
+"""Files hold remains of rounding as small as (1e-16)^3; a chain of 200 joints of 10 km stays far from overflow."""
+
+ANGLE = Range(TINIEST, 1e3, "rad")
+"""Beyond, sine and cosine would turn the number's last digit into 1e-13 and more."""
+
+MASS = Range(1e-12, 1e6, "kg")
+"""Pinocchio takes masses below 2e-16 kg for none when it merges bodies."""
+
+INERTIA = Range(1e-60, 1e10, "kg m^2")
+
+DRIVE_INERTIA = Range(1e-18, 1e8, "kg m^2 (kg)")
+
+DIRECTION = Range(TINIEST, 1e6, "")
+"""Components of an axis; what counts is their ratio."""
+
+AXIS_LENGTH = Range(1e-6, 2e6, "")
+"""Length of an axis as written: a shorter one is more likely a mistake than a direction."""
+
+GRAVITY = Range(TINIEST, 1e3, "m/s^2")
+"""Components; noise beside a larger one is harmless."""
+
+GRAVITY_LENGTH = Range(1e-6, 2e3, "m/s^2")
+
+QUATERNION = Range(TINIEST, 2.0, "")
+
+ANY = Range(TINIEST, 1.8e308, "")
+"""Joint limits: only copied; files write the largest number for none."""
+
+LONGEST_LENGTH = Range(1e-6, 1e4, "m")
+"""The longest length of a robot, of which the others may be any fraction."""
+
+
+def shown(value: object) -> str:
+    """A file's text or value as a message repeats it: quoted as Python quotes it, cut off where it is long."""
+    try:
+        text = repr(value)
+    except ValueError:
+        # Python prints no integer of more than 4,300 digits.
+        return "a number of thousands of digits"
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}... ({len(text)} characters)"
+
+
+def gravity_fault(gravity: Sequence[float]) -> str | None:
+    """What is wrong with an acceleration of gravity (three finite numbers, m/s^2), or None."""
+    faults = [GRAVITY.fault(component) for component in gravity]
+    return next((fault for fault in faults if fault), None) or GRAVITY_LENGTH.fault(math.hypot(*gravity))
+
+
+def scale_fault(lengths: Iterable[float]) -> str | None:
+    """What is wrong with a robot's lengths (m) as a whole, or None."""
+    longest = max((abs(length) for length in lengths), default=0.0)
+    fault = LONGEST_LENGTH.fault(longest)
+    return f"the longest of all its lengths, {longest:g} m, {fault}" if fault else None

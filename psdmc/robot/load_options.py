@@ -1,0 +1,114 @@
+"""What, besides its file, decides a robot, every value checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from psdmc.errors import InputError
+from psdmc.robot import limits
+from psdmc.robot.limits import shown
+
+DEFAULT_SNAP = 1e-5
+"""rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
+
+MAX_SNAP = 0.1
+"""rad: a robot whose axes may move by more is another robot."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoadOptions:
+    """What, besides the file, decides the chain; plain values, so that a saved model can be read again.
+
+    base, tip      link names of a URDF; None: the root, the end of the longest chain
+    gravity        m/s^2 in the URDF's root or the DH base frame; None: the file's own, or (0, 0, -9.81)
+    drive_inertia  True: drive inertias are parameters; numbers: with these values, one a joint, kg m^2 (kg)
+    assume_zero    texts such as "link5:mx" or "link5:Ixz@com"
+    snap           rad; 0 keeps the file's rotations but for floating-point noise
+    """
+
+    base: str | None = None
+    tip: str | None = None
+    gravity: tuple[float, float, float] | None = None
+    drive_inertia: bool | tuple[float, ...] = False
+    assume_zero: tuple[str, ...] = ()
+    snap: float = DEFAULT_SNAP
+
+    def as_json(self) -> dict[str, Any]:
+        """Keyword arguments of load_robot_text as plain JSON values."""
+        return asdict(self)
+
+
+def checked_options(
+    base: str | None,
+    tip: str | None,
+    gravity: Sequence[float] | None,
+    drive_inertia: bool | Sequence[float],
+    assume_zero: Sequence[str],
+    snap: float,
+) -> LoadOptions:
+    """The options; InputError names the first that is wrong."""
+    for name, value in (("base", base), ("tip", tip)):
+        if value is not None and not isinstance(value, str):
+            raise InputError(f"{name} is {shown(value)}, expected a link's name", "give a text")
+    if isinstance(assume_zero, str) or not _all_are_texts(assume_zero):
+        raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
+    drives = _drive_inertia(drive_inertia)
+    return LoadOptions(base, tip, _gravity(gravity), drives, tuple(assume_zero), _snap(snap))
+
+
+def _all_are_texts(values: object) -> bool:
+    return isinstance(values, Iterable) and all(isinstance(value, str) for value in values)
+
+
+def _gravity(gravity: Sequence[float] | None) -> tuple[float, float, float] | None:
+    if gravity is None:
+        return None
+    hint = "for example --gravity 0 0 -9.81"
+    values = _floats(gravity)
+    if values is None or len(values) != 3:
+        raise InputError(f"gravity {_listed(gravity)} is not three finite numbers", hint)
+    fault = limits.gravity_fault(values)
+    if fault:
+        raise InputError(f"gravity {_listed(values)} {fault}", hint)
+    return (values[0], values[1], values[2])
+
+
+def _drive_inertia(drive_inertia: bool | Sequence[float]) -> bool | tuple[float, ...]:
+    if isinstance(drive_inertia, bool):
+        return drive_inertia
+    values = _floats(drive_inertia)
+    if values is None or not all(value >= 0.0 for value in values):
+        found = _listed(drive_inertia)
+        raise InputError(f"drive inertias {found} are not all finite and positive", "in kg m^2 (kg)")
+    faults = [f"{value:g} {fault}" for value in values if (fault := limits.DRIVE_INERTIA.fault(value))]
+    if faults:
+        raise InputError(f"drive inertia {faults[0]}", "in kg m^2 (kg)")
+    return values
+
+
+def _snap(snap: float) -> float:
+    if not isinstance(snap, int | float) or not 0.0 <= snap <= MAX_SNAP:
+        raise InputError(
+            f"snap is {snap} rad, expected 0 to {MAX_SNAP:g}", f"the default is {DEFAULT_SNAP:g}"
+        )
+    return float(snap)
+
+
+def _floats(values: object) -> tuple[float, ...] | None:
+    """Finite floats from a sequence, None where it is none or holds something else."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        return None
+    try:
+        found = tuple(float(value) for value in values)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return found if all(math.isfinite(value) for value in found) else None
+
+
+def _listed(values: object) -> str:
+    return (
+        shown(list(values)) if isinstance(values, Iterable) and not isinstance(values, str) else shown(values)
+    )

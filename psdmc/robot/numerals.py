@@ -1,0 +1,39 @@
+"""Numbers as robot files write them: plain decimals in ASCII, and nothing else.
+
+Python's float also takes underscores, other alphabets' digits and exotic spaces, C++'s streams take none of them and
+urdfdom then reads zero without a word. One grammar for all readers leaves nothing to chance.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from psdmc.robot.limits import MAX_CHARACTERS, TINIEST
+
+WHITE_SPACE = " \t\n\r\f\v"
+"""ASCII white space, which may stand around and between numbers."""
+
+DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_GAP = re.compile(f"[{WHITE_SPACE}]+")
+_NOT_ZERO = re.compile("[1-9]")
+
+
+def words(text: str) -> list[str]:
+    """The words of a text between ASCII white space."""
+    return [word for word in _GAP.split(text) if word]
+
+
+def decimal(word: str) -> float | None:
+    """The number that a word writes, or None where it is no finite decimal number or too long or small a one."""
+    if len(word) > MAX_CHARACTERS or not DECIMAL.fullmatch(word):
+        return None
+    value = float(word)
+    if not math.isfinite(value) or (abs(value) < TINIEST and _has_digits(word)):
+        return None
+    return value
+
+
+def _has_digits(word: str) -> bool:
+    """Whether the digits before the exponent say something else than zero."""
+    return bool(_NOT_ZERO.search(word.lower().partition("e")[0]))

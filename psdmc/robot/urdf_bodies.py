@@ -1,0 +1,97 @@
+"""Bodies of a URDF, merged into the links of a chain: psdmc's own sum, held against Pinocchio's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from psdmc.errors import InputError
+from psdmc.robot.chain import Array, Placement
+from psdmc.robot.inertia import inertia_matrix, six_of, standard_parameters, without_noise
+from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
+from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
+from psdmc.robot.small import times
+from psdmc.robot.snap import snap_rotation
+from psdmc.robot.tree import Route
+from psdmc.robot.urdf import LOCKABLE, Origin, UrdfInertial, UrdfRobot
+
+AGREEMENT = 1e-11
+"""Relative to the largest parameter of the body's mass, moments or inertias: rounding of angles up to 1e3 rad leaves
+1e-13, any other reading of a number far more."""
+
+
+def placement_of(origin: Origin, snap: float = 0.0) -> Placement:
+    """Where an <origin> puts its frame; turns about axes are snapped one by one (rad)."""
+    if origin.quaternion is None:
+        return Placement(roll_pitch_yaw(origin.rpy, snap), np.array(origin.xyz))
+    return Placement(snap_rotation(from_quaternion(*origin.quaternion), snap)[0], np.array(origin.xyz))
+
+
+def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
+    """Ten standard parameters per movable joint, of all that moves with it, about its child link's frame.
+
+    Joints beside the chain and beyond the tip are locked at neutral.
+    """
+    below: dict[str, list[tuple[str, Placement]]] = {}
+    on_chain = {joint.name for joint in route.movable}
+    for joint in robot.joints:
+        if joint.name not in on_chain:
+            below.setdefault(joint.parent, []).append((joint.child, placement_of(joint.origin)))
+    return [without_noise(_with_all_below(robot, joint.child, below)) for joint in route.movable]
+
+
+def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
+    """(10,) standard parameters of a link's body about the frame in which the link sits at `place`."""
+    if body is None:
+        return np.zeros(10)
+    at = place @ placement_of(body.origin)
+    turned = times(times(at.rotation, inertia_matrix(np.array(body.inertia))), at.rotation.T)
+    return standard_parameters(body.mass, at.translation, six_of(turned))
+
+
+def hold_against_pinocchio(
+    robot: UrdfRobot, route: Route, merged: Sequence[Array], text: str, source: str
+) -> None:
+    """InputError that names the first link whose body Pinocchio reads, or merges, otherwise.
+
+    Each link is compared alone (every joint made a revolute one, so that nothing is merged), then what was merged.
+    """
+    alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, "revolute"))
+    for joint in robot.joints:
+        own = body_parameters(robot.inertials[joint.child], Placement.identity())
+        _compare(
+            own, alone.inertias[alone.getJointId(JOINT_PREFIX + joint.name)], joint.child, "the body", source
+        )
+    movable = [joint.name for joint in route.movable]
+    whole = pinocchio_model(text, source, movable)
+    for joint, own in zip(route.movable, merged, strict=True):
+        body = whole.inertias[whole.getJointId(JOINT_PREFIX + joint.name)]
+        _compare(own, body, joint.child, "all that moves with it", source)
+
+
+def _with_all_below(robot: UrdfRobot, link: str, below: dict[str, list[tuple[str, Placement]]]) -> Array:
+    """(10,) the link's body and those of all links that hang on it, about the link's frame."""
+    total = np.zeros(10)
+    queue = [(link, Placement.identity())]
+    while queue:
+        name, place = queue.pop()
+        total = total + body_parameters(robot.inertials[name], place)
+        queue += [(child, place @ origin) for child, origin in reversed(below.get(name, []))]
+    return total
+
+
+def _compare(own: Array, other: object, link: str, what: str, source: str) -> None:
+    found = np.array(other.toDynamicParameters())  # type: ignore[attr-defined]
+    for group in (slice(0, 1), slice(1, 4), slice(4, 10)):
+        size = max(float(np.abs(own[group]).max()), float(np.abs(found[group]).max()))
+        if not np.all(np.abs(own[group] - found[group]) <= AGREEMENT * size):
+            values = f"{_listed(own[group])} and {_listed(found[group])}"
+            raise InputError(
+                f"{source}: link '{link}': psdmc and Pinocchio read {what} differently: {values}",
+                "write its numbers as plain decimals, and tell us of the file: one of the two readers is wrong",
+            )
+
+
+def _listed(values: Array) -> str:
+    return " ".join(f"{value:.9g}" for value in values)

@@ -1,0 +1,163 @@
+"""The words of a URDF: which elements and attributes are read, which may stand beside them, and which are refused.
+
+A word that is misspelt or misplaced is not read, and a robot without it has other dynamics without anybody being told:
+within the elements that carry dynamics every word must be known; beside them, what looks like one of them is refused,
+and what does not is noted.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from xml.etree.ElementTree import Element
+
+from psdmc.robot.inertia import INERTIA_NAMES
+from psdmc.robot.limits import shown
+from psdmc.robot.numerals import words
+
+VERSIONS = ("1.0", "1.1", "1.2")
+"""1.1 adds quat_xyzw and capsules, 1.2 limits of acceleration; all that dynamics needs of them is read."""
+
+ATTRIBUTES = {
+    "inertial": (),
+    "mass": ("value",),
+    "inertia": tuple(f"i{name}" for name in INERTIA_NAMES),
+    "origin": ("xyz", "rpy", "quat_xyzw"),
+    "axis": ("xyz",),
+    "parent": ("link",),
+    "child": ("link",),
+}
+"""Elements that carry dynamics, each with all the attributes that it may have."""
+
+READ = {"link": ("inertial",), "joint": ("origin", "parent", "child", "axis", "limit", "mimic", "dynamics")}
+"""Children of links and joints that say something about dynamics; each stands once at most."""
+
+BESIDE = {
+    "robot": ("link", "joint", "material", "gazebo", "transmission", "ros2_control", "sensor", "mujoco"),
+    "link": (
+        "visual",
+        "collision",
+        "collision_checking",
+        "contact",
+        "self_collision_checking",
+        "sensor",
+        "surface",
+    ),
+    "joint": ("calibration", "safety_controller"),
+}
+"""Children that have nothing to say about a serial arm's dynamics."""
+
+CARRIERS = (
+    "link",
+    "joint",
+    "inertial",
+    "mass",
+    "inertia",
+    "axis",
+    "parent",
+    "child",
+    "limit",
+    "mimic",
+    "dynamics",
+)
+"""A child elsewhere that is called so, or nearly so, is misspelt or misplaced."""
+
+LIKENESS = 0.75
+"""Ratio of difflib above which a word is taken for a slip of the pen: 'inertail' and 'inertial' have 0.88."""
+
+LONGER = 4
+"""Letters by which a word may be longer or shorter than the one that it is taken for."""
+
+MOST_NOTED = 12
+"""Kinds of unread elements that notes name."""
+
+
+def link_faults(link: Element) -> list[str]:
+    """Words of one <link> that must not stand there, one sentence each."""
+    inertial = link.find("inertial")
+    return [*_children_faults(link, "link"), *([] if inertial is None else _strict_faults(inertial))]
+
+
+def joint_faults(joint: Element) -> list[str]:
+    """Words of one <joint> that must not stand there, one sentence each."""
+    inside = [child for child in joint if child.tag in ("origin", "axis", "parent", "child")]
+    return [
+        *_children_faults(joint, "joint"),
+        *(fault for child in inside for fault in _strict_faults(child)),
+    ]
+
+
+def robot_faults(root: Element) -> list[str]:
+    """Words directly in <robot> that must not stand there, and a version that is not known."""
+    version = " ".join(words(root.get("version", "1.0")))
+    faults = [] if version in VERSIONS else [f"version {shown(version)} is not supported"]
+    return [*faults, *_children_faults(root, "robot")]
+
+
+def unread_words(root: Element) -> list[str]:
+    """A note for each kind of word that is neither read nor known to be harmless."""
+    found: dict[str, None] = {}
+    for parent in [root, *root.findall("link"), *root.findall("joint")]:
+        for child in parent:
+            if _is_foreign(child.tag) or child.tag in (*READ.get(parent.tag, ()), *BESIDE[parent.tag]):
+                continue
+            found[f"<{_short(child.tag)}> in <{parent.tag}> is not read"] = None
+    more = (
+        [f"{len(found) - MOST_NOTED} more kinds of elements are not read"] if len(found) > MOST_NOTED else []
+    )
+    return [*list(found)[:MOST_NOTED], *more]
+
+
+def has_dynamics(joint: Element) -> bool:
+    """Whether a joint's <dynamics> say something: damping, friction, a spring."""
+    return any(
+        letter in "123456789"
+        for dynamics in joint.findall("dynamics")
+        for letter in "".join(dynamics.attrib.values())
+    )
+
+
+def _children_faults(parent: Element, kind: str) -> list[str]:
+    """Children that look like one that carries dynamics but are none of the parent's own."""
+    allowed = (*READ.get(kind, ()), *BESIDE[kind])
+    faults = []
+    for child in parent:
+        if _is_foreign(child.tag) or child.tag in allowed:
+            continue
+        meant = _meant(child.tag, kind)
+        if meant:
+            where = f"did you mean <{meant}>?" if meant in allowed else "it does not belong there"
+            faults.append(f"unknown element <{_short(child.tag)}> in <{kind}>: {where}")
+    return faults
+
+
+def _meant(tag: str, kind: str) -> str | None:
+    """The word that carries dynamics which this one is like; <origin> matters in joints and inertials only."""
+    words_known = (*CARRIERS, "origin") if kind == "joint" else CARRIERS
+    near = [word for word in words_known if abs(len(word) - len(tag)) <= LONGER]
+    return next(iter(get_close_matches(tag.lower(), near, 1, LIKENESS)), None) if near else None
+
+
+def _strict_faults(element: Element) -> list[str]:
+    """Attributes and children of an element that carries dynamics which are none of its own, at any depth."""
+    faults = []
+    known = ATTRIBUTES.get(element.tag, ())
+    for name in element.attrib:
+        if name not in known and not _is_foreign(name):
+            listed = ", ".join(known) or "none"
+            faults.append(f"<{element.tag}> has an unknown attribute '{_short(name)}' (known: {listed})")
+    children = ("origin", "mass", "inertia") if element.tag == "inertial" else ()
+    for child in element:
+        if child.tag in children:
+            faults += _strict_faults(child)
+        elif not _is_foreign(child.tag):
+            faults.append(f"unknown element <{_short(child.tag)}> in <{element.tag}>")
+    return faults
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= 40 else f"{name[:40]}..."
+
+
+def _is_foreign(name: str) -> bool:
+    """Of another vocabulary: what a name space marks, and comments."""
+    return not isinstance(name, str) or name.startswith("{") or ":" in name
