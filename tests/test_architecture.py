@@ -31,7 +31,7 @@ MAY_IMPORT |= {
 }
 
 OUTSIDE = {
-    "robot": {"numpy", "pinocchio", "defusedxml"},
+    "robot": {"numpy", "pinocchio", "defusedxml", "mujoco"},
     "dynamics": {"numpy"},
     "model": {"numpy", "scipy"},
     "derive": {"numpy", "scipy"},

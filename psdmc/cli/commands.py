@@ -140,13 +140,13 @@ def check(
         typer.Option(metavar="FILE", help="robot file to check against instead of the embedded source"),
     ] = None,
 ) -> None:
-    """Check a model again, independently, against Pinocchio's own reading of its source."""
+    """Check a model again, independently, against Pinocchio's (and MuJoCo's) own reading of its source."""
     found = load(model)
     source = None
     if robot is not None:
         source = load_robot(robot, **found.provenance.get("options", {}))
     with steps() as progress:
-        progress("checking against Pinocchio")
+        progress("checking against other readers")
         rows = check_model(found, source)
     print_check(rows)
     if not all(row.passed for row in rows):

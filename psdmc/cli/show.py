@@ -11,7 +11,7 @@ from rich.table import Table
 
 from psdmc.calibrate.record import Calibration
 from psdmc.lower.kernels import Lowering, lower
-from psdmc.model.check import CheckRow
+from psdmc.model.check import CheckRow, readers
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
@@ -122,13 +122,16 @@ def print_cost(model: DynamicsModel, lowerings: Sequence[Lowering]) -> None:
 
 
 def print_check(rows: Sequence[CheckRow]) -> None:
-    """Each comparison with Pinocchio and its verdict."""
-    table = Table("quantity", "Pinocchio's", "relative error", "limit", "")
+    """Each comparison and its verdict, and with which readers of the source."""
+    table = Table("quantity", "against", "relative error", "limit", "", "")
     for row in rows:
         limit = "" if row.limit is None else f"{row.limit:.0e}"
+        error = "" if math.isnan(row.error) and row.limit is None else f"{row.error:.1e}"
         verdict = "" if row.limit is None else "pass" if row.passed else "FAIL"
-        table.add_row(row.name, row.against, f"{row.error:.1e}", limit, verdict)
-    console().print(table)
+        table.add_row(row.name, row.against, error, limit, verdict, escape(row.remark))
+    out = console()
+    out.print(table)
+    out.print(readers(rows))
 
 
 def print_accuracy(record: Calibration) -> None:

@@ -1,8 +1,14 @@
-"""A finished model against Pinocchio's own reading of the robot's source: nothing of the derivation is
-used."""
+"""A finished model against other readers of the robot's source: nothing of the derivation, and of the chain only
+names, is used.
+
+Pinocchio reads the file as it is written, MuJoCo too where it is installed and reads such files. Where rotations were
+snapped, the file has no such robot: then torques are compared with Pinocchio's bodies on joints placed as the chain's are,
+and that these differ from the file's by no more than snapping says is compared beside it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +17,13 @@ from numpy.typing import NDArray
 from psdmc.dynamics.parameters import BODY_PARAMETERS, inertia_of, standard_parameters
 from psdmc.errors import InputError
 from psdmc.model import evaluate
+from psdmc.model.check_placements import chain_poses, gravity_error, placement_errors, reach_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK
 from psdmc.robot.load import LoadedRobot, load_robot_text
-from psdmc.robot.reference import Reference, reference
+from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
+from psdmc.robot.reference import Reference, pinocchio_version, reference
+from psdmc.robot.snap_bound import angles_by_segment, torque_bound
 
 Array = NDArray[np.float64]
 
@@ -32,6 +41,18 @@ CONDITION_LIMIT = 1e-12
 always."""
 
 
+PLACEMENT_LIMIT = 1e-11
+"""rad, or share of the robot's reach: rounding leaves 1e-15, and what snapping cleans as noise 1e-13."""
+
+MUJOCO_LIMIT = 1e-9
+"""MuJoCo keeps inertias as principal moments and axes, found to 1e-12 or so."""
+
+ANGLES_ACTED_ON = 2.0
+"""An axis snapped by an angle turns what moves about it by up to twice that."""
+
+MUJOCO = "MuJoCo's mj_inverse"
+"""What rows of the second reader say that they are against."""
+
 NO_TORQUE = 1e-9
 """Share of the largest torque below which a joint's torque is rounding."""
 
@@ -41,15 +62,17 @@ class CheckRow:
     """One comparison.
 
     name     what was compared
-    against  with which function of Pinocchio
+    against  with which function of Pinocchio, or with what else
     error    largest difference, relative to the largest magnitude (per joint where there is one per joint)
-    limit    largest error that passes; None where the figure is for information
+    limit    largest error that passes; None where nothing could be compared
+    remark   why not, or what the limit allows for
     """
 
     name: str
     against: str
     error: float
     limit: float | None
+    remark: str = ""
 
     @property
     def passed(self) -> bool:
@@ -80,11 +103,22 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
             "give the file, base and tip that the model was derived from",
         )
     theta, parameters = _parameters(model, loaded)
-    robot = reference(loaded, parameters=parameters)
-    rows = _compared(model, theta, robot)
-    if loaded.snap_report:
-        rows += (_snapping(loaded, robot, parameters),)
-    return rows
+    written = reference(loaded, snapped=False, parameters=parameters)
+    snapped = bool(loaded.snap_report)
+    robot = reference(loaded, parameters=parameters) if snapped else written
+    angles = angles_by_segment(loaded.snap_report, model.n, loaded.options.snap)
+    rows = (*_compared(model, theta, robot), *_placements(model, written, angles))
+    if snapped:
+        rows += (_snapping(model, theta, written, angles),)
+    return (*rows, _against_mujoco(model, loaded, angles))
+
+
+def readers(rows: Sequence[CheckRow]) -> str:
+    """Which readers of the source the rows come from, in words."""
+    words = f"compared with Pinocchio {pinocchio_version()}'s reading of the source"
+    if any(row.against == MUJOCO and row.limit is not None for row in rows):
+        return f"{words} and with MuJoCo {mujoco_version()}'s"
+    return words
 
 
 def _parameters(model: DynamicsModel, loaded: LoadedRobot) -> tuple[Array, Array | None]:
@@ -121,9 +155,15 @@ def random_parameters(model: DynamicsModel) -> Array:
     return admitted
 
 
-def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[CheckRow, ...]:
+def _states(n: int) -> tuple[Array, Array, Array]:
+    """q, qd, qdd, (STATES, n) each."""
     rng = np.random.default_rng(SEED)
-    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, size=(STATES, model.n)) for limit in RANGES)
+    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, size=(STATES, n)) for limit in RANGES)
+    return q, qd, qdd
+
+
+def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[CheckRow, ...]:
+    q, qd, qdd = _states(model.n)
     rest = np.zeros_like(q)
     tau = evaluate.torques_for(model, theta, q, qd, qdd)
     mass = np.stack(
@@ -151,14 +191,60 @@ def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[Che
     return (*checked, CheckRow("forward dynamics of these torques", "aba", error, limit))
 
 
-def _snapping(loaded: LoadedRobot, robot: Reference, parameters: Array | None) -> CheckRow:
-    """What snapping changed, against the file's own rotations."""
-    rng = np.random.default_rng(SEED)
-    n = len(loaded.chain)
-    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, size=(STATES, n)) for limit in RANGES)
-    as_written = reference(loaded, snapped=False, parameters=parameters)
-    error = _error(robot.inverse_dynamics(q, qd, qdd), as_written.inverse_dynamics(q, qd, qdd))
-    return CheckRow("effect of snapped rotations", "rnea on the file as written", error, None)
+def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
+    """Where the chain puts links, tip and gravity, beyond what snapping says that it turned."""
+    q, _, _ = _states(model.n)
+    chain = model.chain
+    links = [joint.link_name for joint in chain.joints]
+    expected = written.poses(q, links)
+    errors = placement_errors(chain_poses(chain, q), expected)
+    lever = max(1.0, written.path_length / reach_of(expected))
+    beyond = errors - ANGLES_ACTED_ON * lever * angles[:-1]
+    gravity = gravity_error(chain.gravity, written.gravity_vector) - ANGLES_ACTED_ON * angles[-1]
+    remark = f"beyond the {angles.sum():.2g} rad of snapping" if angles.any() else ""
+    found = (
+        ("placements of links and tip", "framesForwardKinematics", float(beyond.max())),
+        ("gravity in the base frame", "model.gravity", gravity),
+    )
+    return tuple(
+        CheckRow(name, against, max(0.0, error), PLACEMENT_LIMIT, remark) for name, against, error in found
+    )
+
+
+def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Array) -> CheckRow:
+    """What snapping changed: torques against the file's own rotations, within what its angles can do there."""
+    states = _states(model.n)
+    expected = written.inverse_dynamics(*states)
+    bound = torque_bound(written, angles, *states)
+    error, limit = _worst(evaluate.torques_for(model, theta, *states), expected, bound)
+    return CheckRow(
+        "effect of snapped rotations", "rnea", error, limit, "the limit is what the angles can do"
+    )
+
+
+def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) -> CheckRow:
+    """Torques of the source's own bodies as MuJoCo reads them."""
+    states = _states(model.n)
+    try:
+        expected = mujoco_torques(loaded, *states)
+    except NotCompared as reason:
+        return CheckRow("inverse dynamics", MUJOCO, np.nan, None, f"not compared: {reason}")
+    tau = evaluate.torques_for(model, model.B @ loaded.chain.parameters.reshape(-1), *states)
+    if not angles.any():
+        return CheckRow("inverse dynamics", MUJOCO, _error(tau, expected), MUJOCO_LIMIT)
+    bound = torque_bound(reference(loaded, snapped=False), angles, *states)
+    error, limit = _worst(tau, expected, bound)
+    return CheckRow(
+        "inverse dynamics", MUJOCO, error, limit + MUJOCO_LIMIT, "the limit is what snapping can do"
+    )
+
+
+def _worst(values: Array, expected: Array, bound: Array) -> tuple[float, float]:
+    """Error and bound of the joint whose error uses most of its bound, both relative to its largest torque."""
+    scale = _scales(expected)
+    error = np.abs(values - expected).max(axis=0)
+    joint = int(np.argmax(error / (bound + TORQUE_LIMIT * scale)))
+    return float(error[joint] / scale[joint]), float(bound[joint] / scale[joint]) + TORQUE_LIMIT
 
 
 def _error(values: Array, expected: Array) -> float:
@@ -170,6 +256,11 @@ def _error(values: Array, expected: Array) -> float:
     overall = max(float(np.abs(expected).max(initial=0.0)), np.finfo(float).tiny)
     if expected.ndim == 3:
         return float(np.abs(values - expected).max()) / overall
+    return float((np.abs(values - expected).max(axis=0) / _scales(expected)).max())
+
+
+def _scales(expected: Array) -> Array:
+    """(n,) what each joint's error is measured against."""
+    overall = max(float(np.abs(expected).max(initial=0.0)), np.finfo(float).tiny)
     largest = np.abs(expected).max(axis=0)
-    scale = np.where(largest > NO_TORQUE * overall, largest, overall)
-    return float((np.abs(values - expected).max(axis=0) / scale).max())
+    return np.where(largest > NO_TORQUE * overall, largest, overall)

@@ -50,10 +50,9 @@ def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tupl
     joints: list[Joint] = []
     before = Placement.identity()
     for number, row in enumerate(robot.joints, start=1):
-        twist = _exact(about(0, row.alpha), f"alpha of joint '{row.name}'", snap, snaps)
-        offset = Placement(
-            _exact(about(2, row.theta), f"theta of joint '{row.name}'", snap, snaps), np.zeros(3)
-        )
+        twist = _exact(about(0, row.alpha), f"alpha of joint '{row.name}'", snap, snaps, len(joints))
+        turn = _exact(about(2, row.theta), f"theta of joint '{row.name}'", snap, snaps, len(joints))
+        offset = Placement(turn, np.zeros(3))
         if robot.convention == "standard":
             placement = before @ offset
             link = Placement(twist, np.array([row.a, 0.0, row.d]))
@@ -65,10 +64,10 @@ def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tupl
     return tuple(joints), tuple(snaps)
 
 
-def _exact(rotation: Array, where: str, snap: float, snaps: list[Snap]) -> Array:
+def _exact(rotation: Array, where: str, snap: float, snaps: list[Snap], segment: int) -> Array:
     result, angle = snap_rotation(rotation, snap)
     if angle > ROUNDING:
-        snaps.append(Snap(where, angle))
+        snaps.append(Snap(where, angle, segment))
     return result
 
 

@@ -10,10 +10,19 @@ from psdmc.robot.chain import Array, Joint, Placement
 
 @dataclass(frozen=True, slots=True)
 class Snap:
-    """One rotation that was replaced by a near one with exact zeros: where, and by what angle (rad)."""
+    """One rotation that was replaced by a near one with exact zeros: where, and by what angle (rad).
+
+    segment   the way it lies on, counted by the joint at its end: 0 from the base to the first link and so on; n from
+              the last link to the tip; BASE from the root to the base
+    """
 
     where: str
     angle: float
+    segment: int
+
+
+BASE = -1
+"""Segment of the rotation that turns gravity with the base."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

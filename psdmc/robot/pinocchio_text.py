@@ -38,7 +38,7 @@ def pinocchio_model(
     """
     root = parse_xml(text, source, "robot")
     wanted = tostring(
-        _dynamics_of(root, movable, {"continuous": "revolute", **(kinds or {})}), encoding="unicode"
+        dynamics_of(root, movable, {"continuous": "revolute", **(kinds or {})}), encoding="unicode"
     )
     try:
         return pinocchio.buildModelFromXML(wanted)
@@ -47,7 +47,9 @@ def pinocchio_model(
         raise InputError(f"{source}: Pinocchio cannot read it: {reason}", "check_urdf may say more") from None
 
 
-def _dynamics_of(root: Element, movable: Collection[str] | None, kinds: Mapping[str, str]) -> Element:
+def dynamics_of(root: Element, movable: Collection[str] | None, kinds: Mapping[str, str]) -> Element:
+    """The elements and attributes of a <robot> that carry dynamics, numbers trimmed; arguments as pinocchio_model has
+    them."""
     robot = Element("robot", name=root.get("name") or "robot", version=VERSION)
     for link in root.findall("link"):
         copy = SubElement(robot, "link", name=link.get("name", ""))

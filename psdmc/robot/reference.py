@@ -1,8 +1,9 @@
 """Pinocchio's own reading of a robot's source, to check everything else against.
 
 It shares the file's text with the chain and as little code as it can: a URDF is read, merged and locked by
-Pinocchio, a DH table becomes one Pinocchio joint per row. Only where the snapped robot is asked for do the
-joints' placements come from the chain, because the file has none such; the bodies are still Pinocchio's.
+Pinocchio, a DH table is read by dh_textbook. From the chain come names only: of its joints, links, base and tip. Where
+the snapped robot is asked for, the joints' placements come from the chain too, because the file has none such; the
+bodies are still Pinocchio's.
 
 The models have one coordinate per joint (a continuous joint is an angle), the chain's joints in the chain's
 order, the chain's base as their universe, and a frame for the tip: use them with any Pinocchio function and
@@ -11,8 +12,7 @@ plain q, qd, qdd (n,).
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ import pinocchio
 
 from psdmc.errors import InputError
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Placement, frozen_array
-from psdmc.robot.dh import DhJoint, read_dh
+from psdmc.robot.dh_textbook import dh_model
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 
@@ -39,7 +39,7 @@ def reference_model(
     where parameters are needed and unknown.
     """
     chain = loaded.chain
-    model = _urdf_model(loaded) if loaded.source_format == "urdf" else _dh_model(loaded)
+    model = as_written(loaded)
     if parameters is None:
         values, replaced = chain.parameters, _assumed(chain)
     else:
@@ -52,6 +52,13 @@ def reference_model(
     _set_bodies(model, chain, values, replaced)
     model.armature = values[:, DRIVE].copy()
     return _placed_as(chain, model) if snapped else model
+
+
+def as_written(loaded: LoadedRobot) -> pinocchio.Model:
+    """Pinocchio's own model of the file, nothing of the chain in it but names; bodies as far as the file gives them."""
+    if loaded.source_format == "urdf":
+        return _urdf_model(loaded)
+    return dh_model(loaded.source_text, loaded.options.gravity)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +106,35 @@ class Reference:
 
         return self._each(of_tip, q)
 
+    def poses(self, q: Array, link_names: Sequence[str]) -> Array:
+        """(..., len(link_names) + 1, 4, 4) of the links' frames and the tip's in the base frame."""
+        kind = pinocchio.FrameType.BODY
+        frames = [self.model.getFrameId(name, kind) for name in link_names]
+        frames.append(self.model.getFrameId(self.tip_name))
+
+        def of_links(model: pinocchio.Model, data: pinocchio.Data, q: Array) -> Array:
+            pinocchio.framesForwardKinematics(model, data, q)
+            return np.array([data.oMf[frame].homogeneous for frame in frames])
+
+        return self._each(of_links, q)
+
+    @property
+    def gravity_vector(self) -> Array:
+        """(3,) m/s^2 in the base frame."""
+        return np.array(self.model.gravity.linear)
+
+    @property
+    def path_length(self) -> float:
+        """Way from the base to the tip over every frame between, m, at q = 0; with every fixed joint's detour."""
+        model, data = self.model, self.model.createData()
+        pinocchio.framesForwardKinematics(model, data, np.zeros(model.nq))
+        frame, length = model.getFrameId(self.tip_name), 0.0
+        while frame:
+            above = model.frames[frame].parentFrame
+            length += float(np.linalg.norm(data.oMf[frame].translation - data.oMf[above].translation))
+            frame = above
+        return length
+
     def _each(self, function: Callable[..., Array], *states: Array) -> Array:
         """Pinocchio's function at every state of broadcast arrays."""
         data = self.model.createData()
@@ -135,44 +171,6 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     return model
 
 
-def _dh_model(loaded: LoadedRobot) -> pinocchio.Model:
-    """One Pinocchio joint per row, in frames of its own: after the row's Rz(theta) for both conventions."""
-    robot = read_dh(loaded.source_text, loaded.source_name)
-    model = pinocchio.Model()
-    model.name = robot.name
-    before, parent = pinocchio.SE3.Identity(), 0
-    for row, joint in zip(robot.joints, loaded.chain.joints, strict=True):
-        about = pinocchio.JointModelRZ() if row.kind == "revolute" else pinocchio.JointModelPZ()
-        twist = pinocchio.SE3(pinocchio.utils.rotate("x", row.alpha), np.zeros(3))
-        slide_a = pinocchio.SE3(np.eye(3), np.array([row.a, 0.0, 0.0]))
-        slide_d = pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, row.d]))
-        turn = pinocchio.SE3(pinocchio.utils.rotate("z", row.theta), np.zeros(3))
-        if robot.convention == "standard":
-            placement, link = before * turn, slide_d * slide_a * twist
-        else:
-            placement, link = before * twist * slide_a * slide_d * turn, pinocchio.SE3.Identity()
-        parent = model.addJoint(parent, about, placement, row.name)
-        model.appendBodyToJoint(parent, _dh_body(row), link)
-        model.addFrame(pinocchio.Frame(joint.link_name, parent, 0, link, pinocchio.FrameType.BODY))
-        before = link
-    gravity = loaded.options.gravity
-    model.gravity.linear = np.array(robot.gravity if gravity is None else gravity)
-    return model
-
-
-def _dh_body(row: DhJoint) -> pinocchio.Inertia:
-    """The row's body about its link frame; one with zeros or unknowns is set from the chain later."""
-    link = row.link
-    if link.mass == 0.0 or not math.isfinite(link.mass + sum(link.com) + sum(link.inertia_com)):
-        return pinocchio.Inertia.Zero()
-    com = np.array(link.com)
-    xx, xy, yy, xz, yz, zz = link.inertia_com
-    about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    about_frame = about_com + link.mass * (com @ com * np.eye(3) - np.outer(com, com))
-    six = about_frame[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
-    return body_of(np.array([link.mass, *(link.mass * com), *six]))
-
-
 def body_of(parameters: Array) -> pinocchio.Inertia:
     """Pinocchio's body with ten standard parameters, physical or not.
 
@@ -191,6 +189,15 @@ def _set_bodies(model: pinocchio.Model, chain: Chain, parameters: Array, which: 
     for k in which:
         link = model.frames[model.getFrameId(chain.joints[k].link_name, pinocchio.FrameType.BODY)]
         model.inertias[k + 1] = link.placement.act(body_of(parameters[k]))
+
+
+def pinocchio_version() -> str:
+    return str(pinocchio.__version__)
+
+
+def has_assumptions(loaded: LoadedRobot) -> bool:
+    """Whether some bodies cannot be had from the file alone: assumed zeros and unknowns."""
+    return bool(_assumed(loaded.chain))
 
 
 def _assumed(chain: Chain) -> list[int]:

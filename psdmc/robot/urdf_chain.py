@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from psdmc.robot.chain import Array, Joint, Placement
-from psdmc.robot.draft import Draft, Snap
+from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, snap_translation
@@ -76,16 +76,17 @@ def _placed_joints(route: Route, snap: float) -> tuple[tuple[Joint, ...], Placem
     joints: list[Joint] = []
     so_far = Placement.identity()
     for joint in route.path:
-        so_far = so_far @ _origin(joint, snap, snaps)
+        so_far = so_far @ _origin(joint, snap, snaps, len(joints))
         if not joint.is_movable:
             continue
         axis, angle = snap_axis(np.array(joint.axis), snap)
-        _record(snaps, f"axis of joint '{joint.name}'", angle)
+        _record(snaps, f"axis of joint '{joint.name}'", angle, len(joints))
         link = Placement(link_rotation(axis), np.zeros(3))
-        placement = _merged(so_far @ link.inverse(), f"joint '{joint.name}', merged", snap, snaps, reach)
+        where = f"joint '{joint.name}', merged"
+        placement = _merged(so_far @ link.inverse(), where, snap, snaps, len(joints), reach)
         joints.append(_joint(joint, placement, link))
         so_far = link
-    tip = _merged(so_far, f"tip '{route.tip}', merged", snap, snaps, reach)
+    tip = _merged(so_far, f"tip '{route.tip}', merged", snap, snaps, len(joints), reach)
     return tuple(joints), tip, snaps
 
 
@@ -99,30 +100,30 @@ def _base_rotation(route: Route, snap: float) -> tuple[Array, list[Snap]]:
     snaps: list[Snap] = []
     base = Placement.identity()
     for joint in route.to_base:
-        base = base @ _origin(joint, snap, snaps)
+        base = base @ _origin(joint, snap, snaps, BASE)
     rotation, angle = snap_rotation(base.rotation, snap)
-    _record(snaps, f"base '{route.base}', merged", angle)
+    _record(snaps, f"base '{route.base}', merged", angle, BASE)
     return rotation, snaps
 
 
-def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap]) -> Placement:
+def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap], segment: int) -> Placement:
     """Where the child link's frame sits in the parent's at q = 0."""
-    place = placement_of(joint.origin, snap)
-    _record(
-        snaps, f"joint '{joint.name}'", angle_between(place.rotation, placement_of(joint.origin).rotation)
-    )
+    place, unsnapped = placement_of(joint.origin, snap), placement_of(joint.origin)
+    _record(snaps, f"joint '{joint.name}'", angle_between(place.rotation, unsnapped.rotation), segment)
     return place
 
 
-def _merged(place: Placement, where: str, snap: float, snaps: list[Snap], reach: float) -> Placement:
+def _merged(
+    place: Placement, where: str, snap: float, snaps: list[Snap], segment: int, reach: float
+) -> Placement:
     rotation, angle = snap_rotation(place.rotation, snap)
-    _record(snaps, where, angle)
+    _record(snaps, where, angle, segment)
     return Placement(rotation, snap_translation(place.translation, reach))
 
 
-def _record(snaps: list[Snap], where: str, angle: float) -> None:
+def _record(snaps: list[Snap], where: str, angle: float, segment: int) -> None:
     if angle > ROUNDING:
-        snaps.append(Snap(where, angle))
+        snaps.append(Snap(where, angle, segment))
 
 
 def _unmodelled(route: Route) -> list[str]:

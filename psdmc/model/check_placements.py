@@ -1,0 +1,68 @@
+"""Where a model's chain puts its links, against the file as its own reader places them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.robot.chain import Chain, Placement
+
+Array = NDArray[np.float64]
+
+
+def chain_poses(chain: Chain, q: Array) -> Array:
+    """(k, n + 1, 4, 4) of the links' frames and the tip's in the base frame, at q (k, n)."""
+    return np.array([_poses_at(chain, row) for row in q])
+
+
+def placement_errors(found: Array, expected: Array) -> Array:
+    """(n + 1,) largest error of each link's pose in the one before, and the tip's in the last link.
+
+    found, expected   (k, n + 1, 4, 4), poses in the base frame
+
+    The larger of the angle between (rad) and the distance between, relative to the robot's reach.
+    """
+    reach = reach_of(expected)
+    own, other = _in_the_one_before(found), _in_the_one_before(expected)
+    chord = np.linalg.norm((own - other)[..., :3, :3], axis=(-2, -1)) / np.sqrt(8.0)
+    angle = 2.0 * np.arcsin(np.minimum(1.0, chord))
+    distance = np.linalg.norm((own - other)[..., :3, 3], axis=-1) / reach
+    return np.asarray(np.maximum(angle, distance).max(axis=0))
+
+
+def gravity_error(found: Array, expected: Array) -> float:
+    """Distance between two vectors (3,), relative to the larger."""
+    size = max(float(np.linalg.norm(found)), float(np.linalg.norm(expected)), np.finfo(float).tiny)
+    return float(np.linalg.norm(found - expected)) / size
+
+
+def reach_of(poses: Array) -> float:
+    """Sum of the largest distances from each frame to the next, m; one where there are none."""
+    steps = np.linalg.norm(_in_the_one_before(poses)[..., :3, 3], axis=-1).max(axis=0)
+    return float(steps.sum()) or 1.0
+
+
+def _in_the_one_before(poses: Array) -> Array:
+    base = np.broadcast_to(np.eye(4), (len(poses), 1, 4, 4))
+    return np.linalg.inv(np.concatenate([base, poses[:, :-1]], axis=1)) @ poses
+
+
+def _poses_at(chain: Chain, q: Array) -> list[Array]:
+    poses, frame = [], Placement.identity()
+    for joint, value in zip(chain.joints, q, strict=True):
+        frame = frame @ joint.placement @ _motion(joint.kind, value)
+        poses.append(_matrix(frame @ joint.link_frame))
+    return [*poses, _matrix(frame @ chain.tip)]
+
+
+def _motion(kind: str, value: float) -> Placement:
+    if kind == "prismatic":
+        return Placement(np.eye(3), np.array([0.0, 0.0, value]))
+    c, s = np.cos(value), np.sin(value)
+    return Placement(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
+
+
+def _matrix(place: Placement) -> Array:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = place.rotation, place.translation
+    return matrix

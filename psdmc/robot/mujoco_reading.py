@@ -1,0 +1,93 @@
+"""MuJoCo's reading of a URDF, where MuJoCo is installed: a second oracle, which shares neither parser nor algorithm
+with Pinocchio."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree.ElementTree import SubElement, tostring
+
+import numpy as np
+
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array
+from psdmc.robot.limits import shown
+from psdmc.robot.load import LoadedRobot
+from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
+from psdmc.robot.reference import has_assumptions
+from psdmc.robot.urdf_chain import STANDARD_GRAVITY
+from psdmc.robot.xml_text import parse_xml
+
+COMPILER = {
+    "angle": "radian",
+    "balanceinertia": "false",
+    "boundmass": "0",
+    "boundinertia": "0",
+    "inertiafromgeom": "false",
+    "fusestatic": "true",
+    "discardvisual": "true",
+}
+"""What MuJoCo must not do to the file's numbers; bodies without a joint are merged into those that they hang on."""
+
+DRIVE = PARAMETERS_PER_LINK - 1
+REASON = 160
+"""Characters of MuJoCo's own words that a message repeats."""
+
+
+class NotCompared(Exception):
+    """MuJoCo cannot say what it makes of this robot; the message says why."""
+
+
+def mujoco_version() -> str:
+    """Of the MuJoCo that is installed; NotCompared where there is none."""
+    return str(_mujoco().__version__)
+
+
+def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Array:
+    """(k, n) torques of the robot's own bodies as MuJoCo reads the file, at states (k, n), N m (N).
+
+    NotCompared where MuJoCo is not installed, or does not read this file.
+    """
+    mujoco = _mujoco()
+    model = _model(mujoco, loaded)
+    names = [JOINT_PREFIX + name for name in loaded.chain.joint_names]
+    joints = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in names]
+    if -1 in joints or model.nv != len(joints):
+        raise NotCompared("MuJoCo finds other joints")
+    places, speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    model.dof_armature[speeds] = loaded.chain.parameters[:, DRIVE]
+    data = mujoco.MjData(model)
+    torques = np.zeros_like(q)
+    for k in range(len(q)):
+        data.qpos[places], data.qvel[speeds], data.qacc[speeds] = q[k], qd[k], qdd[k]
+        mujoco.mj_inverse(model, data)
+        torques[k] = data.qfrc_inverse[speeds]
+    return torques
+
+
+def _mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError:
+        raise NotCompared("MuJoCo is not installed") from None
+    return mujoco
+
+
+def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
+    """MuJoCo's model, all but the chain's joints fixed, without contacts and limits."""
+    if loaded.source_format != "urdf":
+        raise NotCompared("MuJoCo reads no DH tables")
+    if has_assumptions(loaded):
+        raise NotCompared("MuJoCo cannot be told of parameters assumed zero")
+    root = parse_xml(loaded.source_text, loaded.source_name, "robot")
+    if any(element.get("quat_xyzw") is not None for element in root.iter("origin")):
+        raise NotCompared("MuJoCo reads no quat_xyzw")
+    text = dynamics_of(root, loaded.chain.joint_names, {})
+    SubElement(SubElement(text, "mujoco"), "compiler", COMPILER)
+    try:
+        model = mujoco.MjModel.from_xml_string(tostring(text, encoding="unicode"))
+    except ValueError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ")
+        raise NotCompared(f"MuJoCo refuses it: {shown(reason[:REASON])}") from None
+    model.opt.gravity[:] = loaded.options.gravity or STANDARD_GRAVITY
+    disabled = mujoco.mjtDisableBit
+    model.opt.disableflags |= disabled.mjDSBL_CONSTRAINT
+    return model

@@ -1,0 +1,86 @@
+"""How far torques may move when rotations are snapped: measured on Pinocchio's model of the file as written.
+
+Nothing of the snapped chain is used but the angles that it says it turned by. Each is put, one after the other, on every
+degree of freedom that it could have acted on, and what the torques change by is added up: a bound to first order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import pinocchio
+
+from psdmc.robot.chain import Array
+from psdmc.robot.draft import BASE, Snap
+from psdmc.robot.reference import Reference
+
+MARGIN = 2.0
+"""For what is of second order in the angles, up to --snap 0.1."""
+
+
+def angles_by_segment(snaps: Sequence[Snap], n: int, largest: float) -> Array:
+    """(n + 2,) rad: what was snapped between joints (0 to n - 1), to the tip (n) and, last, from root to base.
+
+    largest   rad: no single angle counts for more, whatever it says
+    """
+    angles = np.zeros(n + 2)
+    for snap in snaps:
+        angles[n + 1 if snap.segment == BASE else snap.segment] += min(snap.angle, largest)
+    return angles
+
+
+def torque_bound(reference: Reference, angles: Array, q: Array, qd: Array, qdd: Array) -> Array:
+    """(n,) largest change of each joint's torque over the states (k, n), N m (N).
+
+    angles   (n + 2,) rad, as angles_by_segment gives them
+    """
+    exact = reference.inverse_dynamics(q, qd, qdd)
+    change = np.zeros_like(exact)
+    for disturb, motion in _disturbances(reference, angles):
+        other = reference.model.copy()
+        disturb(other, motion)
+        change += np.abs(Reference(other, reference.tip_name).inverse_dynamics(q, qd, qdd) - exact)
+    return np.asarray(MARGIN * change.max(axis=0))
+
+
+Disturbance = Callable[[pinocchio.Model, pinocchio.SE3], None]
+
+
+def _disturbances(reference: Reference, angles: Array) -> Iterator[tuple[Disturbance, pinocchio.SE3]]:
+    """Small motions of a joint in its parent, of a body on its joint with all that follows, and of gravity."""
+    n, reach = reference.model.nv, reference.path_length
+    for k, angle in enumerate(angles[:n], start=1):
+        if angle > 0.0:
+            for motion in _motions(angle, reach):
+                yield _moved_joint(k), motion
+                yield _moved_link(k), motion
+    if angles[n + 1] > 0.0:
+        for motion in _motions(angles[n + 1], 0.0)[:3]:
+            yield _turned_gravity, motion
+
+
+def _motions(angle: float, reach: float) -> list[pinocchio.SE3]:
+    """Turns by the angle about each axis, and shifts along each by what it moves a point `reach` away."""
+    turns = [pinocchio.SE3(pinocchio.exp3(angle * axis), np.zeros(3)) for axis in np.eye(3)]
+    return turns + [pinocchio.SE3(np.eye(3), angle * reach * axis) for axis in np.eye(3)]
+
+
+def _moved_joint(k: int) -> Disturbance:
+    def disturb(model: pinocchio.Model, motion: pinocchio.SE3) -> None:
+        model.jointPlacements[k] = model.jointPlacements[k] * motion
+
+    return disturb
+
+
+def _moved_link(k: int) -> Disturbance:
+    def disturb(model: pinocchio.Model, motion: pinocchio.SE3) -> None:
+        model.inertias[k] = motion.act(model.inertias[k])
+        if k + 1 < model.njoints:
+            model.jointPlacements[k + 1] = motion * model.jointPlacements[k + 1]
+
+    return disturb
+
+
+def _turned_gravity(model: pinocchio.Model, motion: pinocchio.SE3) -> None:
+    model.gravity.linear = motion.rotation @ model.gravity.linear
