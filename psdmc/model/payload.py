@@ -10,12 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.dynamics.parameters import BODY_PARAMETERS, moved, standard_parameters
 from psdmc.errors import InputError
+from psdmc.robot import limits
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Placement
+from psdmc.robot.inertia import physical_fault, six_of
 
 if TYPE_CHECKING:
     from psdmc.model.dynamics_model import DynamicsModel
 
 Array = NDArray[np.float64]
+
+ROTATION_SLACK = 1e-6
+"""By which products of a rotation's rows may miss zero and one: a matrix written with seven digits."""
 
 SPAN_TOLERANCE = 1e-9
 """Share of the load by which it may miss the parameters that the model admits: rounding only."""
@@ -33,8 +38,10 @@ def with_payload(
     mass      kg
     com       (3,) m, centre of mass in `frame`
     inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
-    frame     where the load's numbers are given: a Placement in the tip frame, or the tip's name; None: the
-    tip InputError where the numbers are no rigid body's or the model's assumptions do not admit the load.
+    frame     where the load's numbers are given: a Placement in the tip frame, or the tip's name; None: the tip
+
+    InputError where the numbers are no rigid body's, beyond the ranges of robot files, or the model's assumptions do
+    not admit the load.
     """
     load = load_parameters(model, mass, com, inertia, frame)
     index = PARAMETERS_PER_LINK * (model.n - 1) + np.arange(BODY_PARAMETERS)
@@ -59,35 +66,80 @@ def load_parameters(
 ) -> Array:
     """(10,) the load's standard parameters about the last link's frame."""
     centre, about_com = _checked(mass, com, inertia)
-    about_frame = about_com + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    own = standard_parameters(float(mass), mass * centre, about_frame)
+    kilograms = float(mass)
+    about_frame = about_com + kilograms * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    own = standard_parameters(kilograms, kilograms * centre, about_frame)
     in_tip = model.chain.tip @ _frame(model, frame)
     return moved(own, model.chain.joints[-1].link_frame.inverse() @ in_tip)
 
 
 def _frame(model: DynamicsModel, frame: Placement | str | None) -> Placement:
     if isinstance(frame, Placement):
-        return frame
+        return _checked_frame(frame)
     if frame is None or frame == model.chain.tip_name:
         return Placement.identity()
     raise InputError(
-        f"payload frame '{frame}' is not the tip '{model.chain.tip_name}'",
+        f"payload frame {limits.shown(frame)} is not the tip {limits.shown(model.chain.tip_name)}",
         "give the tip's name, or a Placement in the tip frame",
     )
 
 
+def _checked_frame(frame: Placement) -> Placement:
+    rotation = frame.rotation
+    is_rotation = np.isfinite(rotation).all() and np.abs(rotation).max() < 2.0
+    if not is_rotation or np.abs(rotation @ rotation.T - np.eye(3)).max() > ROTATION_SLACK:
+        raise InputError("the rotation of the payload's frame is none", "its rows are orthonormal")
+    if np.linalg.det(rotation) < 0.0:
+        raise InputError("the rotation of the payload's frame is a reflection", "its determinant is one")
+    _numbers(frame.translation, (3,), "translation of the payload's frame", limits.LENGTH)
+    return frame
+
+
 def _checked(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> tuple[Array, Array]:
-    centre = np.asarray(com, dtype=np.float64)
-    about_com = np.zeros((3, 3)) if inertia is None else np.asarray(inertia, dtype=np.float64)
-    if not np.isfinite(mass) or mass < 0:
-        raise InputError(f"payload mass is {mass}, expected a number >= 0", "in kg")
-    if centre.shape != (3,) or not np.isfinite(centre).all():
-        raise InputError(f"payload com is {centre.tolist()}, expected three finite numbers", "in m")
-    if about_com.shape != (3, 3) or not np.isfinite(about_com).all():
-        raise InputError(f"payload inertia has shape {about_com.shape}, expected (3, 3)", "in kg m^2")
+    kilograms = float(_numbers(mass, (), "payload mass", limits.MASS))
+    centre = _numbers(com, (3,), "payload com", limits.LENGTH)
+    if kilograms < 0.0:
+        raise InputError(f"payload mass is {kilograms}, expected a number >= 0", "in kg")
+    if inertia is None:
+        return centre, np.zeros((3, 3))
+    about_com = _numbers(inertia, (3, 3), "payload inertia", limits.INERTIA)
     if not np.allclose(about_com, about_com.T, rtol=1e-9, atol=0.0):
         raise InputError("payload inertia is not symmetric", "give Ixx Ixy Ixz, Ixy Iyy Iyz, Ixz Iyz Izz")
+    fault = physical_fault(kilograms, six_of(about_com))
+    if fault:
+        raise InputError(
+            f"payload inertia: {fault}: no rigid body has it", "in kg m^2, about the load's centre of mass"
+        )
     return centre, about_com
+
+
+def _numbers(values: ArrayLike, shape: tuple[int, ...], what: str, accepted: limits.Range) -> Array:
+    """Finite numbers of that shape within their range; InputError says what was found."""
+    found = array_of(values)
+    if found is None or found.shape != shape:
+        form = f"has shape {found.shape}" if found is not None else f"is {limits.shown(values)}"
+        raise InputError(f"{what} {form}, expected {_SHAPES[shape]}", f"in {accepted.unit}")
+    for value in found.reshape(-1).tolist():
+        if not np.isfinite(value):
+            raise InputError(
+                f"{what} is {limits.shown(found.tolist())}, expected {_SHAPES[shape]}", f"in {accepted.unit}"
+            )
+        fault = accepted.fault(value)
+        if fault:
+            raise InputError(f"{what}: {value:g} {fault}", f"in {accepted.unit}")
+    return found
+
+
+def array_of(values: ArrayLike) -> Array | None:
+    """The values as float64, None where they are none."""
+    try:
+        found = np.asarray(values)
+    except ValueError:
+        return None
+    return found.astype(np.float64) if found.dtype.kind in "iuf" else None
+
+
+_SHAPES = {(): "a finite number", (3,): "three finite numbers", (3, 3): "3 x 3 finite numbers"}
 
 
 def _check_admitted(model: DynamicsModel, load: Array, index: NDArray[np.int64]) -> None:
