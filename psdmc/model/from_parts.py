@@ -19,7 +19,7 @@ from psdmc.model import json_values as json
 from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
-from psdmc.robot.load import LoadOptions
+from psdmc.robot.load_options import LoadOptions
 
 Arrays = Mapping[str, NDArray[Any]]
 
