@@ -17,8 +17,10 @@ from psdmc.emit.package import PackageView, package_files, package_view
 from psdmc.emit.references import References
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError
-from psdmc.lower.kernels import Lowering, lower
+from psdmc.lower.kernels import ALL_FUNCTIONS, Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.mass_check import check_mass_matrix
+from psdmc.program.functions import BY_NAME
 from psdmc.robot.load import LoadedRobot, load_robot
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.call import CompiledRobot
@@ -97,7 +99,8 @@ def emit_c(
     """Write the model's C package; returns the files that changed.
 
     lowering   which arithmetic: "auto" takes the cheaper per function
-    functions  names of functions to generate; None: all that the model admits
+    functions  names of functions to generate; None: all. InputError where theta_b is known and the mass matrix is
+               not positive definite within the joint limits, unless forward_dynamics is left out
     real       precision of the package
     trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"
     name       the robot's name in C; None: the robot's own
@@ -133,12 +136,52 @@ def _package(
     _choose("lowering", lowering, ("auto", "expanded", "factored"))
     _choose("real", options.real, ("float64", "float32"))
     _choose("trig", options.trig, ("inline", "libm", "freestanding"))
+    require_forward_dynamics(model, functions)
     wanted = ("all",) if functions is None else ("some", *functions)
     kernels = lowered_once(
         (model.content_hash, lowering, *wanted), lambda: lower(model, lowering, functions, progress)
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     return package_view(package_info(model, name, shown), kernels, options, references(model))
+
+
+FORWARD = "forward_dynamics"
+
+
+def require_forward_dynamics(model: DynamicsModel, functions: Sequence[str] | None) -> None:
+    """InputError where forward dynamics is wanted and the mass matrix is not positive definite in every pose."""
+    if functions is not None and FORWARD not in functions:
+        return
+    mass = check_mass_matrix(model)
+    if mass is None or mass.passed:
+        return
+    others = ",".join(name for name in functions or ALL_FUNCTIONS if name != FORWARD)
+    raise InputError(
+        f"{model.chain.name}: no {FORWARD}: {mass.reason}",
+        f"correct the inertias, or calibrate with physical consistency; or leave it out: --functions {others}",
+    )
+
+
+def admitted(model: DynamicsModel) -> tuple[str, ...]:
+    """All functions that the model can give: without forward dynamics where its mass matrix does not admit it."""
+    mass = check_mass_matrix(model)
+    is_sound = mass is None or mass.passed
+    return tuple(name for name in ALL_FUNCTIONS if is_sound or name != FORWARD)
+
+
+def left_out(model: DynamicsModel, functions: Sequence[str] | None = None) -> tuple[str, ...]:
+    """What a model cannot give of the functions that are wanted (None: all), a sentence each."""
+    wanted = ALL_FUNCTIONS if functions is None else functions
+    notes = []
+    if functions is None and FORWARD not in admitted(model):
+        mass = check_mass_matrix(model)
+        notes.append(f"{FORWARD} is left out: {mass.reason if mass else ''}")
+    by_theta = [name for name in wanted if name in BY_NAME and BY_NAME[name].theta]
+    if model.theta_b is None and by_theta:
+        notes.append(
+            f"the base parameters are unknown: {', '.join(by_theta)} take them at run time only, as NAME_theta"
+        )
+    return tuple(notes)
 
 
 def _choose(option: str, value: str, allowed: Sequence[str]) -> None:

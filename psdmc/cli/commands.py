@@ -10,10 +10,11 @@ import typer
 from psdmc import compiler
 from psdmc.cli import measuring
 from psdmc.cli.progress import steps
-from psdmc.cli.show import print_check, print_cost, print_model, print_terms
+from psdmc.cli.show import print_check, print_cost, print_mass_check, print_model, print_terms
 from psdmc.errors import InputError
 from psdmc.lower.kernels import Lowering
 from psdmc.model.check import check_model
+from psdmc.model.mass_check import check_mass_matrix
 from psdmc.model.store import load
 from psdmc.robot.load import load_robot
 from psdmc.robot.load_options import DEFAULT_SNAP
@@ -140,7 +141,8 @@ def check(
         typer.Option(metavar="FILE", help="robot file to check against instead of the embedded source"),
     ] = None,
 ) -> None:
-    """Check a model again, independently, against Pinocchio's (and MuJoCo's) own reading of its source."""
+    """Check a model again, independently, against Pinocchio's (and MuJoCo's) own reading of its source, and its mass
+    matrix."""
     found = load(model)
     source = None
     if robot is not None:
@@ -148,8 +150,10 @@ def check(
     with steps() as progress:
         progress("checking against other readers")
         rows = check_model(found, source)
+        mass = check_mass_matrix(found)
     print_check(rows)
-    if not all(row.passed for row in rows):
+    print_mass_check(mass)
+    if not all(row.passed for row in rows) or (mass is not None and not mass.passed):
         raise typer.Exit(CHECK_FAILED_STATUS)
 
 
@@ -167,12 +171,14 @@ def emit_c(
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
 ) -> None:
     """Write a model's C package: header, sources, build files, self-test."""
+    found = load(model)
+    wanted = [word.strip() for word in functions.split(",") if word.strip()] or None
     with steps() as progress:
         changed = compiler.emit_c(
-            load(model),
+            found,
             output,
             lowering,  # type: ignore[arg-type]
-            [word.strip() for word in functions.split(",") if word.strip()] or None,
+            wanted,
             real,  # type: ignore[arg-type]
             trig,  # type: ignore[arg-type]
             name,
@@ -180,6 +186,8 @@ def emit_c(
             progress,
         )
     print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
+    for note in compiler.left_out(found, wanted):
+        print(f"note: {note}")
 
 
 @app.command()

@@ -10,9 +10,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from psdmc.calibrate.record import Calibration
+from psdmc.compiler import admitted, left_out
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.check import CheckRow, readers
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.mass_check import MassCheck
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
 from psdmc.robot.chain import Joint
@@ -112,8 +114,10 @@ def print_terms(model: DynamicsModel) -> None:
 def print_cost(model: DynamicsModel, lowerings: Sequence[Lowering]) -> None:
     """Operations of each function per lowering; for one state, and where they differ for one state per lane."""
     table = Table("function", "lowering", "mul", "add", "mul + add", "div", "sincos", "fused", "in lanes")
+    for note in left_out(model):
+        print(f"note: {note}")
     for lowering in lowerings:
-        for name, kernel in lower(model, lowering).items():
+        for name, kernel in lower(model, lowering, admitted(model)).items():
             if kernel.lowering == lowering:
                 one, lanes = cost(kernel.single), cost(kernel.batch)
                 figures = (one.mul, one.add, one.total, one.div, one.sincos, one.fused)
@@ -132,6 +136,14 @@ def print_check(rows: Sequence[CheckRow]) -> None:
     out = console()
     out.print(table)
     out.print(readers(rows))
+
+
+def print_mass_check(mass: MassCheck | None) -> None:
+    """Whether the mass matrix is positive definite over the joint limits, or why that was not tested."""
+    if mass is None:
+        print("mass matrix: not tested, for the base parameters are unknown")
+        return
+    print(f"{'pass' if mass.passed else 'FAIL'}: {mass.reason}")
 
 
 def print_accuracy(record: Calibration) -> None:

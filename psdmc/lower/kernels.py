@@ -48,9 +48,8 @@ def lower(
 ) -> dict[str, Kernel]:
     """Kernels by name, `_theta` variants included where wanted, in the order of FUNCTIONS.
 
-    functions  names of FUNCTIONS; None takes all that the model admits: without theta_b only those that need none, and
-               forward dynamics only where the mass matrix is regular for some q
-    Raises InputError for an unknown function or one that the model does not admit.
+    functions  names of FUNCTIONS; None takes all; without theta_b only those variants that need none are made
+    Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
     wanted = _wanted(model, functions)
     lowered = _Lowered(model, lowering)
@@ -63,9 +62,7 @@ def lower(
             try:
                 kernel = lowered.kernel(BY_NAME[name], theta)
             except SingularMassMatrix as singular:
-                if functions is not None:
-                    raise _refusal(model, singular) from singular
-                continue
+                raise _refusal(model, singular) from singular
             kernels[kernel.name] = kernel
     return kernels
 

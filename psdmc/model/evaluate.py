@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from psdmc.dynamics.composite_body import mass_matrix as composite_mass_matrix
+from psdmc.dynamics.composite_body import mass_matrix as composite_bodies
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
@@ -119,7 +119,7 @@ def mass_matrix(model: DynamicsModel, q: ArrayLike) -> Array:
     theta = known(model)
     shape, (angles,) = states(model, q=q)
     if model.P is None:
-        return _by_composite_bodies(model, angles).reshape(*shape, model.n, model.n)
+        return composite_mass_matrix(model, angles).reshape(*shape, model.n, model.n)
     exponents, matrices = expanded(model)
     weights = _weights(matrices, theta)
     columns = [np.flatnonzero(exponents[4 * model.n + j]) for j in range(model.n)]
@@ -156,10 +156,11 @@ def _by_newton_euler(model: DynamicsModel, theta: Array, arrays: list[Array]) ->
     return _columns(torques, len(arrays[0]))
 
 
-def _by_composite_bodies(model: DynamicsModel, q: Array) -> Array:
+def composite_mass_matrix(model: DynamicsModel, q: Array) -> Array:
+    """M(q) (states, n, n) from (states, n) by composite bodies that have the model's theta_b: quick for any p."""
     x = model.representative @ known(model)
     chain = model.chain
-    rows = composite_mass_matrix(frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), list(q.T))
+    rows = composite_bodies(frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), list(q.T))
     return np.stack([_columns(row, len(q)) for row in rows], axis=1)
 
 

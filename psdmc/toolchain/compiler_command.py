@@ -126,8 +126,22 @@ def _signal_name(number: int) -> str:
         return f"signal {number}"
 
 
+SELF_TEST_FAILED = ": FAILED"
+"""How an emitted package's self-test ends the line of a check that failed."""
+
+
 def _complaint(*texts: str) -> str:
-    """The first line that says 'error', else the last line there is."""
+    """What a self-test says of its failed checks; else the first line that says 'error'; else the last line."""
     lines = [line.strip() for text in texts for line in text.splitlines() if line.strip()]
+    failed = [_check_line(line) for line in lines if line.endswith(SELF_TEST_FAILED)]
+    if failed:
+        more = f"; and {len(failed) - 1} more" if len(failed) > 1 else ""
+        return f"self-test: {failed[0]}{more}"
     errors = [line for line in lines if "error" in line.lower()]
     return (errors or lines[-1:] or ["no message"])[0]
+
+
+def _check_line(line: str) -> str:
+    """A check's line without the number that ctest puts before it, and with single spaces."""
+    head, _, rest = line.partition(": ")
+    return " ".join((rest if head.isdigit() else line).split())

@@ -80,8 +80,12 @@ def test_a_self_test_that_fails_fails_the_build(tmp_path: Path) -> None:
     good = arm_references()
     tau = good.tau.copy()
     tau[3, 1] *= 1 + 1e-6
-    with pytest.raises(ToolchainError, match="ctest failed"):
+    with pytest.raises(ToolchainError, match="ctest failed") as caught:
         build_package(_emit(tmp_path / "arm", References(good.q, good.qd, good.qdd, tau)))
+    said = caught.value.message
+    assert "self-test: inverse_dynamics error" in said
+    assert "tolerance" in said
+    assert "FAILED; and " in said
 
 
 def test_a_self_test_does_not_let_a_nan_pass(tmp_path: Path) -> None:
