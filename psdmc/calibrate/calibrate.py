@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.calibrate.campaign import FILE, read_campaign
-from psdmc.calibrate.four_steps import FourSteps, Runs, calibrate_four_steps
+from psdmc.calibrate.four_steps import Runs, calibrate_four_steps
+from psdmc.calibrate.judged_record import judged_record
+from psdmc.calibrate.least_squares import noise_factor
 from psdmc.calibrate.linear_fit import LinearOptions, calibrate_linear
-from psdmc.calibrate.log import Log
+from psdmc.calibrate.log import Array, Log
 from psdmc.calibrate.log_files import read_log
 from psdmc.calibrate.motor_model import Motors
-from psdmc.calibrate.physical import PhysicalOptions, nearest_physical, physically_consistent
+from psdmc.calibrate.physical import PhysicalOptions, nearest_physical, require_cvxpy, whitening_of
 from psdmc.calibrate.predictor import ChainRegressor, Regressor
-from psdmc.calibrate.record import Calibration, four_step_record, linear_record, with_theta
+from psdmc.calibrate.record import Calibration, four_step_record, linear_record
 from psdmc.calibrate.steps import CalibrationOptions
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
@@ -28,11 +30,12 @@ Progress = Callable[[str], None]
 class CalibrateOptions:
     """Everything `psdmc calibrate` can be told.
 
-    physical   whether base parameters must be those of a real mass distribution
+    physical   whether the result must be what a robot can have: links of positive mass distribution, drive inertias
+               and friction not negative; False shows the unconstrained fit
     campaign   options of the four steps;  linear  of the linear fit;  consistency  of the physical estimate
     """
 
-    physical: bool = False
+    physical: bool = True
     campaign: CalibrationOptions = field(default_factory=CalibrationOptions)
     linear: LinearOptions = field(default_factory=LinearOptions)
     consistency: PhysicalOptions = field(default_factory=PhysicalOptions)
@@ -54,6 +57,8 @@ def calibrate(
     InputError where a file is missing or a log cannot be used.
     """
     options = options or CalibrateOptions()
+    if options.physical:
+        require_cvxpy()
     regressor = regressor or ChainRegressor(model)
     paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
     if not paths:
@@ -75,27 +80,24 @@ def calibrate_campaign(
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
 ) -> Calibration:
-    """The four steps, and the nearest physical parameters where they are wanted."""
+    """The four steps; their theta_b, or the nearest physical one, as their uncertainties and the prior measure."""
     found = calibrate_four_steps(
-        model.chain, regressor, model.l, runs, options.campaign, progress, torque_constants
+        model.chain, regressor, model.l, runs, options.campaign, progress, torque_constants, model.theta_b
     )
-    record = four_step_record(model, found)
-    return _consistent(model, found, record, options) if options.physical else record
-
-
-def _consistent(
-    model: DynamicsModel, found: FourSteps, record: Calibration, options: CalibrateOptions
-) -> Calibration:
     inertial = found.inertial
-    if not inertial.identifiable.all():
-        raise InputError(
-            "physical consistency needs every base parameter identified", "see the warnings without it"
-        )
-    near = nearest_physical(model, inertial.theta_b, inertial.covariance, options.consistency)
-    distance = float(np.max(np.abs(near.theta_b - inertial.theta_b) / inertial.std))
-    return with_theta(
-        record, near.theta_b, (f"physical consistency moved a parameter by {distance:.2g} of its std",)
-    )
+
+    def record(theta_b: Array) -> Calibration:
+        return four_step_record(model, found, theta_b, options.campaign)
+
+    progress("reading the result back")
+    plain = judged_record(record(inertial.theta_b), runs)
+    if not options.physical:
+        return plain
+    progress("physical consistency")
+    factor = max(noise_factor(found.gravity.estimate), noise_factor(inertial.estimate))
+    whitening = whitening_of(factor**2 * inertial.covariance + inertial.unseen @ inertial.unseen.T)
+    near = nearest_physical(model, inertial.theta_b, whitening, None, options.consistency)
+    return judged_record(record(near.values), runs, plain, near.distance)
 
 
 def calibrate_logs(
@@ -106,18 +108,22 @@ def calibrate_logs(
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
 ) -> Calibration:
-    """Everything linear at once."""
+    """Everything linear at once: one vector of theta_b, friction and offsets."""
     motors = _motors(model, logs, torque_constants)
     progress("linear fit")
-    found = calibrate_linear(model.chain, regressor, model.l, logs, options.linear, motors)
+    linear = options.linear
+    found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b)
+    solved = found.estimate
+    progress("reading the result back")
+    plain = judged_record(linear_record(model, found, solved.values, linear), logs, check=linear.check)
     if not options.physical:
-        return linear_record(model, found)
+        return plain
     progress("physical consistency")
-    problem = found.problem
-    physical = physically_consistent(
-        model, problem.columns, problem.torque, found.estimate.weights, options.consistency
+    near = nearest_physical(
+        model, solved.values, solved.whitening, found.problem.never_negative, options.consistency
     )
-    return linear_record(model, found, physical.theta_b, problem.qualities(physical.values))
+    record = linear_record(model, found, near.values, linear)
+    return judged_record(record, logs, plain, near.distance, linear.check)
 
 
 def _motors(model: DynamicsModel, logs: Sequence[Log], constants: Mapping[str, float] | None) -> Motors:

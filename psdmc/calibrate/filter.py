@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import interpolate, signal
 
 from psdmc.calibrate.log import Array, Log
-from psdmc.calibrate.log_checks import CheckOptions, still_joints
+from psdmc.calibrate.log_checks import CheckOptions
+from psdmc.calibrate.position_noise import noise_like, position_noise, resting
 from psdmc.errors import InputError
 
 
@@ -49,6 +51,9 @@ class States:
     effort            (N, n)  as logged, filtered like q
     use               (N,)    False where the filter starts up
     low_pass          the filter, for predictions to be compared with `effort`
+    cutoff            Hz, of that filter
+    noise             (n,)    standard deviation of a raw position sample, rad (m); zero for joints that rest
+    still             (n,)    joints whose motion is no more than noise: their rates are exactly zero
     """
 
     time: Array
@@ -59,6 +64,15 @@ class States:
     effort: Array
     use: NDArray[np.bool_]
     low_pass: LowPass
+    cutoff: float
+    noise: Array
+    still: NDArray[np.bool_]
+
+    def jittered(self) -> tuple[Array, Array, Array]:
+        """q, qd, qdd (N, n) as another draw of the position noise would have made them."""
+        draw = self.low_pass(noise_like(self.noise, len(self.time)))
+        rate, acceleration = central_differences(draw, self.period)
+        return self.q + draw, self.qd + rate, self.qdd + acceleration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,13 +97,17 @@ class LowPass:
 
 
 def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None) -> States:
-    """States of a checked log; a joint that stands still gets exactly zero rates, so that it excites nothing."""
+    """States of a checked log; a joint that does no more than its sensor's noise gets exactly zero rates, so that it
+    excites nothing."""
     time, position, effort = evenly_spaced(log)
     period = float(time[1] - time[0])
     low_pass = LowPass.design(options, period)
-    still = np.array(still_joints(log, check))
-    position = np.where(still, np.mean(position, axis=0), position)
-    q = np.where(still, position, low_pass(position))
+    smooth = low_pass(position)
+    in_band = min(2.0 * options.cutoff * period, 1.0)
+    noise = position_noise(position, smooth, in_band)
+    smallest = (check or CheckOptions()).smallest_motion
+    still = resting(position, smooth, noise, in_band, smallest)
+    q = np.where(still, np.mean(position, axis=0), smooth)
     qd, qdd = central_differences(q, period)
     margin = int(np.ceil(options.settle / options.cutoff / period))
     use = np.zeros(len(time), dtype=bool)
@@ -98,7 +116,8 @@ def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None
         raise InputError(
             f"{log.name}: too short: {log.duration:.3g} s leave nothing after the {options.cutoff:g} Hz filter settled"
         )
-    return States(time, period, q, qd, qdd, low_pass(effort), use, low_pass)
+    noise = np.where(still, 0.0, noise)
+    return States(time, period, q, qd, qdd, low_pass(effort), use, low_pass, options.cutoff, noise, still)
 
 
 def evenly_spaced(log: Log) -> tuple[Array, Array, Array]:
@@ -143,6 +162,38 @@ def thinned(states: States, options: FilterOptions) -> NDArray[np.intp]:
     """
     step = max(1, int(np.floor(0.5 / (options.cutoff * states.period))))
     return np.flatnonzero(states.use)[::step]
+
+
+BLOCK_ROWS = 16384
+"""Rows that are filtered at once."""
+MEMORY_CYCLES = 30.0
+"""Cut-off periods after which the filter has forgotten a sample to rounding: its slowest pole decays by
+exp(-2 pi sin(pi / (2 order))) a period, which is to 0.29 at order 8."""
+
+
+def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice], Array]) -> Array:
+    """(len(at), ...) low-passed values at rows `at`, block by block: a long log's values need not be held at once.
+
+    values   of a slice of the log's rows, (rows, ...)
+    The same as filtering all rows at once, but for what the filter remembers beyond MEMORY_CYCLES.
+    """
+    count = len(states.time)
+    margin = int(np.ceil(MEMORY_CYCLES / states.cutoff / states.period))
+    parts = []
+    for start in range(0, count, BLOCK_ROWS):
+        wanted = at[(at >= start) & (at < start + BLOCK_ROWS)]
+        if not len(wanted):
+            continue
+        first, last = max(start - margin, 0), min(start + BLOCK_ROWS + margin, count)
+        parts.append(_by_column(states.low_pass, values(slice(first, last)), wanted - first))
+    return np.concatenate(parts)
+
+
+def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Array:
+    """A filter's copies of one column are small, those of all columns are not."""
+    flat = values.reshape(len(values), -1)
+    smooth = np.stack([low_pass(column)[rows] for column in np.ascontiguousarray(flat.T)], axis=-1)
+    return smooth.reshape(len(rows), *values.shape[1:])
 
 
 def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float) -> NDArray[np.bool_]:

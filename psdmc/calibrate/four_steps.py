@@ -55,10 +55,12 @@ def calibrate_four_steps(
     options: CalibrationOptions | None = None,
     progress: Progress | None = None,
     torque_constants: Mapping[str, float] | None = None,
+    file_theta: Array | None = None,
 ) -> FourSteps:
     """Torque constants, gravity, friction, inertia; gravity to inertia as often as the options say.
 
     torque_constants  N m/A by joint name, for joints that no load can reach (an axis along gravity)
+    file_theta        (l,)  the file's values, kept in directions that no run shows; None: zero
     """
     options = options or CalibrationOptions()
     say = progress or (lambda step: None)
@@ -70,7 +72,9 @@ def calibrate_four_steps(
     friction: FrictionResult | None = None
     for _ in range(options.passes):
         say("gravity")
-        gravity = calibrate_gravity(chain, model, split, motors, runs.gravity, options.gravity, theta_b)
+        gravity = calibrate_gravity(
+            chain, model, split, motors, runs.gravity, options.gravity, theta_b, file_theta
+        )
         say("friction")
         known = split.from_phi() @ gravity.estimate.values
         friction = calibrate_friction(
@@ -78,7 +82,7 @@ def calibrate_four_steps(
         )
         say("inertia")
         inertial = calibrate_inertial(
-            chain, model, motors, gravity, friction, runs.inertial, options.inertial
+            chain, model, motors, gravity, friction, runs.inertial, options.inertial, file_theta
         )
         theta_b = inertial.theta_b
     assert friction is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
@@ -24,7 +24,6 @@ class FrictionResult:
     """Friction per joint name, in the chain's order; joints without a run have none."""
 
     joints: dict[str, JointFriction]
-    quality: StepQuality
     warnings: tuple[str, ...]
 
     @property
@@ -48,25 +47,50 @@ def calibrate_friction(
     theta_gravity  (l,)  a theta_b with the identified gravity parameters
     start          an earlier pass, to start from instead of searching
     """
-    places = {name: k for k, name in enumerate(chain.joint_names)}
-    own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
-    data = {
-        run.joint: prepared(chain, model, motors, theta_gravity, run, places[run.joint], options)
-        for run in own
-    }
+    data = _prepared(chain, model, motors, theta_gravity, runs, options)
     earlier = start.joints if start is not None else {}
     tasks = [(name, data[name], lugre, earlier.get(name)) for name in data]
     found = {joint.joint: joint for joint in _fitted(tasks, lugre.workers)}
-    qualities, samples = {}, []
-    for name, joint in found.items():
-        qualities[name], sample = _judged(name, data[name], joint)
-        samples.append(sample)
     warnings = tuple(
         f"joint {name}: friction parameter(s) not seen in the data: {', '.join(joint.unseen)}"
         for name, joint in found.items()
         if joint.unseen
     )
-    return FrictionResult(found, StepQuality("Friction", qualities, tuple(samples)), warnings)
+    return FrictionResult(found, warnings)
+
+
+def judge_friction(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    theta_b: Array,
+    runs: Sequence[FrictionRun],
+    options: StepOptions,
+    joints: Mapping[str, JointFriction],
+) -> StepQuality:
+    """Friction of each joint alone against its run, relieved of these base parameters' gravity."""
+    qualities, samples = {}, []
+    for name, data in _prepared(chain, model, motors, theta_b, runs, options).items():
+        if name in joints:
+            qualities[name], sample = _judged(name, data, joints[name])
+            samples.append(sample)
+    return StepQuality("Friction", qualities, tuple(samples))
+
+
+def _prepared(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    theta_b: Array,
+    runs: Sequence[FrictionRun],
+    options: StepOptions,
+) -> dict[str, JointRun]:
+    """The runs by joint, in the chain's order."""
+    places = {name: k for k, name in enumerate(chain.joint_names)}
+    own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
+    return {
+        run.joint: prepared(chain, model, motors, theta_b, run, places[run.joint], options) for run in own
+    }
 
 
 _Task = tuple[str, JointRun, FrictionOptions, JointFriction | None]

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibrate.filter import States, away_from, filtered, held_out
-from psdmc.calibrate.least_squares import Consider, Estimate, estimate, noise_warnings
+from psdmc.calibrate.least_squares import Consider, Estimate, Prior, estimate, noise_warnings
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor, gravity_regressor, payload_torque
-from psdmc.calibrate.quality import quality
-from psdmc.calibrate.steps import GravityRun, JointQuality, Sample, StepOptions, StepQuality
+from psdmc.calibrate.prior import base_scale, torque_sizes
+from psdmc.calibrate.steps import GravityRun, StepOptions, StepQuality, judged
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 
@@ -67,7 +67,6 @@ class GravityResult:
 
     split: GravitySplit
     estimate: Estimate
-    quality: StepQuality
     warnings: tuple[str, ...]
 
 
@@ -102,32 +101,52 @@ def calibrate_gravity(
     runs: Sequence[GravityRun],
     options: StepOptions,
     theta_b: Array | None = None,
+    file_theta: Array | None = None,
 ) -> GravityResult:
     """phi by linear least squares over samples averaged over both directions.
 
-    theta_b   from an earlier pass: its velocity and acceleration torques are subtracted
+    theta_b     from an earlier pass: its velocity and acceleration torques are subtracted
+    file_theta  the file's values, kept where the runs show nothing; None: zero
     """
-    parts = [_even_part(chain, model, motors, run, options, theta_b) for run in runs]
-    q, target, use = (np.concatenate(x) for x in zip(*(part[:3] for part in parts), strict=True))
-    currents = np.concatenate([part[3] for part in parts])
+    q, target, use, currents = _even_parts(chain, model, motors, runs, options, theta_b)
     columns = gravity_regressor(model, q)[:, :, split.pivots]
     out = held_out(len(q), options.split)
     kept = use & ~out[:, None]
     consider = Consider(-currents[:, :, None] * np.eye(len(chain)), np.diag(motors.relative_std**2))
-    solved = estimate(columns, target, options.fit, consider, kept)
-    predicted = columns @ solved.values
-    qualities, samples = _judged(chain, target, predicted, use, out)
-    warnings = _warnings(chain, solved, split)
-    return GravityResult(split, solved, StepQuality("Gravity", qualities, samples), warnings)
+    scale = base_scale(chain, model, torque_sizes(currents), file_theta)[split.pivots]
+    start = np.zeros(len(scale)) if file_theta is None else split.phi(file_theta)
+    solved = estimate(columns, target, options.fit, consider, kept, Prior(start, scale))
+    return GravityResult(split, solved, noise_warnings("gravity", chain.joint_names, solved))
 
 
-def _warnings(chain: Chain, solved: Estimate, split: GravitySplit) -> tuple[str, ...]:
-    noise = noise_warnings("gravity", chain.joint_names, solved)
-    unseen = [int(split.pivots[k]) + 1 for k in np.flatnonzero(~solved.identifiable)]
-    if not unseen:
-        return noise
-    names = ", ".join(f"theta_{k}" for k in unseen)
-    return (f"gravity: {names} unidentifiable: rank {solved.rank} of {len(split.pivots)}", *noise)
+def judge_gravity(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    runs: Sequence[GravityRun],
+    options: StepOptions,
+    theta_b: Array,
+) -> StepQuality:
+    """Torque averaged over both directions against the gravity of these base parameters."""
+    q, target, use, _ = _even_parts(chain, model, motors, runs, options, theta_b)
+    out = held_out(len(q), options.split)
+    predicted = gravity_regressor(model, q) @ theta_b
+    row = np.arange(len(q), dtype=np.float64)
+    return judged("Gravity", chain.joint_names, row, target, predicted, out, use, "sample")
+
+
+def _even_parts(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    runs: Sequence[GravityRun],
+    options: StepOptions,
+    theta_b: Array | None,
+) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+    """All runs' rows one after the other: position, torque without friction, usable entries, total motor torque."""
+    parts = [_even_part(chain, model, motors, run, options, theta_b) for run in runs]
+    q, target, use, torque = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return q, target, use, torque
 
 
 def _even_part(
@@ -175,20 +194,3 @@ def _pairs(states: States, options: StepOptions) -> tuple[NDArray[np.intp], NDAr
     step = max(1, int(np.floor(0.5 / (options.filter.cutoff * states.period))))
     there = np.flatnonzero(states.use[: last // 2 + 1])[::step]
     return there, last - there
-
-
-def _judged(
-    chain: Chain, target: Array, predicted: Array, use: NDArray[np.bool_], out: NDArray[np.bool_]
-) -> tuple[dict[str, JointQuality], tuple[Sample, ...]]:
-    qualities: dict[str, JointQuality] = {}
-    samples: list[Sample] = []
-    for k, name in enumerate(chain.joint_names):
-        rows = np.flatnonzero(use[:, k])
-        fit, held = rows[~out[rows]], rows[out[rows]]
-        qualities[name] = JointQuality(
-            quality(target[fit, k], predicted[fit, k]), quality(target[held, k], predicted[held, k])
-        )
-        samples.append(
-            Sample(name, "sample", rows.astype(float), target[rows, k], predicted[rows, k], out[rows])
-        )
-    return qualities, tuple(samples)

@@ -7,7 +7,7 @@ compared with a prediction read late.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from psdmc.calibrate.filter import States, filtered, held_out, thinned
 from psdmc.calibrate.friction import FrictionResult
 from psdmc.calibrate.friction_fit import JointFriction
-from psdmc.calibrate.gravity import GravityResult
-from psdmc.calibrate.least_squares import Consider, Estimate, estimate, noise_warnings
+from psdmc.calibrate.gravity import GravityResult, gravity_split
+from psdmc.calibrate.least_squares import Consider, Estimate, Prior, estimate, noise_warnings
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.lugre import Lugre, friction_torque
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor, payload_torque
-from psdmc.calibrate.quality import quality
-from psdmc.calibrate.steps import InertialRun, JointQuality, Sample, StepOptions, StepQuality
+from psdmc.calibrate.prior import base_scale, torque_sizes
+from psdmc.calibrate.steps import InertialRun, StepOptions, StepQuality, judged
 from psdmc.robot.chain import Chain
 
 FRICTION_STEP = 0.1
@@ -38,15 +38,15 @@ class InertialResult:
     covariance   (l, l)  with the uncertainty of torque constants, gravity and friction
     identifiable (l,)
     estimate     of psi, the parameters that gravity does not show
-    inertial     R^2 of what is left for inertia;  everything  of the whole torque
+    seen, unseen (l, r), (l, l - r)  directions of theta_b that all runs together show and do not show (Estimate)
     """
 
     theta_b: Array
     covariance: Array
     identifiable: NDArray[np.bool_]
     estimate: Estimate
-    inertial: StepQuality
-    everything: StepQuality
+    seen: Array
+    unseen: Array
     warnings: tuple[str, ...]
 
     @property
@@ -62,6 +62,7 @@ class _Rows:
     torque: Array
     known: Array
     columns: Array
+    noise: Array
     friction: Array
     friction_columns: Array
 
@@ -74,33 +75,62 @@ def calibrate_inertial(
     friction: FrictionResult,
     runs: Sequence[InertialRun],
     options: StepOptions,
+    file_theta: Array | None = None,
 ) -> InertialResult:
-    """psi by linear least squares, and theta_b with what gravity found."""
+    """psi by linear least squares, and theta_b with what gravity found.
+
+    file_theta  the file's values, kept where the runs show nothing; None: zero
+    """
     split = gravity.split
-    parts = [_rows(chain, model, motors, friction, run, options) for run in runs]
-    torque, known, columns, rubbed, rub_columns = (
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in ("torque", "known", "columns", "friction", "friction_columns")
-    )
-    time = np.concatenate([part.time for part in parts])
-    static = columns @ (split.from_phi() @ gravity.estimate.values) + known
-    target = torque - static - rubbed
-    free = columns @ split.from_psi()
+    rows = _stacked([_rows(chain, model, motors, friction, run, options) for run in runs])
+    static = rows.columns @ (split.from_phi() @ gravity.estimate.values) + rows.known
+    target = rows.torque - static - rows.friction
     out = held_out(len(target), options.split)
-    consider = _considered(motors, gravity, friction, columns, torque, rubbed, rub_columns)
+    consider = _considered(motors, gravity, friction, rows)
     kept = np.repeat(~out[:, None], len(chain), axis=1)
-    solved = estimate(free, target, options.fit, consider, kept)
+    scale = base_scale(chain, model, torque_sizes(rows.torque), file_theta)[split.rest]
+    start = np.zeros(len(scale)) if file_theta is None else file_theta[split.rest]
+    prior = Prior(start, scale, rows.noise @ split.from_psi())
+    solved = estimate(rows.columns @ split.from_psi(), target, options.fit, consider, kept, prior)
     theta_b = split.from_phi() @ gravity.estimate.values + split.from_psi() @ solved.values
-    predicted = free @ solved.values
+    by_phi, by_psi = split.from_phi(), split.from_psi()
     return InertialResult(
         theta_b=theta_b,
         covariance=_combined(motors, gravity, friction, solved),
         identifiable=_identifiable(gravity, solved),
         estimate=solved,
-        inertial=_judged("Inertial", chain, time, target, predicted, out),
-        everything=_judged("All", chain, time, torque, predicted + static + rubbed, out),
-        warnings=_warnings(chain, gravity, solved),
+        seen=np.hstack([by_phi @ gravity.estimate.seen, by_psi @ solved.seen]),
+        unseen=np.hstack([by_phi @ gravity.estimate.unseen, by_psi @ solved.unseen]),
+        warnings=noise_warnings("inertial", chain.joint_names, solved),
     )
+
+
+def judge_inertial(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    theta_b: Array,
+    friction: FrictionResult,
+    runs: Sequence[InertialRun],
+    options: StepOptions,
+) -> tuple[StepQuality, StepQuality]:
+    """What gravity and friction leave of the fast motion against inertia alone; and the whole torque."""
+    split = gravity_split(chain, model, len(theta_b))
+    rows = _stacked([_rows(chain, model, motors, friction, run, options, sensitive=False) for run in runs])
+    still = split.from_phi() @ split.phi(theta_b)
+    static = rows.columns @ still + rows.known + rows.friction
+    moving = rows.columns @ (theta_b - still)
+    out = held_out(len(rows.time), options.split)
+    names = chain.joint_names
+    return (
+        judged("Inertial", names, rows.time, rows.torque - static, moving, out),
+        judged("All", names, rows.time, rows.torque, static + moving, out),
+    )
+
+
+def _stacked(parts: Sequence[_Rows]) -> _Rows:
+    """All runs' rows one after the other."""
+    return _Rows(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(_Rows)))
 
 
 def _rows(
@@ -110,30 +140,42 @@ def _rows(
     friction: FrictionResult,
     run: InertialRun,
     options: StepOptions,
+    sensitive: bool = True,
 ) -> _Rows:
+    """`sensitive`: with noise columns and slopes of friction, which the fit needs and a prediction does not."""
     states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
     at = thinned(states, options.filter)
     late = _Late(states, friction.delay, at)
     known = np.zeros_like(states.q)
     if run.tool is not None:
         known = payload_torque(chain, states.q, run.tool.mass, run.tool.com)
-    columns = model.regressor(states.q, states.qd, states.qdd)
+    columns = _late_columns(model, late, (states.q, states.qd, states.qdd))
+    by_noise = (
+        _late_columns(model, late, states.jittered()) - columns if sensitive else np.zeros_like(columns)
+    )
     rubbed = np.zeros_like(states.q)
     slopes: list[Array] = []
     for k, name in enumerate(chain.joint_names):
         if name in friction.joints:
             rubbed[:, k] = friction_torque(friction.joints[name].friction, states.qd[:, k], states.period)
-            slopes += [
-                late(slope, k) for slope in _friction_slopes(friction.joints[name], states, k, rubbed[:, k])
-            ]
+            if sensitive:
+                own = _friction_slopes(friction.joints[name], states, k, rubbed[:, k])
+                slopes += [late(slope, k) for slope in own]
     return _Rows(
         time=states.time[at],
         torque=motors.torque(states.effort)[at],
         known=late(known),
-        columns=np.stack([late(columns[:, :, j]) for j in range(columns.shape[2])], axis=-1),
+        columns=columns,
+        noise=by_noise,
         friction=late(rubbed),
         friction_columns=np.stack(slopes, axis=-1) if slopes else np.zeros((len(at), len(chain), 0)),
     )
+
+
+def _late_columns(model: Regressor, late: _Late, motion: tuple[Array, Array, Array]) -> Array:
+    """(rows, n, l) the regressor along a motion as the log would hold it."""
+    columns = model.regressor(*motion)
+    return np.stack([late(columns[:, :, j]) for j in range(columns.shape[2])], axis=-1)
 
 
 class _Late:
@@ -171,20 +213,13 @@ def _friction_slopes(found: JointFriction, states: States, k: int, base: Array) 
     return slopes
 
 
-def _considered(
-    motors: Motors,
-    gravity: GravityResult,
-    friction: FrictionResult,
-    columns: Array,
-    torque: Array,
-    rubbed: Array,
-    rub_columns: Array,
-) -> Consider:
+def _considered(motors: Motors, gravity: GravityResult, friction: FrictionResult, rows: _Rows) -> Consider:
     """Effects of torque constants, phi and friction on (prediction - target); constants move all three."""
     n = len(motors.relative_std)
-    by_phi = columns @ gravity.split.from_phi()
-    by_constant = by_phi @ gravity.estimate.considered - (torque - rubbed)[:, :, None] * np.eye(n)
-    stacked = np.concatenate([by_constant, by_phi, rub_columns], axis=2)
+    by_phi = rows.columns @ gravity.split.from_phi()
+    moved = (rows.torque - rows.friction)[:, :, None] * np.eye(n)
+    by_constant = by_phi @ gravity.estimate.considered - moved
+    stacked = np.concatenate([by_constant, by_phi, rows.friction_columns], axis=2)
     return Consider(stacked, _source_covariance(motors, gravity, friction))
 
 
@@ -220,24 +255,3 @@ def _identifiable(gravity: GravityResult, solved: Estimate) -> NDArray[np.bool_]
     unseen_rest = np.abs(split.dependence[:, ~solved.identifiable]).sum(axis=1) > 0
     seen[split.pivots] = gravity.estimate.identifiable & ~unseen_rest
     return seen
-
-
-def _judged(
-    step: str, chain: Chain, time: Array, measured: Array, predicted: Array, out: NDArray[np.bool_]
-) -> StepQuality:
-    joints: dict[str, JointQuality] = {}
-    samples: list[Sample] = []
-    for k, name in enumerate(chain.joint_names):
-        m, p = measured[:, k], predicted[:, k]
-        joints[name] = JointQuality(quality(m[~out], p[~out]), quality(m[out], p[out]))
-        samples.append(Sample(name, "time [s]", time, m, p, out))
-    return StepQuality(step, joints, tuple(samples))
-
-
-def _warnings(chain: Chain, gravity: GravityResult, solved: Estimate) -> tuple[str, ...]:
-    warnings = []
-    unseen = gravity.split.rest[~solved.identifiable]
-    if len(unseen):
-        names = ", ".join(f"theta_{k + 1}" for k in unseen)
-        warnings.append(f"inertial: {names} unidentifiable: rank {solved.rank} of {len(gravity.split.rest)}")
-    return (*warnings, *noise_warnings("inertial", chain.joint_names, solved))

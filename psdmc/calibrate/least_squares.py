@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -22,8 +22,11 @@ class FitOptions:
     rounds          of reweighting
     huber           residual in standard deviations beyond which irls turns from squares to magnitudes: 1.345 keeps
                     95 % of least squares' efficiency where errors are normal
-    rank_tolerance  singular value of the column-scaled problem, relative to the largest, below which a direction is
-                    called unseen: states from sensors carry about 1e-4 of noise
+    rank_tolerance  share of its own size by which a column may be wrong, beside its noise: differentiation and filters
+                    leave about 1e-4
+    noise_ratio     how many times stronger than noise alone a direction must be: at ten, noise in the columns shrinks
+                    what is found by a tenth at most
+    seen            standard deviation, in units of the prior's scale, from which the data no longer show a direction
     unseen_share    share of a parameter in unseen directions from which it is unidentifiable
     clusters        contiguous stretches whose errors may be dependent, for the robust standard deviations
     """
@@ -32,6 +35,8 @@ class FitOptions:
     rounds: int = 6
     huber: float = 1.345
     rank_tolerance: float = 3e-4
+    noise_ratio: float = 10.0
+    seen: float = 0.2
     unseen_share: float = 1e-2
     clusters: int = 30
 
@@ -49,19 +54,36 @@ class Consider:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Estimate:
-    """The solution of target = columns @ values. l unknowns, n joints.
+class Prior:
+    """What is known before the data: where unseen directions stay, and in which units "near" is measured.
 
-    values            (l,)    zero where unidentifiable
-    covariance        (l, l)  of the fit alone, from residuals taken as white
-    considered        (l, k)  change of `values` per unit of what was considered; k may be 0
-    total_covariance  (l, l)  with what was considered
-    identifiable      (l,)    whether the data see the parameter
-    singular_values   (l,)    of the weighted, column-scaled problem, descending
-    rank              how many of them count
-    sigma             (n,)    residual RMS per joint, target's unit
-    weights           (N, n)  of the last round, one over unit; zero where a row did not count
-    correlation       (n,)    of the residual from sample to sample: near zero for noise
+    values  (l,)       the file's parameters, or zero
+    scale   (l,)       positive: how far from them a parameter may believably lie
+    noise   (N, n, l)  columns that the sensors' noise alone would give; None where states are exact
+    """
+
+    values: Array
+    scale: Array
+    noise: Array | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """The solution of target = columns @ values. l unknowns, n joints, r directions seen.
+
+    values            (l,)      as near to the prior as the data allow: in unseen directions, on it
+    covariance        (l, l)    of the fit alone, from residuals taken as white; none in unseen directions
+    considered        (l, k)    change of `values` per unit of what was considered; k may be 0
+    total_covariance  (l, l)    with what was considered
+    seen, unseen      (l, r), (l, l - r)  directions, in units of the parameters; a parameter's row is its share
+    whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances: the data's where they see
+                                (widened by noise_factor), the prior's where not
+    identifiable      (l,)      whether the data see the parameter by itself
+    singular_values   (l,)      of the weighted, column-scaled problem, descending
+    rank              how many directions are seen
+    sigma             (n,)      residual RMS per joint, target's unit
+    weights           (N, n)    of the last round, one over unit; zero where a row did not count
+    correlation       (n,)      of the residual from sample to sample: near zero for noise
     optimism          robust over white standard deviation, median over parameters: near one for noise
     """
 
@@ -69,6 +91,9 @@ class Estimate:
     covariance: Array
     considered: Array
     total_covariance: Array
+    seen: Array
+    unseen: Array
+    whitening: Array
     identifiable: NDArray[np.bool_]
     singular_values: Array
     rank: int
@@ -78,6 +103,11 @@ class Estimate:
     optimism: float
 
     @property
+    def prior_covariance(self) -> Array:
+        """(l, l) what the prior leaves open where the data see nothing."""
+        return np.asarray(self.unseen @ self.unseen.T)
+
+    @property
     def std(self) -> Array:
         """(l,) standard deviations with what was considered; infinite where unidentifiable."""
         spread = np.sqrt(np.maximum(np.diag(self.total_covariance), 0.0))
@@ -85,7 +115,7 @@ class Estimate:
 
     @property
     def condition(self) -> float:
-        """Of the part that counts."""
+        """Of the part that counts, columns scaled."""
         return (
             float(self.singular_values[0] / self.singular_values[self.rank - 1])
             if self.rank
@@ -99,19 +129,29 @@ def estimate(
     options: FitOptions | None = None,
     consider: Consider | None = None,
     use: NDArray[np.bool_] | None = None,
+    prior: Prior | None = None,
 ) -> Estimate:
     """Solve target = columns @ values in the least squares that the options name.
 
     columns  (N, n, l), target (N, n): samples that may be taken as independent (filter.thinned)
     use      (N, n)  entries that count; None: all
+    prior    None: zero, in units of the columns, and no bound on what is believable
     """
     options = options or FitOptions()
     use = np.ones(target.shape, dtype=bool) if use is None else use
-    solved = _Solved(columns, target, use.astype(np.float64), options)
-    for _ in range(0 if options.method == "ols" else options.rounds):
-        weights = np.where(use, _weights(solved.residual, use, options), 0.0)
-        solved = _Solved(columns, target, weights, options)
+    solved = _Solved(columns, target, use.astype(np.float64), options, prior, 0.0)
+    for _ in range(1 if options.method == "ols" else options.rounds):
+        plain = options.method == "ols"
+        weights = (
+            use.astype(np.float64) if plain else np.where(use, _weights(solved.residual, use, options), 0.0)
+        )
+        solved = _Solved(columns, target, weights, options, prior, _level(solved.residual * weights, use))
     return solved.estimate(consider)
+
+
+def _level(weighted: Array, use: NDArray[np.bool_]) -> float:
+    """RMS of a weighted residual's usable entries."""
+    return float(np.sqrt(np.sum(np.where(use, weighted, 0.0) ** 2) / max(int(use.sum()), 1)))
 
 
 def _weights(residual: Array, use: NDArray[np.bool_], options: FitOptions) -> Array:
@@ -145,15 +185,23 @@ CORRELATED = 0.5
 """Correlation of neighbouring residuals above which they are called no noise: filtered white noise gives 0 +- 0.1."""
 
 
+def noise_factor(solved: Estimate) -> float:
+    """By how much the standard deviations are too small at least, for residuals that are no noise; one where they are."""
+    correlated = solved.correlation[solved.correlation > CORRELATED]
+    if not len(correlated) and solved.optimism < OPTIMISTIC:
+        return 1.0
+    by_joint = np.sqrt((1.0 + correlated) / (1.0 - np.minimum(correlated, 0.999)))
+    return float(max([*by_joint.tolist(), solved.optimism]))
+
+
 def noise_warnings(step: str, joint_names: Sequence[str], solved: Estimate) -> tuple[str, ...]:
     """Says so where residuals are no noise, for then the standard deviations are too small, and by how much at least."""
     found = [
         (name, rho) for name, rho in zip(joint_names, solved.correlation, strict=True) if rho > CORRELATED
     ]
-    if not found and solved.optimism < OPTIMISTIC:
+    factor = noise_factor(solved)
+    if factor == 1.0:
         return ()
-    factors = [np.sqrt((1.0 + rho) / (1.0 - min(rho, 0.999))) for _, rho in found]
-    factor = max([*factors, solved.optimism])
     where = ", ".join(f"{name} ({rho:.2f})" for name, rho in found) or "all joints together"
     return (
         f"{step}: the residual is no noise but correlated from sample to sample, joint(s) {where}: the model lacks an "
@@ -165,78 +213,115 @@ OPTIMISTIC = 1.7
 """Robust over white standard deviation above which the latter is called too small."""
 
 
-class _Solved:
-    """One weighted solution by truncated SVD of the column-scaled rows."""
+NUMERICAL = 1e-9
+"""Of the largest column: what rounding alone leaves of one."""
 
-    def __init__(self, columns: Array, target: Array, weights: Array, options: FitOptions) -> None:
+
+class _Solved:
+    """One weighted solution.
+
+    Unknowns are y with v = v0 + T y, scaled so that whatever is no more than noise has a singular value below one:
+    T T^T is the inverse of `_floor`. Directions with singular values above one are the data's, the others stay on the
+    prior.
+    """
+
+    def __init__(
+        self,
+        columns: Array,
+        target: Array,
+        weights: Array,
+        options: FitOptions,
+        prior: Prior | None,
+        level: float,
+    ) -> None:
         self.options = options
         self.columns = columns
         self.weights = weights
         l = columns.shape[2]
-        rows = (columns * weights[:, :, None]).reshape(-1, l)
-        self.scale = np.linalg.norm(rows, axis=0)
-        self.scale[self.scale < 1e-300] = 1.0
-        self.left, self.singular, right = np.linalg.svd(rows / self.scale, full_matrices=False)
-        self.right = right.T
-        largest = self.singular[0] if len(self.singular) else 0.0
-        self.rank = int(np.sum(self.singular > options.rank_tolerance * largest)) if largest > 0 else 0
-        self.scaled = self.pseudo_inverse((target * weights).reshape(-1))
-        unseen = np.ones(l) - np.sum(self.right[:, : self.rank] ** 2, axis=1)
-        self.identifiable = unseen < options.unseen_share
-        self.values = np.where(self.identifiable, self.scaled / self.scale, 0.0)
-        self.residual = target - columns @ (self.scaled / self.scale)
+        self.rows = (columns * weights[:, :, None]).reshape(-1, l)
+        factor = np.asarray(np.linalg.qr(self.rows, mode="r"))
+        factor = np.vstack([factor, np.zeros((l - len(factor), l))]) if len(factor) < l else factor
+        sizes = np.linalg.norm(factor, axis=0)
+        unit = np.where(sizes > 0, sizes, 1.0)
+        self.column_values = np.asarray(np.linalg.svd(factor / unit, compute_uv=False), dtype=np.float64)
+        start = np.zeros(l) if prior is None else prior.values
+        scale = 1.0 / unit if prior is None else prior.scale
+        chol = np.linalg.cholesky(self._floor(sizes * scale, scale, prior, level))
+        self.back = scale[:, None] * np.linalg.inv(chol).T
+        self.forth = chol.T / scale
+        _, self.singular, right = np.linalg.svd(factor @ self.back)
+        self.rank = int(np.sum(self.singular > 1.0))
+        directions = self.back @ right.T
+        self.right = right
+        self.inverse = directions[:, : self.rank] / self.singular[: self.rank]
+        self.unseen = directions[:, self.rank :]
+        left = target - columns @ start
+        self.left = self.rows @ self.inverse
+        self.coordinates = self.left.T @ (left * weights).reshape(-1)
+        self.values = start + self.inverse @ self.coordinates
+        self.residual = target - columns @ self.values
+        every = np.sum(directions**2, axis=1)
+        share = np.sum(self.unseen**2, axis=1) / np.where(every > 0, every, 1.0)
+        self.identifiable = share < options.unseen_share
+        self.directions = directions
 
-    def pseudo_inverse(self, rows: Array) -> Array:
-        kept = slice(0, self.rank)
-        projected = self.left[:, kept].T @ rows
-        inverse = 1.0 / self.singular[kept]
-        solution: Array = self.right[:, kept] @ (
-            inverse[:, None] * projected if rows.ndim == 2 else inverse * projected
-        )
-        return solution
+    def _floor(self, sizes: Array, scale: Array, prior: Prior | None, level: float) -> Array:
+        """(l, l), in the prior's units: the square of what a direction must exceed to be seen.
+
+        Noise in the columns, times the ratio asked for; the error of differentiation, a share of each column; and the
+        torque's noise, against the prior's scale.
+        """
+        options = self.options
+        largest = float(sizes.max(initial=0.0)) or 1.0
+        believable = 0.0 if prior is None else level / options.seen
+        floor = np.diag((options.rank_tolerance * sizes) ** 2 + max(believable, NUMERICAL * largest) ** 2)
+        if prior is None or prior.noise is None:
+            return floor
+        noise = (prior.noise * self.weights[:, :, None]).reshape(-1, len(sizes)) * scale
+        return np.asarray(floor + options.noise_ratio * noise.T @ noise)
 
     def estimate(self, consider: Consider | None) -> Estimate:
         l = self.columns.shape[2]
-        kept = slice(0, self.rank)
-        unit = self.right[:, kept] / self.singular[kept]
         freedom = max(int(np.count_nonzero(self.weights)) - self.rank, 1)
         weighted = self.residual * self.weights
         variance = float(np.sum(weighted**2)) / freedom
-        fit = variance * unit @ unit.T
+        fit = variance * self.inverse @ self.inverse.T
         considered = np.zeros((l, 0))
         total = fit
         if consider is not None and consider.columns.shape[2]:
             rows = (consider.columns * self.weights[:, :, None]).reshape(-1, consider.columns.shape[2])
-            considered = -self.pseudo_inverse(rows)
+            considered = -self.inverse @ (self.left.T @ rows)
             total = fit + considered @ consider.covariance @ considered.T
-            considered = considered / self.scale[:, None]
-        outer = np.outer(self.scale, self.scale)
-        return Estimate(
+        unit = np.sqrt(variance) or 1.0
+        found = Estimate(
             values=self.values,
-            covariance=fit / outer,
+            covariance=fit,
             considered=considered,
-            total_covariance=total / outer,
+            total_covariance=total,
+            seen=self.directions[:, : self.rank] * unit,
+            unseen=self.unseen * unit,
+            whitening=np.zeros((0, l)),
             identifiable=self.identifiable,
-            singular_values=self.singular,
+            singular_values=self.column_values,
             rank=self.rank,
             sigma=spread(self.residual, self.weights > 0),
             weights=self.weights,
             correlation=sample_correlation(self.residual, self.weights > 0),
             optimism=self._optimism(np.diag(fit), weighted),
         )
+        strength = np.where(np.arange(l) < self.rank, self.singular / noise_factor(found), 1.0)
+        return replace(found, whitening=strength[:, None] * (self.right @ self.forth) / unit)
 
     def _optimism(self, white: Array, weighted: Array) -> float:
         """Cluster-robust over white standard deviation (Liang and Zeger 1986): clusters are stretches of time."""
         count = min(self.options.clusters, len(weighted) // 4)
         if count < 5 or not self.rank:
             return 1.0
-        l, n = self.columns.shape[2], self.columns.shape[1]
-        kept = slice(0, self.rank)
-        scores = self.left[:, kept] * weighted.reshape(-1, 1)
+        n = self.columns.shape[1]
+        scores = self.left * weighted.reshape(-1, 1)
         cluster = np.repeat(np.arange(len(weighted)) * count // len(weighted), n)
         sums = np.zeros((count, self.rank))
         np.add.at(sums, cluster, scores)
-        unit = self.right[:, kept] / self.singular[kept]
-        robust = np.sum((sums @ unit.T) ** 2, axis=0) * count / (count - 1)
-        seen = np.flatnonzero((white > 0) & self.identifiable[:l])
+        robust = np.sum((sums @ self.inverse.T) ** 2, axis=0) * count / (count - 1)
+        seen = np.flatnonzero((white > 0) & self.identifiable)
         return float(np.sqrt(np.median(robust[seen] / white[seen]))) if len(seen) else 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +32,6 @@ class MotorResult:
 
     torque_constant: Array
     std: Array
-    quality: StepQuality
     warnings: tuple[str, ...]
 
     @property
@@ -47,16 +46,12 @@ def calibrate_motors(chain: Chain, runs: Sequence[MotorRun], options: StepOption
     """
     n = len(chain)
     constant, std = np.full(n, np.nan), np.full(n, np.nan)
-    columns: dict[str, JointQuality] = {}
-    samples: list[Sample] = []
     warnings: list[str] = []
     for k, joint in enumerate(chain.joints):
-        own = [run for run in runs if run.joint == joint.name]
-        if not own:
+        sweeps = _sweeps(chain, k, runs, options)
+        if sweeps is None:
             continue
-        angle, torque, current = (
-            np.concatenate(x) for x in zip(*(_added(chain, k, r, options) for r in own), strict=True)
-        )
+        angle, torque, current = sweeps
         out = held_out(len(angle), options.split)
         slope, error = _slope(torque[~out], current[~out])
         if not abs(slope) > SMALLEST_SHARE * error:
@@ -66,16 +61,44 @@ def calibrate_motors(chain: Chain, runs: Sequence[MotorRun], options: StepOption
             )
             continue
         constant[k], std[k] = 1.0 / slope, error / slope**2
-        measured = constant[k] * current
-        columns[joint.name] = JointQuality(
-            quality(torque[~out], measured[~out]), quality(torque[out], measured[out])
-        )
-        samples.append(Sample(joint.name, "position [rad]", angle, measured, torque, out))
         if slope < 0:
             warnings.append(
                 f"joint {joint.name}: torque constant is negative: the current's sign is against the joint's"
             )
-    return MotorResult(constant, std, StepQuality("Motor", columns, tuple(samples)), tuple(warnings))
+    return MotorResult(constant, std, tuple(warnings))
+
+
+def judge_motors(
+    chain: Chain, runs: Sequence[MotorRun], options: StepOptions, constants: Mapping[str, float]
+) -> StepQuality:
+    """The known load's torque against what these constants (N m/A, by joint name) say of the current that it adds."""
+    joints: dict[str, JointQuality] = {}
+    samples: list[Sample] = []
+    for k, joint in enumerate(chain.joints):
+        sweeps = _sweeps(chain, k, runs, options)
+        if sweeps is None or joint.name not in constants:
+            continue
+        angle, torque, current = sweeps
+        measured = constants[joint.name] * current
+        out = held_out(len(angle), options.split)
+        joints[joint.name] = JointQuality(
+            quality(torque[~out], measured[~out]), quality(torque[out], measured[out])
+        )
+        samples.append(Sample(joint.name, "position [rad]", angle, measured, torque, out))
+    return StepQuality("Motor", joints, tuple(samples))
+
+
+def _sweeps(
+    chain: Chain, k: int, runs: Sequence[MotorRun], options: StepOptions
+) -> tuple[Array, Array, Array] | None:
+    """Angle, load torque and added current of all of a joint's runs; None where it has none."""
+    own = [run for run in runs if run.joint == chain.joints[k].name]
+    if not own:
+        return None
+    angle, torque, current = (
+        np.concatenate(x) for x in zip(*(_added(chain, k, run, options) for run in own), strict=True)
+    )
+    return angle, torque, current
 
 
 def _slope(x: Array, y: Array) -> tuple[float, float]:

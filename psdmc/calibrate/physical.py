@@ -7,10 +7,14 @@ is positive. Then the mass matrix is positive definite everywhere, and forward d
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.calibrate.log import Array
 from psdmc.dynamics.parameters import inertia_matrix, second_moments
@@ -19,65 +23,81 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK
 
 SETTLING = 1e-6
-"""Pull beside a squared standard deviation: settles what theta_b leaves open, moves nothing that it fixes."""
+"""Pull towards the prior's standard parameters (SI, squared) beside a squared standard deviation: settles what theta_b
+leaves open, moves nothing that it fixes."""
 
 
 @dataclass(frozen=True, slots=True)
 class PhysicalOptions:
-    """How far inside.
+    """How far inside, and how near to the file's bodies.
 
-    smallest        eigenvalue of each link's pseudo-inertia, relative to the largest mass and length scale 0.1 m
+    smallest        eigenvalue of each link's pseudo-inertia, kg with lengths in units of 0.1 m
     smallest_drive  kg m^2, of each drive inertia that is a parameter
-    pull            weight of small parameters beside the data's: squares of x (SI) against the share of the torque's
-                    power that is left unexplained. Settles what the data barely see
+    known_body      variances that one unit of divergence from the file's body costs (Lee, Wensing, Park 2020: the
+                    divergence of one distribution of mass from another, the same in any unit and frame)
+    unknown_body    likewise from an ordinary body, where the file has none: enough to keep off the boundary
     """
 
     smallest: float = 1e-6
     smallest_drive: float = 1e-4
-    pull: float = 1e-5
+    known_body: float = 1.0
+    unknown_body: float = 1e-2
+
+
+ORDINARY_BODY = (1.0, 1.0, 1.0, 5.0)
+"""Diagonal of a pseudo-inertia: 5 kg spread over 0.1 m."""
+THIN_BODY = 1e-3
+"""Eigenvalues of the file's pseudo-inertias count as at least this share of the largest: some published bodies are no
+distribution of mass, and others are points."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Physical:
-    """theta_b = B x of physical standard parameters x (11 n,), and all values of the fit they are part of."""
+    """All values of the fit, theta_b first; theta_b = B x of physical standard parameters x (11 n,).
+
+    distance  from the unconstrained values, in standard deviations
+    """
 
     x: Array
-    theta_b: Array
     values: Array
+    distance: float
 
 
-def physically_consistent(
+def nearest_physical(
     model: DynamicsModel,
-    columns: Array,
-    target: Array,
-    weights: Array,
+    values: Array,
+    whitening: Array,
+    never_negative: NDArray[np.bool_] | None = None,
     options: PhysicalOptions | None = None,
-    unit_loss: float | None = None,
 ) -> Physical:
-    """The weighted least-squares fit among parameters that a real robot could have.
+    """The parameters that a real robot could have, nearest to an estimate of the whole vector.
 
-    columns    (N, n, l + extra)  the first l belong to theta_b, the others are free;  target, weights (N, n)
-    unit_loss  sum of squares that counts as one beside `pull`; None: the target's
-    InputError where cvxpy is missing or no solution is found.
+    values          (l + k,)  theta_b and whatever was estimated with it, friction and offsets
+    whitening       (l + k, l + k)  W: the cost of v is |W (v - values)|^2, in variances (Estimate.whitening)
+    never_negative  (l + k,)  entries that may not be negative
+    For a linear fit that cost is what v adds to its sum of squares: one problem, its weights, and the prior where the
+    data see nothing. InputError where cvxpy is missing or no solution is found.
     """
     options = options or PhysicalOptions()
-    cp: Any = _cvxpy()
-    l = model.l
-    span: Array = model.chain.parameter_span
-    unit = np.linalg.norm((columns * weights[:, :, None]).reshape(-1, columns.shape[2]), axis=0)
-    unit[unit == 0] = 1.0
-    rows = (columns * weights[:, :, None]).reshape(-1, columns.shape[2]) / unit
-    factor: Array = np.linalg.qr(np.column_stack([rows, (target * weights).reshape(-1)]), mode="r")  # type: ignore[assignment]
-    free = cp.Variable(columns.shape[2] - l)
+    cp: Any = require_cvxpy()
+    l, span = model.l, model.chain.parameter_span
     inner = cp.Variable(span.shape[1])
+    extra = cp.Variable(len(values) - l) if len(values) > l else None
     x = span @ inner
-    values = cp.hstack([cp.multiply(unit[:l], model.B @ x), free])
-    loss = cp.sum_squares(factor[:, :-1] @ values - factor[:, -1])
-    size = float(np.linalg.norm(factor[:, -1])) ** 2 if unit_loss is None else unit_loss
-    constraints = [
-        c for link in range(len(model.chain)) for c in _link_constraints(cp, model, x, link, options)
-    ]
-    problem = cp.Problem(cp.Minimize(loss / size + options.pull * cp.sum_squares(inner)), constraints)
+    theta = model.B @ x
+    vector = theta if extra is None else cp.hstack([theta, extra])
+    goal = whitening @ values
+    loss = cp.sum_squares(whitening @ vector - goal)
+    constraints, divergence = [], 0.0
+    for link in range(len(model.chain)):
+        own, away = _link_terms(cp, model, x, link, options)
+        constraints += own
+        divergence += away
+    bounded = np.zeros(len(values), dtype=bool) if never_negative is None else never_negative
+    if extra is not None and bounded[l:].any():
+        constraints.append(extra[np.flatnonzero(bounded[l:])] >= 0)
+    settle = SETTLING * cp.sum_squares(inner - _known_inner(model))
+    problem = cp.Problem(cp.Minimize(loss + settle + divergence), constraints)
     with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; what matters is checked below
         warnings.simplefilter("ignore", UserWarning)
         problem.solve(solver=cp.CLARABEL)
@@ -85,8 +105,24 @@ def physically_consistent(
         raise InputError(f"physical consistency: clarabel found no solution ({problem.status})")
     found = np.asarray(span @ inner.value)
     _require_physical(model, found)
-    theta_b = model.B @ found
-    return Physical(found, theta_b, np.concatenate([theta_b, np.asarray(free.value) / unit[l:]]))
+    rest = np.zeros(0) if extra is None else np.asarray(extra.value)
+    rest = np.where(bounded[l:], np.maximum(rest, 0.0), rest)
+    whole = np.concatenate([model.B @ found, rest])
+    return Physical(found, whole, float(np.linalg.norm(whitening @ (whole - values))))
+
+
+def whitening_of(covariance: Array) -> Array:
+    """(m, m) W with W^T W the inverse of a covariance, by way of its correlations."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    correlation = covariance / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)) / scale)
+
+
+def _known_inner(model: DynamicsModel) -> Array:
+    """The span's coordinates of the file's standard parameters; zero where it has none."""
+    span = model.chain.parameter_span
+    known = np.nan_to_num(model.chain.parameters.reshape(-1))
+    return np.asarray(np.linalg.lstsq(span, known, rcond=None)[0])
 
 
 def _require_physical(model: DynamicsModel, x: Array) -> None:
@@ -107,45 +143,46 @@ ROUNDING = 1e-9
 """Negative eigenvalue of a pseudo-inertia, relative to its largest entry, that counts as zero."""
 
 
-def nearest_physical(
-    model: DynamicsModel, theta_b: Array, covariance: Array, options: PhysicalOptions | None = None
-) -> Physical:
-    """The physical base parameters nearest to an estimate, in units of its standard deviations (Mahalanobis)."""
-    options = replace(options or PhysicalOptions(), pull=SETTLING)
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
-    correlation = covariance / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
-    whitened = np.linalg.inv(np.linalg.cholesky(correlation)) / scale
-    return physically_consistent(
-        model, whitened[:, None, :], (whitened @ theta_b)[:, None], np.ones((len(scale), 1)), options, 1.0
-    )
-
-
-def _link_constraints(
+def _link_terms(
     cp: Any, model: DynamicsModel, x: Any, link: int, options: PhysicalOptions
-) -> list[Any]:
-    """Pseudo-inertia above its bound; a link that the chain assumes massless has none."""
+) -> tuple[list[Any], Any]:
+    """Constraints, pseudo-inertia above its bound, and divergence from the file's body; a link that the chain assumes
+    massless has neither."""
     start = PARAMETERS_PER_LINK * link
     span: Array = model.chain.parameter_span
     constraints: list[Any] = []
     if np.any(span[start + 10]):
         constraints.append(x[start + 10] >= options.smallest_drive)
     if not np.any(span[start]):
-        return constraints
-    m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = (x[start + k] for k in range(10))
-    half = 0.5 * (ixx + iyy + izz)
-    # metres to tenths: entries of one size, which the solver likes
-    t = 10.0
-    matrix = cp.bmat(
-        [
-            [t * t * (half - ixx), -t * t * ixy, -t * t * ixz, t * hx],
-            [-t * t * ixy, t * t * (half - iyy), -t * t * iyz, t * hy],
-            [-t * t * ixz, -t * t * iyz, t * t * (half - izz), t * hz],
-            [t * hx, t * hy, t * hz, m],
-        ]
-    )
+        return constraints, 0.0
     held = [k for k in range(4) if not _vanishes(span, start, k)]
-    block = matrix[held, :][:, held] if len(held) < 4 else matrix
-    return [*constraints, block >> options.smallest * np.eye(len(held))]
+    body = cp.bmat(_pseudo_inertia([x[start + k] for k in range(10)]))
+    block = body[held, :][:, held] if len(held) < 4 else body
+    near, weight = _reference_body(model.chain.parameters[link], held, options)
+    divergence = cp.trace(np.linalg.inv(near) @ block) - cp.log_det(block)
+    return [*constraints, block >> options.smallest * np.eye(len(held))], weight * divergence
+
+
+def _pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
+    """Of m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz; metres to tenths: entries of one size, which the solver likes."""
+    m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = link
+    half = 0.5 * (ixx + iyy + izz)
+    t = 10.0
+    return [
+        [t * t * (half - ixx), -t * t * ixy, -t * t * ixz, t * hx],
+        [-t * t * ixy, t * t * (half - iyy), -t * t * iyz, t * hy],
+        [-t * t * ixz, -t * t * iyz, t * t * (half - izz), t * hz],
+        [t * hx, t * hy, t * hz, m],
+    ]
+
+
+def _reference_body(link: Array, held: list[int], options: PhysicalOptions) -> tuple[Array, float]:
+    """The body that a link should resemble, and how much that counts: the file's, or an ordinary one."""
+    if not np.isfinite(link[:10]).all() or not link[0] > 0:
+        return np.diag([ORDINARY_BODY[k] for k in held]), options.unknown_body
+    body = np.array(_pseudo_inertia(link[:10].tolist()))[np.ix_(held, held)]
+    values, axes = np.linalg.eigh(body)
+    return np.asarray((axes * np.maximum(values, THIN_BODY * values[-1])) @ axes.T), options.known_body
 
 
 def _vanishes(span: Array, start: int, k: int) -> bool:
@@ -158,11 +195,12 @@ def _vanishes(span: Array, start: int, k: int) -> bool:
     return not np.any(span[moments[k]]) and not np.any(np.abs(own) > 1e-12)
 
 
-def _cvxpy() -> Any:
-    try:
-        import cvxpy
-    except ImportError as error:
+def require_cvxpy() -> Any:
+    """cvxpy; InputError with the remedy where it or its solver is not installed."""
+    missing = [name for name in ("cvxpy", "clarabel") if find_spec(name) is None]
+    if missing:
         raise InputError(
-            "physical consistency needs cvxpy and clarabel", "pip install 'psdmc[calibrate]'"
-        ) from error
-    return cvxpy
+            f"physical consistency needs {' and '.join(missing)}, not installed here",
+            "pip install 'psdmc[calibrate]', or see the unconstrained fit with --no-physical",
+        )
+    return import_module("cvxpy")

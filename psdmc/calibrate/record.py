@@ -6,20 +6,27 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psdmc.calibrate.four_steps import FourSteps
-from psdmc.calibrate.linear_fit import LinearResult
+from psdmc.calibrate.linear_fit import LinearOptions, LinearResult
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.lugre import PARAMETERS, UNITS
-from psdmc.calibrate.steps import StepQuality
+from psdmc.calibrate.motor import MotorResult
+from psdmc.calibrate.motor_model import Motors
+from psdmc.calibrate.prediction import FrictionRunConstants, Prediction
+from psdmc.calibrate.steps import CalibrationOptions, StepOptions, StepQuality
+from psdmc.calibrate.visibility import IDENTIFIED, Visibility, visibility, visibility_warnings, weak_notes
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import base_parameters
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterRow:
-    """One base parameter of table 4; std is infinite and value the model's own (or zero) where unidentifiable."""
+    """One base parameter of table 4.
+
+    std           infinite where the data do not fix it by itself; value then as near to the prior as they allow
+    identifiable  whether `visibility` is "identified": fixed by itself, to less than half of its value
+    """
 
     name: str
     group: str
@@ -28,6 +35,7 @@ class ParameterRow:
     unit: str
     equation: str
     identifiable: bool
+    visibility: str = IDENTIFIED
 
     @property
     def relative(self) -> float:
@@ -44,16 +52,19 @@ class NumberRow:
     std: float
     unit: str
     seen: bool = True
+    visibility: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
     """Everything a calibration hands on.
 
-    model     the calibrated model, its provenance carrying `numbers`
-    motors    torque constants; friction: seven per joint, or Coulomb, viscous and offset
-    steps     table 3's columns
-    facts     plain values: ranks, condition numbers, singular values, delay, options
+    model       the calibrated model, its provenance carrying these numbers
+    motors      torque constants; friction: seven per joint, or Coulomb, viscous and offset
+    steps       table 3's columns, by what the model's file holds (delivered.delivered_quality)
+    prediction  what else a prediction needs
+    notes       what a reader should know and need not worry about
+    facts       plain values: ranks, condition numbers, singular values, delay, options
     """
 
     robot: str
@@ -66,6 +77,8 @@ class Calibration:
     steps: tuple[StepQuality, ...]
     warnings: tuple[str, ...]
     facts: dict[str, Any] = field(default_factory=dict)
+    prediction: Prediction | None = None
+    notes: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Plain values; numbers that are not finite become null."""
@@ -83,6 +96,7 @@ class Calibration:
                     "unit": row.unit,
                     "equation": row.equation,
                     "identifiable": row.identifiable,
+                    "visibility": row.visibility,
                 }
                 for row in self.parameters
             ],
@@ -90,6 +104,8 @@ class Calibration:
             "friction": [_number(row) for row in self.friction],
             "quality": {step.step: _quality(step) for step in self.steps},
             "warnings": list(self.warnings),
+            "notes": list(self.notes),
+            "prediction": None if self.prediction is None else self.prediction.as_json(),
             "facts": self.facts,
         }
 
@@ -106,6 +122,7 @@ def _number(row: NumberRow) -> dict[str, Any]:
         "std": _finite(row.std),
         "unit": row.unit,
         "seen": row.seen,
+        "visibility": row.visibility,
     }
 
 
@@ -119,13 +136,16 @@ def _quality(step: StepQuality) -> dict[str, Any]:
     }
 
 
-def four_step_record(model: DynamicsModel, found: FourSteps) -> Calibration:
-    """The record of a campaign."""
+def four_step_record(
+    model: DynamicsModel, found: FourSteps, theta_b: Array, options: CalibrationOptions
+) -> Calibration:
+    """The record of a campaign with these base parameters; its quality is still to be found."""
     inertial, gravity = found.inertial, found.gravity
     groups = ["inertial"] * model.l
     for k in gravity.split.pivots:
         groups[int(k)] = "gravity"
-    theta = _kept(model, inertial.theta_b, inertial.identifiable)
+    names = [f"theta_{k + 1}" for k in range(model.l)]
+    seen = visibility(names, theta_b, inertial.std, inertial.seen, inertial.unseen, _kept_at(model))
     facts = {
         "delay_s": found.friction.delay,
         "gravity_rank": gravity.estimate.rank,
@@ -134,114 +154,125 @@ def four_step_record(model: DynamicsModel, found: FourSteps) -> Calibration:
         "inertial_rank": inertial.estimate.rank,
         "inertial_condition": inertial.estimate.condition,
         "inertial_singular_values": inertial.estimate.singular_values.tolist(),
-        "residual_correlation": dict(
-            zip(model.joint_names, inertial.estimate.correlation.tolist(), strict=True)
-        ),
+        "residual_correlation": _by_joint(model, inertial.estimate.correlation),
     }
-    steps = (gravity.quality, found.friction.quality, inertial.inertial, inertial.everything)
-    return _with_model(
+    steps = {
+        "motor": options.motor,
+        "gravity": options.gravity,
+        "friction": options.friction,
+        "inertial": options.inertial,
+    }
+    runs = {
+        name: FrictionRunConstants(joint.inertia, joint.offset, joint.delay)
+        for name, joint in found.friction.joints.items()
+    }
+    return with_model(
         Calibration(
             robot=model.chain.name,
             method="four steps",
             joint_names=model.joint_names,
             model=model,
-            parameters=_parameter_rows(model, theta, inertial.std, groups),
-            motors=_motor_rows(model, found),
+            parameters=_parameter_rows(model, theta_b, inertial.std, groups, seen),
+            motors=_motor_rows(model, found.motors, found.motor),
             friction=_lugre_rows(model, found),
-            steps=steps if found.motor is None else (found.motor.quality, *steps),
-            warnings=found.warnings,
+            steps=(),
+            warnings=(*found.warnings, *visibility_warnings("inertial", names, seen)),
             facts=facts,
+            prediction=Prediction("lugre", steps, runs=runs),
+            notes=weak_notes("inertial", names, seen),
         ),
-        theta,
+        theta_b,
     )
 
 
 def linear_record(
-    model: DynamicsModel,
-    found: LinearResult,
-    theta_b: Array | None = None,
-    quality: StepQuality | None = None,
+    model: DynamicsModel, found: LinearResult, values: Array, options: LinearOptions
 ) -> Calibration:
-    """The record of a linear fit; theta_b and quality of its physically consistent version, where there is one."""
-    values = found.theta_b if theta_b is None else theta_b
-    seen = found.identifiable | (theta_b is not None)
-    theta = _kept(model, values, seen)
+    """The record of a linear fit with these values of the whole vector; its quality is still to be found."""
+    problem, solved = found.problem, found.estimate
+    kept_at = [*_kept_at(model), *["zero"] * (len(values) - model.l)]
+    seen = visibility(problem.names, values, solved.std, solved.seen, solved.unseen, kept_at)
     facts = {
-        "rank": found.estimate.rank,
-        "condition": found.estimate.condition,
-        "singular_values": found.estimate.singular_values.tolist(),
-        "physically_consistent": theta_b is not None,
-        "residual_correlation": dict(
-            zip(model.joint_names, found.estimate.correlation.tolist(), strict=True)
-        ),
+        "rank": solved.rank,
+        "unknowns": len(values),
+        "condition": solved.condition,
+        "singular_values": solved.singular_values.tolist(),
+        "residual_correlation": _by_joint(model, solved.correlation),
     }
+    each = [(joint, name) for joint in model.joint_names for name in problem.friction]
     friction = tuple(
         NumberRow(
-            joint, name, float(found.friction[k, j]), float(found.friction_std[k, j]), _friction_unit(name)
+            joint,
+            name,
+            float(values[k]),
+            float(solved.std[k]),
+            _friction_unit(name),
+            seen.words[k] == IDENTIFIED,
+            seen.words[k],
         )
-        for k, joint in enumerate(model.joint_names)
-        for j, name in enumerate(found.friction_names)
+        for k, (joint, name) in enumerate(each, start=model.l)
     )
-    return _with_model(
+    step = StepOptions(options.filter, options.split, options.fit)
+    return with_model(
         Calibration(
             robot=model.chain.name,
-            method="linear fit, physically consistent" if theta_b is not None else "linear fit",
+            method="linear fit",
             joint_names=model.joint_names,
             model=model,
-            parameters=_parameter_rows(model, theta, found.std, ["all"] * model.l),
-            motors=(),
+            parameters=_parameter_rows(model, values, solved.std, ["all"] * model.l, seen),
+            motors=_motor_rows(model, found.motors, None),
             friction=friction,
-            steps=(found.quality if quality is None else quality,),
-            warnings=found.warnings,
+            steps=(),
+            warnings=(*found.warnings, *visibility_warnings("linear fit", problem.names, seen)),
             facts=facts,
+            prediction=Prediction(
+                "linear", {"all": step}, options.sign_speed, options.exponents, options.offset
+            ),
+            notes=weak_notes("linear fit", problem.names, seen),
         ),
-        theta,
+        values[: model.l],
     )
 
 
-def with_theta(record: Calibration, theta_b: Array, warnings: tuple[str, ...] = ()) -> Calibration:
-    """The same calibration with other base parameters: the physically consistent ones nearest to what was found."""
-    rows = tuple(replace(row, value=float(v)) for row, v in zip(record.parameters, theta_b, strict=True))
-    method = f"{record.method}, physically consistent"
-    changed = replace(record, method=method, parameters=rows, warnings=(*record.warnings, *warnings))
-    return _with_model(changed, theta_b)
+def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration:
+    """The record whose model carries its numbers as they now are; with these base parameters, where given."""
+    provenance = {**record.model.provenance, "calibration": record.as_json()}
+    theta = record.model.theta_b if theta_b is None else theta_b
+    return replace(record, model=replace(record.model, theta_b=theta, provenance=provenance))
 
 
-def _kept(model: DynamicsModel, theta_b: Array, identifiable: NDArray[np.bool_]) -> Array:
-    """What the data do not see stays as the model has it, or zero."""
-    own = np.zeros(model.l) if model.theta_b is None else model.theta_b
-    return np.where(identifiable, theta_b, own)
+def _kept_at(model: DynamicsModel) -> list[str]:
+    return ["zero" if model.theta_b is None else "the file's value"] * model.l
 
 
-def _with_model(record: Calibration, theta_b: Array) -> Calibration:
-    numbers = record.as_json()
-    provenance = {**record.model.provenance, "calibration": numbers}
-    return replace(record, model=replace(record.model, theta_b=theta_b, provenance=provenance))
+def _by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:
+    return dict(zip(model.joint_names, values.tolist(), strict=True))
 
 
 def _parameter_rows(
-    model: DynamicsModel, theta: Array, std: Array, groups: list[str]
+    model: DynamicsModel, theta: Array, std: Array, groups: list[str], seen: Visibility
 ) -> tuple[ParameterRow, ...]:
     return tuple(
         ParameterRow(
             name=f"theta_{k + 1}",
             group=groups[k],
             value=float(theta[k]),
-            std=float(std[k]),
+            std=float(std[k]) if seen.determined[k] else float("inf"),
             unit=parameter.unit,
             equation=parameter.equation,
-            identifiable=bool(np.isfinite(std[k])),
+            identifiable=seen.words[k] == IDENTIFIED,
+            visibility=seen.words[k],
         )
         for k, parameter in enumerate(base_parameters(model))
     )
 
 
-def _motor_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
+def _motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) -> tuple[NumberRow, ...]:
     """None where torques were logged; a constant that was given, not identified, is marked as not seen."""
-    constants, relative = found.motors.torque_constant, found.motors.relative_std
-    if found.motor is None and np.all(constants == 1.0):
+    constants, relative = motors.torque_constant, motors.relative_std
+    if step is None and np.all(constants == 1.0):
         return ()
-    seen = np.zeros(model.n, dtype=bool) if found.motor is None else found.motor.identified
+    seen = np.zeros(model.n, dtype=bool) if step is None else step.identified
     return tuple(
         NumberRow(name, "torque_constant", float(value), float(abs(value) * share), "Nm/A", bool(known))
         for name, value, share, known in zip(model.joint_names, constants, relative, seen, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from psdmc.calibrate.filter import FilterOptions, SplitOptions
 from psdmc.calibrate.least_squares import FitOptions
 from psdmc.calibrate.log import Array, Log
-from psdmc.calibrate.quality import Quality
+from psdmc.calibrate.quality import Quality, quality
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,3 +134,27 @@ class StepQuality:
     step: str
     joints: dict[str, JointQuality]
     samples: tuple[Sample, ...] = field(default_factory=tuple)
+
+
+def judged(
+    step: str,
+    joint_names: Sequence[str],
+    x: Array,
+    measured: Array,
+    predicted: Array,
+    out: NDArray[np.bool_],
+    use: NDArray[np.bool_] | None = None,
+    abscissa: str = "time [s]",
+) -> StepQuality:
+    """Quality and samples of every joint.
+
+    x (N,), measured and predicted (N, n), out (N,) held-out rows; use (N, n) entries that count, None: all
+    """
+    joints: dict[str, JointQuality] = {}
+    samples: list[Sample] = []
+    for k, name in enumerate(joint_names):
+        rows = np.arange(len(x)) if use is None else np.flatnonzero(use[:, k])
+        m, p, is_out = measured[rows, k], predicted[rows, k], out[rows]
+        joints[name] = JointQuality(quality(m[~is_out], p[~is_out]), quality(m[is_out], p[is_out]))
+        samples.append(Sample(name, abscissa, x[rows], m, p, is_out))
+    return StepQuality(step, joints, tuple(samples))

@@ -105,8 +105,12 @@ def calibrate(
         Path | None, typer.Option(metavar="DIR", help="write friction and motors as C there")
     ] = None,
     physical: Annotated[
-        bool, typer.Option("--physical", help="base parameters of a real mass distribution only")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--physical/--no-physical",
+            help="only what a robot can have: bodies of mass, friction not negative (the default); or the bare fit",
+        ),
+    ] = None,
     torque_constants: Annotated[
         str, typer.Option(metavar="JOINT=KT,...", help="N m/A, for plain logs that hold currents")
     ] = "",
@@ -118,13 +122,17 @@ def calibrate(
             logs,
             output,
             report,
-            CalibrateOptions(physical=physical),
+            CalibrateOptions(physical=physical is not False),
             _torque_constants(torque_constants),
             actuators,
             progress,
         )
     print_accuracy(record)
     print(f"{output}: calibrated model")
+    if physical:
+        print("note: --physical is the default now and need not be given")
+    for note in record.notes:
+        print(f"note: {note}")
     for warning in record.warnings:
         print(f"warning: {warning}")
 

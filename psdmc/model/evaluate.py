@@ -86,7 +86,7 @@ def torques_for(model: DynamicsModel, theta: Array, q: ArrayLike, qd: ArrayLike,
     """Inverse dynamics with base parameters (l,) that are not the model's own."""
     shape, arrays = states(model, q=q, qd=qd, qdd=qdd)
     if model.P is None:
-        return _by_newton_euler(model, theta, arrays).reshape(*shape, model.n)
+        return newton_euler_torques(model, theta, arrays).reshape(*shape, model.n)
     weights = _weights(model.P, theta)
     return _by_chunks(model, arrays, lambda y: (weights @ y).T).reshape(*shape, model.n)
 
@@ -147,7 +147,8 @@ def _by_chunks(model: DynamicsModel, arrays: list[Array], result: Callable[[Arra
     return np.concatenate(parts)
 
 
-def _by_newton_euler(model: DynamicsModel, theta: Array, arrays: list[Array]) -> Array:
+def newton_euler_torques(model: DynamicsModel, theta: Array, arrays: list[Array]) -> Array:
+    """tau (states, n) of base parameters (l,) along q, qd, qdd (states, n): quick for any p, E and P are not used."""
     x = model.representative @ theta
     q, qd, qdd = (list(array.T) for array in arrays)
     chain = model.chain
