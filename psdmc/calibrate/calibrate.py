@@ -95,7 +95,7 @@ def calibrate_campaign(
         return plain
     progress("physical consistency")
     factor = max(noise_factor(found.gravity.estimate), noise_factor(inertial.estimate))
-    whitening = whitening_of(factor**2 * inertial.covariance + inertial.unseen @ inertial.unseen.T)
+    whitening = whitening_of(factor**2 * inertial.covariance + inertial.prior_covariance)
     near = nearest_physical(model, inertial.theta_b, whitening, None, options.consistency)
     return judged_record(record(near.values), runs, plain, near.distance)
 

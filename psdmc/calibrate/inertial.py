@@ -38,20 +38,27 @@ class InertialResult:
     covariance   (l, l)  with the uncertainty of torque constants, gravity and friction
     identifiable (l,)
     estimate     of psi, the parameters that gravity does not show
-    seen, unseen (l, r), (l, l - r)  directions of theta_b that all runs together show and do not show (Estimate)
+    unseen       (l, k)  directions of theta_b that no run shows, SI, each as long as is believable
+    scale        (l,)    believable size of each base parameter
     """
 
     theta_b: Array
     covariance: Array
     identifiable: NDArray[np.bool_]
     estimate: Estimate
-    seen: Array
     unseen: Array
+    scale: Array
     warnings: tuple[str, ...]
 
     @property
+    def prior_covariance(self) -> Array:
+        """(l, l) what the prior leaves open where no run sees anything."""
+        return np.asarray(self.estimate.prior_std**2 * self.unseen @ self.unseen.T)
+
+    @property
     def std(self) -> Array:
-        return np.where(self.identifiable, np.sqrt(np.maximum(np.diag(self.covariance), 0.0)), np.inf)
+        variance = np.diag(self.covariance) + np.diag(self.prior_covariance)
+        return np.where(self.identifiable, np.sqrt(np.maximum(variance, 0.0)), np.inf)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,9 +95,9 @@ def calibrate_inertial(
     out = held_out(len(target), options.split)
     consider = _considered(motors, gravity, friction, rows)
     kept = np.repeat(~out[:, None], len(chain), axis=1)
-    scale = base_scale(chain, model, torque_sizes(rows.torque), file_theta)[split.rest]
-    start = np.zeros(len(scale)) if file_theta is None else file_theta[split.rest]
-    prior = Prior(start, scale, rows.noise @ split.from_psi())
+    scale = base_scale(chain, model, torque_sizes(rows.torque), file_theta)
+    start = np.zeros(len(split.rest)) if file_theta is None else file_theta[split.rest]
+    prior = Prior(start, scale[split.rest], rows.noise @ split.from_psi())
     solved = estimate(rows.columns @ split.from_psi(), target, options.fit, consider, kept, prior)
     theta_b = split.from_phi() @ gravity.estimate.values + split.from_psi() @ solved.values
     by_phi, by_psi = split.from_phi(), split.from_psi()
@@ -99,10 +106,15 @@ def calibrate_inertial(
         covariance=_combined(motors, gravity, friction, solved),
         identifiable=_identifiable(gravity, solved),
         estimate=solved,
-        seen=np.hstack([by_phi @ gravity.estimate.seen, by_psi @ solved.seen]),
-        unseen=np.hstack([by_phi @ gravity.estimate.unseen, by_psi @ solved.unseen]),
+        unseen=np.hstack([by_phi @ _believable(gravity.estimate), by_psi @ _believable(solved)]),
+        scale=scale,
         warnings=noise_warnings("inertial", chain.joint_names, solved),
     )
+
+
+def _believable(solved: Estimate) -> Array:
+    """Unseen directions, SI, as long as is believable."""
+    return np.asarray(solved.scale[:, None] * solved.unseen)
 
 
 def judge_inertial(

@@ -27,7 +27,8 @@ class FitOptions:
     noise_ratio     how many times stronger than noise alone a direction must be: at ten, noise in the columns shrinks
                     what is found by a tenth at most
     seen            standard deviation, in units of the prior's scale, from which the data no longer show a direction
-    unseen_share    share of a parameter in unseen directions from which it is unidentifiable
+    unseen_share    share (squared, in the prior's units) of a parameter in unseen directions from which it is
+                    unidentifiable
     clusters        contiguous stretches whose errors may be dependent, for the robust standard deviations
     """
 
@@ -75,7 +76,9 @@ class Estimate:
     covariance        (l, l)    of the fit alone, from residuals taken as white; none in unseen directions
     considered        (l, k)    change of `values` per unit of what was considered; k may be 0
     total_covariance  (l, l)    with what was considered
-    seen, unseen      (l, r), (l, l - r)  directions, in units of the parameters; a parameter's row is its share
+    unseen            (l, l - r)  orthonormal directions that the data do not show, in units of `scale`
+    scale             (l,)      the prior's, or the columns' where there is none
+    prior_std         of unseen directions, in units of `scale`; zero without a prior
     whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances: the data's where they see
                                 (widened by noise_factor), the prior's where not
     identifiable      (l,)      whether the data see the parameter by itself
@@ -91,8 +94,9 @@ class Estimate:
     covariance: Array
     considered: Array
     total_covariance: Array
-    seen: Array
     unseen: Array
+    scale: Array
+    prior_std: float
     whitening: Array
     identifiable: NDArray[np.bool_]
     singular_values: Array
@@ -105,13 +109,15 @@ class Estimate:
     @property
     def prior_covariance(self) -> Array:
         """(l, l) what the prior leaves open where the data see nothing."""
-        return np.asarray(self.unseen @ self.unseen.T)
+        directions = self.scale[:, None] * self.unseen
+        return np.asarray(self.prior_std**2 * directions @ directions.T)
 
     @property
     def std(self) -> Array:
-        """(l,) standard deviations with what was considered; infinite where unidentifiable."""
-        spread = np.sqrt(np.maximum(np.diag(self.total_covariance), 0.0))
-        return np.where(self.identifiable, spread, np.inf)
+        """(l,) standard deviations with what was considered and what unseen directions leave open; infinite where
+        unidentifiable."""
+        variance = np.diag(self.total_covariance) + np.diag(self.prior_covariance)
+        return np.where(self.identifiable, np.sqrt(np.maximum(variance, 0.0)), np.inf)
 
     @property
     def condition(self) -> float:
@@ -217,12 +223,15 @@ NUMERICAL = 1e-9
 """Of the largest column: what rounding alone leaves of one."""
 
 
-class _Solved:
-    """One weighted solution.
+ROUNDING = 1e-12
+"""Share of a parameter in shown directions that is none: its value is then the prior's to the last digit."""
 
-    Unknowns are y with v = v0 + T y, scaled so that whatever is no more than noise has a singular value below one:
-    T T^T is the inverse of `_floor`. Directions with singular values above one are the data's, the others stay on the
-    prior.
+
+class _Solved:
+    """One weighted solution, in units z of the prior: v = v0 + S z.
+
+    Directions in which the data are stronger than `_floor` are shown, the others hidden: hidden ones form a subspace,
+    in which z = 0; the rest of z is the least-squares solution.
     """
 
     def __init__(
@@ -247,23 +256,24 @@ class _Solved:
         start = np.zeros(l) if prior is None else prior.values
         scale = 1.0 / unit if prior is None else prior.scale
         chol = np.linalg.cholesky(self._floor(sizes * scale, scale, prior, level))
-        self.back = scale[:, None] * np.linalg.inv(chol).T
-        self.forth = chol.T / scale
-        _, self.singular, right = np.linalg.svd(factor @ self.back)
-        self.rank = int(np.sum(self.singular > 1.0))
-        directions = self.back @ right.T
-        self.right = right
-        self.inverse = directions[:, : self.rank] / self.singular[: self.rank]
-        self.unseen = directions[:, self.rank :]
+        by_prior = factor * scale
+        _, strength, right = np.linalg.svd(by_prior @ np.linalg.inv(chol).T)
+        self.rank = int(np.sum(strength > 1.0))
+        hidden = np.linalg.inv(chol).T @ right[self.rank :].T
+        basis = np.linalg.qr(hidden, mode="complete")[0]
+        self.unseen, shown = basis[:, : l - self.rank], basis[:, l - self.rank :]
+        self.scale = scale
+        self.prior_std = 0.0 if prior is None else options.seen
+        _, self.singular, turned = np.linalg.svd(by_prior @ shown, full_matrices=False)
+        self.inverse = scale[:, None] * (shown @ turned.T) / self.singular
+        self.forth = self.singular[:, None] * (turned @ shown.T) / scale
         left = target - columns @ start
         self.left = self.rows @ self.inverse
         self.coordinates = self.left.T @ (left * weights).reshape(-1)
-        self.values = start + self.inverse @ self.coordinates
+        share = np.sum(self.unseen**2, axis=1)
+        self.values = np.where(share > 1.0 - ROUNDING, start, start + self.inverse @ self.coordinates)
         self.residual = target - columns @ self.values
-        every = np.sum(directions**2, axis=1)
-        share = np.sum(self.unseen**2, axis=1) / np.where(every > 0, every, 1.0)
         self.identifiable = share < options.unseen_share
-        self.directions = directions
 
     def _floor(self, sizes: Array, scale: Array, prior: Prior | None, level: float) -> Array:
         """(l, l), in the prior's units: the square of what a direction must exceed to be seen.
@@ -298,8 +308,9 @@ class _Solved:
             covariance=fit,
             considered=considered,
             total_covariance=total,
-            seen=self.directions[:, : self.rank] * unit,
-            unseen=self.unseen * unit,
+            unseen=self.unseen,
+            scale=self.scale,
+            prior_std=self.prior_std,
             whitening=np.zeros((0, l)),
             identifiable=self.identifiable,
             singular_values=self.column_values,
@@ -309,8 +320,8 @@ class _Solved:
             correlation=sample_correlation(self.residual, self.weights > 0),
             optimism=self._optimism(np.diag(fit), weighted),
         )
-        strength = np.where(np.arange(l) < self.rank, self.singular / noise_factor(found), 1.0)
-        return replace(found, whitening=strength[:, None] * (self.right @ self.forth) / unit)
+        by_prior = self.unseen.T / self.scale / self.options.seen
+        return replace(found, whitening=np.vstack([self.forth / (unit * noise_factor(found)), by_prior]))
 
     def _optimism(self, white: Array, weighted: Array) -> float:
         """Cluster-robust over white standard deviation (Liang and Zeger 1986): clusters are stretches of time."""

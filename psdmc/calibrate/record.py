@@ -145,7 +145,8 @@ def four_step_record(
     for k in gravity.split.pivots:
         groups[int(k)] = "gravity"
     names = [f"theta_{k + 1}" for k in range(model.l)]
-    seen = visibility(names, theta_b, inertial.std, inertial.seen, inertial.unseen, _kept_at(model))
+    kept_at = _kept_at(model, theta_b, inertial.scale)
+    seen = visibility(names, theta_b, inertial.std, inertial.unseen / inertial.scale[:, None], kept_at)
     facts = {
         "delay_s": found.friction.delay,
         "gravity_rank": gravity.estimate.rank,
@@ -190,8 +191,8 @@ def linear_record(
 ) -> Calibration:
     """The record of a linear fit with these values of the whole vector; its quality is still to be found."""
     problem, solved = found.problem, found.estimate
-    kept_at = [*_kept_at(model), *["zero"] * (len(values) - model.l)]
-    seen = visibility(problem.names, values, solved.std, solved.seen, solved.unseen, kept_at)
+    kept_at = _kept_at(model, values, found.prior.scale)
+    seen = visibility(problem.names, values, solved.std, solved.unseen, kept_at)
     facts = {
         "rank": solved.rank,
         "unknowns": len(values),
@@ -241,8 +242,20 @@ def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration
     return replace(record, model=replace(record.model, theta_b=theta, provenance=provenance))
 
 
-def _kept_at(model: DynamicsModel) -> list[str]:
-    return ["zero" if model.theta_b is None else "the file's value"] * model.l
+MOVED = 1e-6
+"""Of what is believable: further from the prior, an invisible parameter was moved by physical consistency."""
+
+
+def _kept_at(model: DynamicsModel, values: Array, scale: Array) -> list[str]:
+    """Where each value stays that the data do not show: friction at zero, theta_b at the file's."""
+    prior = np.zeros(len(values))
+    prior[: model.l] = 0.0 if model.theta_b is None else model.theta_b
+    names = ["zero" if model.theta_b is None else "the file's value"] * model.l
+    names += ["zero"] * (len(values) - model.l)
+    moved = np.abs(values - prior) > MOVED * scale
+    return [
+        f"the physical value nearest to {name}" if m else name for name, m in zip(names, moved, strict=True)
+    ]
 
 
 def _by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:

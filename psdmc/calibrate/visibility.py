@@ -17,8 +17,8 @@ TOGETHER_WORDS = "only in combination with "
 WEAK_SHARE = 0.5
 """Standard deviation, as a share of the value, from which a parameter is called weakly visible: its sign is then known
 with two standard deviations at most."""
-INVISIBLE_SHARE = 0.99
-"""Share of a parameter in unseen directions from which nothing of it is seen."""
+INVISIBLE_SHARE = 0.9999
+"""Share (squared) of a parameter in unseen directions from which nothing of it is seen: a hundredth may leak."""
 TOGETHER = 0.2
 """Correlation within unseen directions from which two parameters are said to show together."""
 NAMED = 4
@@ -41,20 +41,19 @@ def visibility(
     names: Sequence[str],
     values: Array,
     std: Array,
-    seen: Array,
     unseen: Array,
     kept_at: Sequence[str],
     options: FitOptions | None = None,
 ) -> Visibility:
     """Words for every unknown.
 
-    values, std   (m,)  delivered;  seen, unseen  (m, r), (m, k)  directions as in Estimate
+    values, std   (m,)  delivered;  unseen  (m, k)  directions in units of what is believable
     kept_at       (m) where each stays where it is unseen, in words
     """
     limit = (options or FitOptions()).unseen_share
-    open_, known = np.sum(unseen**2, axis=1), np.sum(seen**2, axis=1)
-    share = open_ / np.where(open_ + known > 0, open_ + known, 1.0)
-    size = np.sqrt(np.where(open_ > 0, open_, 1.0))
+    share = np.minimum(np.sum(unseen**2, axis=1), 1.0)
+    size = np.linalg.norm(unseen, axis=1)
+    size[size == 0] = 1.0
     together = np.abs(unseen @ unseen.T) / np.outer(size, size)
     words = []
     for j in range(len(names)):
