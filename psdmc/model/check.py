@@ -41,18 +41,24 @@ CONDITION_LIMIT = 1e-12
 always."""
 
 
+SINGULAR = 1e15
+"""Condition of a mass matrix that nobody can invert: a last link without inertia, for one."""
+
 PLACEMENT_LIMIT = 1e-11
 """rad, or share of the robot's reach: rounding leaves 1e-15, and what snapping cleans as noise 1e-13."""
 
 MUJOCO_LIMIT = 1e-9
 """MuJoCo keeps inertias as principal moments and axes, found to 1e-12 or so."""
 
+MUJOCO_ROUNDING = 1e-10
+"""Share of the robot's largest torque, beside that: MuJoCo works about the whole robot's centre of mass, where a small
+joint's torque is a difference of large ones (2e-11 at most in robots whose lengths are 1e-3 to 1e3 m)."""
+
 ANGLES_ACTED_ON = 2.0
 """An axis snapped by an angle turns what moves about it by up to twice that."""
 
 MUJOCO = "MuJoCo's mj_inverse"
 """What rows of the second reader say that they are against."""
-
 NO_TORQUE = 1e-9
 """Share of the largest torque below which a joint's torque is rounding."""
 
@@ -185,10 +191,17 @@ def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[Che
         ("gravity", "computeGeneralizedGravity", gravity, robot.gravity(q)),
     )
     checked = [CheckRow(name, against, _error(a, b), TORQUE_LIMIT) for name, against, a, b in pairs]
+    return (*checked, _forward(robot, q, qd, qdd, tau))
+
+
+def _forward(robot: Reference, q: Array, qd: Array, qdd: Array, tau: Array) -> CheckRow:
+    """Whether Pinocchio's forward dynamics gives back the accelerations that the torques were computed from."""
+    name = "forward dynamics of these torques"
     condition = float(np.linalg.cond(robot.mass_matrix(q)).max())
-    error = _error(robot.forward_dynamics(q, qd, tau), qdd)
+    if not condition < SINGULAR:
+        return CheckRow(name, "aba", np.nan, None, "not compared: the mass matrix is singular")
     limit = max(TORQUE_LIMIT, CONDITION_LIMIT * condition)
-    return (*checked, CheckRow("forward dynamics of these torques", "aba", error, limit))
+    return CheckRow(name, "aba", _error(robot.forward_dynamics(q, qd, tau), qdd), limit)
 
 
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
@@ -230,21 +243,20 @@ def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) ->
     except NotCompared as reason:
         return CheckRow("inverse dynamics", MUJOCO, np.nan, None, f"not compared: {reason}")
     tau = evaluate.torques_for(model, model.B @ loaded.chain.parameters.reshape(-1), *states)
+    bound = np.full(model.n, MUJOCO_ROUNDING * float(np.abs(expected).max(initial=0.0)))
     if not angles.any():
-        return CheckRow("inverse dynamics", MUJOCO, _error(tau, expected), MUJOCO_LIMIT)
-    bound = torque_bound(reference(loaded, snapped=False), angles, *states)
-    error, limit = _worst(tau, expected, bound)
-    return CheckRow(
-        "inverse dynamics", MUJOCO, error, limit + MUJOCO_LIMIT, "the limit is what snapping can do"
-    )
+        return CheckRow("inverse dynamics", MUJOCO, *_worst(tau, expected, bound, MUJOCO_LIMIT))
+    bound += torque_bound(reference(loaded, snapped=False), angles, *states)
+    figures = _worst(tau, expected, bound, MUJOCO_LIMIT)
+    return CheckRow("inverse dynamics", MUJOCO, *figures, "the limit is what snapping can do")
 
 
-def _worst(values: Array, expected: Array, bound: Array) -> tuple[float, float]:
-    """Error and bound of the joint whose error uses most of its bound, both relative to its largest torque."""
+def _worst(values: Array, expected: Array, bound: Array, share: float = TORQUE_LIMIT) -> tuple[float, float]:
+    """Error and limit, `share` and bound, of the joint that uses most of it, both relative to its largest torque."""
     scale = _scales(expected)
     error = np.abs(values - expected).max(axis=0)
-    joint = int(np.argmax(error / (bound + TORQUE_LIMIT * scale)))
-    return float(error[joint] / scale[joint]), float(bound[joint] / scale[joint]) + TORQUE_LIMIT
+    joint = int(np.argmax(error / (bound + share * scale)))
+    return float(error[joint] / scale[joint]), float(bound[joint] / scale[joint]) + share
 
 
 def _error(values: Array, expected: Array) -> float:

@@ -14,7 +14,7 @@ from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.chain import JointKind, Limits
 from psdmc.robot.inertia import INERTIA_NAMES
-from psdmc.robot.limits import MOST_FAULTS, Range, shown
+from psdmc.robot.limits import Range, shown
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.numerals import WHITE_SPACE, decimal
 from psdmc.robot.zeros import ZERO_NAMES
@@ -70,9 +70,7 @@ def read_dh(text: str, source: str) -> DhRobot:
     problems: list[str] = []
     robot = _robot(_parsed(text, source), problems)
     if problems or robot is None:
-        more = [f"and {len(problems) - MOST_FAULTS} more"] if len(problems) > MOST_FAULTS else []
-        said = "; ".join([*problems[:MOST_FAULTS], *more])
-        raise InputError(f"{source}: {said}", "see the DH format in docs/notation.md")
+        raise InputError(f"{source}: {limits.joined(problems)}", "see the DH format in docs/notation.md")
     return robot
 
 

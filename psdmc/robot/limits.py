@@ -16,6 +16,9 @@ MAX_BYTES = 4 * 2**20
 MAX_LINKS = 1000
 """Links of a URDF: urdfdom and Pinocchio go down the tree by recursion and end the process beyond a few thousand."""
 
+MAX_UNKNOWN = 100
+"""Different elements of a URDF that it does not know; each is compared with those that it does."""
+
 MAX_JOINTS = 200
 """Movable joints of a chain: the longest serial robots have a few dozen."""
 
@@ -62,7 +65,7 @@ ANGLE = Range(TINIEST, 1e3, "rad")
 MASS = Range(1e-12, 1e6, "kg")
 """Pinocchio takes masses below 2e-16 kg for none when it merges bodies."""
 
-INERTIA = Range(1e-60, 1e10, "kg m^2")
+INERTIA = Range(1e-60, 1e16, "kg m^2")
 
 DRIVE_INERTIA = Range(1e-18, 1e8, "kg m^2 (kg)")
 
@@ -94,6 +97,12 @@ def shown(value: object) -> str:
         # Python prints no integer of more than 4,300 digits.
         return "a number of thousands of digits"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}... ({len(text)} characters)"
+
+
+def joined(faults: Sequence[str]) -> str:
+    """Faults in one line, cut off where there are many."""
+    more = [f"and {len(faults) - MOST_FAULTS} more"] if len(faults) > MOST_FAULTS else []
+    return "; ".join([*faults[:MOST_FAULTS], *more])
 
 
 def gravity_fault(gravity: Sequence[float]) -> str | None:

@@ -4,7 +4,7 @@ with Pinocchio."""
 from __future__ import annotations
 
 from typing import Any
-from xml.etree.ElementTree import SubElement, tostring
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from psdmc.robot.load import LoadedRobot
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference import has_assumptions
 from psdmc.robot.urdf_chain import STANDARD_GRAVITY
+from psdmc.robot.urdf_words import ATTRIBUTES
 from psdmc.robot.xml_text import parse_xml
 
 COMPILER = {
@@ -80,6 +81,9 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     root = parse_xml(loaded.source_text, loaded.source_name, "robot")
     if any(element.get("quat_xyzw") is not None for element in root.iter("origin")):
         raise NotCompared("MuJoCo reads no quat_xyzw")
+    dropped = _massless(root)
+    if dropped:
+        raise NotCompared(f"MuJoCo drops inertia without mass, as link {shown(dropped)} has it")
     text = dynamics_of(root, loaded.chain.joint_names, {})
     SubElement(SubElement(text, "mujoco"), "compiler", COMPILER)
     try:
@@ -91,3 +95,14 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     disabled = mujoco.mjtDisableBit
     model.opt.disableflags |= disabled.mjDSBL_CONSTRAINT
     return model
+
+
+def _massless(root: Element) -> str | None:
+    """The first link with inertia but no mass, which MuJoCo leaves out where it merges links."""
+    for link in root.findall("link"):
+        mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
+        if mass is None or inertia is None or float(mass.get("value", "0")) != 0.0:
+            continue
+        if any(float(inertia.get(name, "0")) for name in ATTRIBUTES["inertia"]):
+            return link.get("name")
+    return None

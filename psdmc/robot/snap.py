@@ -29,6 +29,8 @@ def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:
     Its zeros and ones are exact, its other entries orthonormal to machine precision. Where none is near, the
     rotation itself and 0. Floating-point noise (ROUNDING) is cleaned whatever the tolerance.
     """
+    if np.all((rotation == 0.0) | (np.abs(rotation) == 1.0)):
+        return rotation + 0.0, 0.0
     reach = max(tolerance, ROUNDING)
     for candidates in (_six_zeros(rotation), _four_zeros(rotation), _one_zero(rotation)):
         angle, _, nearest = min(

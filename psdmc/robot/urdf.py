@@ -145,12 +145,13 @@ def _refuse(problems: Sequence[str], source: str, hint: str) -> None:
 
 
 def _refuse_sizes(root: Element, source: str) -> None:
-    count = len(root.findall("link"))
-    if count > limits.MAX_LINKS:
-        raise InputError(
-            f"{source}: {count} links, psdmc reads at most {limits.MAX_LINKS}",
-            "merge links that fixed joints hold together, or leave out what the chain does not need",
-        )
+    for tag in ("link", "joint"):
+        count = len(root.findall(tag))
+        if count > limits.MAX_LINKS:
+            raise InputError(
+                f"{source}: {count} {tag}s, psdmc reads at most {limits.MAX_LINKS}",
+                "merge links that fixed joints hold together, or leave out what the chain does not need",
+            )
 
 
 def _notes(
@@ -205,7 +206,7 @@ def _joint(element: Element) -> UrdfJoint:
 
 def _raise(faults: Sequence[str]) -> None:
     if faults:
-        raise ValueError("; ".join(faults))
+        raise ValueError(limits.joined(faults))
 
 
 def _axis(joint: Element, kind: str) -> Triple:

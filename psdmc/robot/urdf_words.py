@@ -8,10 +8,11 @@ and what does not is noted.
 from __future__ import annotations
 
 from difflib import get_close_matches
+from functools import lru_cache
 from xml.etree.ElementTree import Element
 
 from psdmc.robot.inertia import INERTIA_NAMES
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import MAX_UNKNOWN, shown
 from psdmc.robot.numerals import words
 
 VERSIONS = ("1.0", "1.1", "1.2")
@@ -90,21 +91,34 @@ def robot_faults(root: Element) -> list[str]:
     """Words directly in <robot> that must not stand there, and a version that is not known."""
     version = " ".join(words(root.get("version", "1.0")))
     faults = [] if version in VERSIONS else [f"version {shown(version)} is not supported"]
+    if len(_unknown(root)) > MAX_UNKNOWN:
+        return [
+            *faults,
+            f"{len(_unknown(root))} different unknown elements, psdmc reads at most {MAX_UNKNOWN}",
+        ]
     return [*faults, *_children_faults(root, "robot")]
 
 
 def unread_words(root: Element) -> list[str]:
     """A note for each kind of word that is neither read nor known to be harmless."""
-    found: dict[str, None] = {}
-    for parent in [root, *root.findall("link"), *root.findall("joint")]:
-        for child in parent:
-            if _is_foreign(child.tag) or child.tag in (*READ.get(parent.tag, ()), *BESIDE[parent.tag]):
-                continue
-            found[f"<{_short(child.tag)}> in <{parent.tag}> is not read"] = None
+    found = _unknown(root)
     more = (
         [f"{len(found) - MOST_NOTED} more kinds of elements are not read"] if len(found) > MOST_NOTED else []
     )
-    return [*list(found)[:MOST_NOTED], *more]
+    return [*(f"<{_short(tag)}> in <{kind}> is not read" for kind, tag in found[:MOST_NOTED]), *more]
+
+
+def _unknown(root: Element) -> list[tuple[str, str]]:
+    """Each kind of element that is neither read nor known to be harmless, with the one that it stands in."""
+    return list(
+        dict.fromkeys(
+            (parent.tag, child.tag)
+            for parent in [root, *root.findall("link"), *root.findall("joint")]
+            for child in parent
+            if not _is_foreign(child.tag)
+            and child.tag not in (*READ.get(parent.tag, ()), *BESIDE[parent.tag])
+        )
+    )
 
 
 def has_dynamics(joint: Element) -> bool:
@@ -130,6 +144,7 @@ def _children_faults(parent: Element, kind: str) -> list[str]:
     return faults
 
 
+@lru_cache(maxsize=4 * MAX_UNKNOWN)
 def _meant(tag: str, kind: str) -> str | None:
     """The word that carries dynamics which this one is like; <origin> matters in joints and inertials only."""
     words_known = (*CARRIERS, "origin") if kind == "joint" else CARRIERS

@@ -239,6 +239,10 @@ def test_mujoco_reads_the_file_too() -> None:
             "not compared: MuJoCo reads no quat_xyzw",
         ),
         (
+            lambda: load_robot_text(oblique_urdf(BODY.replace('value="1.5"', 'value="0 "')), "urdf"),
+            "not compared: MuJoCo drops inertia without mass, as link 'root' has it",
+        ),
+        (
             lambda: load_robot_text(oblique_urdf(), "urdf", assume_zero=("c:mx",)),
             "not compared: MuJoCo cannot be told of parameters assumed zero",
         ),
@@ -252,6 +256,18 @@ def test_what_mujoco_does_not_read_is_said(make, said: str) -> None:
     assert row.remark.startswith(said)
     assert row.passed
     assert "MuJoCo" not in readers(rows)
+
+
+def test_a_last_link_without_inertia_is_no_failure() -> None:
+    text = oblique_urdf()
+    for name in ("c", "tool"):
+        text = text.replace(f'<link name="{name}">{BODY}</link>', f'<link name="{name}"/>')
+
+    rows = checked(lambda: load_robot_text(text, "urdf"))
+
+    assert all(row.passed for row in rows), rows
+    forward = next(row for row in rows if row.against == "aba")
+    assert forward.remark == "not compared: the mass matrix is singular"
 
 
 def test_without_mujoco_it_is_said(monkeypatch) -> None:
