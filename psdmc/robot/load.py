@@ -19,6 +19,8 @@ from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
 
+__all__ = ["DEFAULT_SNAP", "LoadOptions", "LoadedRobot", "SourceFormat", "load_robot", "load_robot_text"]
+
 SourceFormat = Literal["urdf", "dh"]
 
 DRIVE = PARAMETERS_PER_LINK - 1
