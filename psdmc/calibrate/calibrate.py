@@ -6,16 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
-from psdmc.calibrate.campaign import FILE, read_campaign
+from psdmc.calibrate.campaign_file import is_campaign, read_campaign
 from psdmc.calibrate.four_steps import Runs, calibrate_four_steps
 from psdmc.calibrate.judged_record import judged_record
 from psdmc.calibrate.least_squares import noise_factor
 from psdmc.calibrate.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibrate.log import Array, Log
 from psdmc.calibrate.log_files import read_log
-from psdmc.calibrate.motor_model import Motors
+from psdmc.calibrate.motor_constants import motors_of_logs
 from psdmc.calibrate.physical import PhysicalOptions, nearest_physical, require_cvxpy, whitening_of
 from psdmc.calibrate.predictor import ChainRegressor, Regressor
 from psdmc.calibrate.record import Calibration, four_step_record, linear_record
@@ -63,9 +61,15 @@ def calibrate(
     paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
     if not paths:
         raise InputError("no log to calibrate from")
-    if len(paths) == 1 and (paths[0].suffix == ".toml" or (paths[0] / FILE).exists()):
+    campaigns = [path for path in paths if is_campaign(path)]
+    if campaigns and len(paths) > 1:
+        raise InputError(
+            f"{campaigns[0]}: a campaign, given with {len(paths) - 1} other log(s) or campaign(s)",
+            "calibrate from one campaign, or from plain logs",
+        )
+    if campaigns:
         return calibrate_campaign(
-            model, read_campaign(paths[0]), options, regressor, torque_constants, progress
+            model, read_campaign(paths[0], model.joint_names), options, regressor, torque_constants, progress
         )
     progress("reading logs")
     logs = [read_log(path) for path in paths]
@@ -109,7 +113,7 @@ def calibrate_logs(
     progress: Progress,
 ) -> Calibration:
     """Everything linear at once: one vector of theta_b, friction and offsets."""
-    motors = _motors(model, logs, torque_constants)
+    motors = motors_of_logs(model.joint_names, logs, torque_constants)
     progress("linear fit")
     linear = options.linear
     found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b)
@@ -124,17 +128,3 @@ def calibrate_logs(
     )
     record = linear_record(model, found, near.values, linear)
     return judged_record(record, logs, plain, near.distance, linear.check)
-
-
-def _motors(model: DynamicsModel, logs: Sequence[Log], constants: Mapping[str, float] | None) -> Motors:
-    if all(log.quantity != "current" for log in logs):
-        return Motors.torques(model.n)
-    if constants is None:
-        raise InputError(
-            f"{logs[0].name}: holds currents, and no torque constants are known",
-            "give --torque-constants, or run a campaign with a motor step",
-        )
-    missing = [name for name in model.joint_names if name not in constants]
-    if missing:
-        raise InputError(f"no torque constant for joint(s) {', '.join(missing)}")
-    return Motors(np.array([constants[name] for name in model.joint_names]), np.zeros(model.n))

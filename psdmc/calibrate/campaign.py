@@ -7,23 +7,22 @@ robot (or `psdmc simulate`) measured.
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from psdmc.atomic import write_whole
+from psdmc.calibrate.campaign_file import FILE, Step
 from psdmc.calibrate.excite import Excitation, ExciteOptions, excite, require_limits
 from psdmc.calibrate.excite_poses import motor_poses
-from psdmc.calibrate.four_steps import Runs
 from psdmc.calibrate.gravity import gravity_split
 from psdmc.calibrate.lead_in import from_rest_to_rest
-from psdmc.calibrate.log_files import read_log
+from psdmc.calibrate.log_bag import is_folder
 from psdmc.calibrate.predictor import Regressor
-from psdmc.calibrate.steps import FrictionRun, GravityRun, InertialRun, Load, MotorRun
+from psdmc.calibrate.steps import Load
 from psdmc.calibrate.sweeps import (
     SineOptions,
     SweepOptions,
@@ -32,14 +31,14 @@ from psdmc.calibrate.sweeps import (
     single_joint_sweep,
     swept_range,
 )
+from psdmc.calibrate.table_files import TABLES
 from psdmc.calibrate.trajectory import Trajectory, sliding_joints, write_trajectory
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 
-Step = Literal["motor", "gravity", "friction", "inertial"]
-STEPS: tuple[Step, ...] = ("motor", "gravity", "friction", "inertial")
 Progress = Callable[[str], None]
-FILE = "campaign.toml"
+LARGEST_ACCELERATION = 1e6
+"""rad/s^2 or m/s^2: beyond any joint."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +60,14 @@ class CampaignOptions:
     repeats: int = 6
     acceleration: float | None = None
     table: str = "csv"
+
+    def __post_init__(self) -> None:
+        if self.acceleration is not None and not 0 < self.acceleration <= LARGEST_ACCELERATION:
+            raise InputError(
+                f"acceleration is {self.acceleration:g}, expected more than 0, at most {LARGEST_ACCELERATION:g}"
+            )
+        if f".{self.table}" not in TABLES:
+            raise InputError(f"table is {self.table!r}, expected csv, npz or parquet")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,29 +147,77 @@ SPOKEN_EVERY = 5.0
 """s between two words on the search."""
 
 
-def write_campaign(folder: str | Path, runs: Sequence[PlannedRun], found: Excitation, table: str) -> Path:
-    """Write a campaign's folder; returns its campaign.toml."""
+def require_free(folder: str | Path) -> None:
+    """InputError where a folder holds a campaign, which writing another one would replace; it says what is there."""
+    root = Path(folder)
+    if is_folder(root):
+        counts = {part: _count(root / part) for part in ("trajectories", "logs")}
+        found = [FILE] if (root / FILE).exists() else []
+        found += [f"{count} file(s) in {part}" for part, count in counts.items() if count]
+        if found:
+            raise InputError(
+                f"{root}: holds a campaign already: {', '.join(found)}",
+                "choose another folder; with --force its plan and trajectories are replaced, its logs stay",
+            )
+
+
+def _count(folder: Path) -> int:
+    return sum(1 for _ in folder.iterdir()) if is_folder(folder) else 0
+
+
+def write_campaign(
+    folder: str | Path, runs: Sequence[PlannedRun], found: Excitation, table: str, *, force: bool = False
+) -> Path:
+    """Write a campaign's folder; returns its campaign.toml.
+
+    force   replace the plan and the trajectories of a campaign that is there; logs are never touched
+    InputError where there is one and `force` is not given, or the folder cannot be written.
+    """
+    if not force:
+        require_free(folder)
     root = Path(folder)
     lines = [
         "# Runs of a calibration campaign: run each trajectory, put what was logged where `log` says.",
         "",
     ]
     written: dict[int, str] = {}
-    for run in runs:
+    files = _file_names(runs)
+    for run, file in zip(runs, files, strict=True):
         if id(run.motion) not in written:  # loaded and unloaded runs share one motion
-            written[id(run.motion)] = f"trajectories/{run.name}.{table}"
+            written[id(run.motion)] = f"trajectories/{file}.{table}"
             write_trajectory(run.motion, root / written[id(run.motion)])
-        lines += ["[[run]]", f"step = {json.dumps(run.step)}", f"name = {json.dumps(run.name)}"]
+        lines += ["[[run]]", f"step = {_toml_text(run.step)}", f"name = {_toml_text(run.name)}"]
         if run.joint:
-            lines.append(f"joint = {json.dumps(run.joint, ensure_ascii=False)}")
+            lines.append(f"joint = {_toml_text(run.joint)}")
         if run.load is not None:
             lines.append(f"load = {{ mass = {run.load.mass!r}, com = {list(run.load.com)!r} }}")
-        lines.append(f"trajectory = {json.dumps(written[id(run.motion)])}")
-        lines += [f"log = {json.dumps(f'logs/{run.name}.{table}')}", ""]
+        lines.append(f"trajectory = {_toml_text(written[id(run.motion)])}")
+        lines += [f"log = {_toml_text(f'logs/{file}.{table}')}", ""]
     write_whole(root / "excitation.json", json.dumps(excitation_json(found), indent=1) + "\n")
     path = root / FILE
     write_whole(path, "\n".join(lines))
     return path
+
+
+def _file_names(runs: Sequence[PlannedRun]) -> list[str]:
+    """Each run's name where it can be a file's everywhere; else its step and number, for joints may be called anything."""
+    names = [run.name for run in runs]
+    plain = [name.replace("_", "").replace("-", "").isalnum() and name.isascii() for name in names]
+    return [
+        run.name
+        if plain[k] and len(run.name) <= LONGEST_NAME and names.count(run.name) == 1
+        else f"{run.step}_{k + 1}"
+        for k, run in enumerate(runs)
+    ]
+
+
+LONGEST_NAME = 100
+"""Characters of a file's name; file systems take 255 bytes."""
+
+
+def _toml_text(text: str) -> str:
+    """A TOML string; JSON's escapes are TOML's, but for DEL, which TOML wants escaped too."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def excitation_json(found: Excitation) -> dict[str, Any]:
@@ -181,77 +236,3 @@ def excitation_json(found: Excitation) -> dict[str, Any]:
         "candidates": found.evaluations,
         "seconds": round(found.seconds, 2),
     }
-
-
-@dataclass(frozen=True, slots=True)
-class ListedRun:
-    """One [[run]] of a campaign.toml, paths made absolute."""
-
-    step: Step
-    name: str
-    log: Path
-    trajectory: Path | None
-    joint: str
-    load: Load | None
-
-
-def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
-    """The runs of a campaign.toml (or its folder); InputError says which run lacks what."""
-    path = Path(path)
-    path = path / FILE if path.is_dir() else path
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not TOML: {error}") from error
-    tables = content.get("run", [])
-    if not tables:
-        raise InputError(f"{path}: no [[run]]", "`psdmc excite` writes campaigns")
-    return tuple(_listed(path, k, table) for k, table in enumerate(tables, start=1))
-
-
-def _listed(path: Path, number: int, table: dict[str, Any]) -> ListedRun:
-    where = f"{path}: run {number}"
-    if table.get("step") not in STEPS:
-        raise InputError(f"{where}: step {table.get('step')!r}, expected one of {', '.join(STEPS)}")
-    if "log" not in table:
-        raise InputError(f"{where}: no 'log'")
-    if table["step"] in ("motor", "friction") and not table.get("joint"):
-        raise InputError(f"{where}: a {table['step']} run needs its 'joint'")
-    load = table.get("load")
-    try:
-        known = None if load is None else Load(float(load["mass"]), tuple(float(x) for x in load["com"]))  # type: ignore[arg-type]
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"{where}: load {load!r}", "expected { mass = 3.5, com = [0.08, 0.0, 0.06] }"
-        ) from error
-    motion = table.get("trajectory")
-    return ListedRun(
-        step=table["step"],
-        name=str(table.get("name", Path(table["log"]).stem)),
-        log=path.parent / table["log"],
-        trajectory=None if motion is None else path.parent / motion,
-        joint=str(table.get("joint", "")),
-        load=known,
-    )
-
-
-def read_campaign(path: str | Path) -> Runs:
-    """All logs of a campaign, step by step; InputError where one is missing or a motor run lacks its partner."""
-    listed = listed_runs(path)
-    motors: list[MotorRun] = []
-    empty = {run.joint: run for run in listed if run.step == "motor" and run.load is None}
-    for run in listed:
-        if run.step == "motor" and run.load is not None:
-            if run.joint not in empty:
-                raise InputError(f"{path}: joint {run.joint}: a loaded motor run without an unloaded one")
-            motors.append(MotorRun(run.joint, read_log(empty[run.joint].log), read_log(run.log), run.load))
-    return Runs(
-        motor=motors,
-        gravity=[GravityRun(read_log(run.log), run.load) for run in listed if run.step == "gravity"],
-        friction=[
-            FrictionRun(run.joint, read_log(run.log), run.load) for run in listed if run.step == "friction"
-        ],
-        inertial=[InertialRun(read_log(run.log), run.load) for run in listed if run.step == "inertial"],
-    )

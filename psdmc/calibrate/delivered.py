@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from psdmc.calibrate.check_options import CheckOptions
 from psdmc.calibrate.filter import States, filtered, held_out, smoothed_rows, thinned
 from psdmc.calibrate.four_steps import Runs
 from psdmc.calibrate.friction import FrictionResult, judge_friction
@@ -20,7 +21,7 @@ from psdmc.calibrate.gravity import judge_gravity
 from psdmc.calibrate.inertial import judge_inertial
 from psdmc.calibrate.linear_fit import friction_names, friction_terms
 from psdmc.calibrate.log import Array, Log
-from psdmc.calibrate.log_checks import CheckOptions, checked
+from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.lugre import PARAMETERS, Lugre
 from psdmc.calibrate.motor import judge_motors
 from psdmc.calibrate.motor_model import Motors

@@ -27,6 +27,15 @@ SETTLED = 1e-3
 FILL = 3.0
 """Where the search for each joint's share of its limits starts: 1 / (1 + exp(-3)) = 95 %."""
 
+SHORTEST_DURATION, LONGEST_DURATION = 0.1, 120.0
+"""s, of a period: from what a small joint follows to what still fits a log, six periods at 1 kHz."""
+LONGEST_SEARCH = 86_400.0
+"""s: a day."""
+MOST_HARMONICS, HIGHEST_HARMONIC = 20, 100
+"""Per joint: each adds two unknowns per joint to the search."""
+LARGEST_SEED = 2**31
+"""Seeds start at 1: the search takes 0 for a seed drawn from the clock."""
+
 Objective = Literal["condition", "log_det"]
 Progress = Callable[[float, float], None]
 """Called with seconds spent and the best score so far: the condition number, or minus the log determinant."""
@@ -60,6 +69,18 @@ class ExciteOptions:
     population: int = 48
     seed: int = 1
     random: int = 1000
+
+    def __post_init__(self) -> None:
+        bounds: tuple[tuple[str, float, float, float], ...] = (
+            ("duration", self.duration, SHORTEST_DURATION, LONGEST_DURATION),
+            ("seconds", self.seconds, 0.0, LONGEST_SEARCH),
+            ("seed", self.seed, 1, LARGEST_SEED),
+            ("harmonics", len(self.harmonics), 1, MOST_HARMONICS),
+            ("highest harmonic", max(self.harmonics, default=0), 1, HIGHEST_HARMONIC),
+        )
+        for what, value, low, high in bounds:
+            if not low <= value <= high:
+                raise InputError(f"exciting motion: {what} is {value:g}, expected {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

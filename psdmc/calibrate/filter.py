@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import interpolate, signal
 
+from psdmc.calibrate.check_options import CheckOptions
 from psdmc.calibrate.log import Array, Log
-from psdmc.calibrate.log_checks import CheckOptions
 from psdmc.calibrate.position_noise import noise_like, position_noise, resting
 from psdmc.errors import InputError
 

@@ -12,6 +12,7 @@ from psdmc.calibrate.gravity import GravityResult, calibrate_gravity, gravity_sp
 from psdmc.calibrate.inertial import InertialResult, calibrate_inertial
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.motor import MotorResult, calibrate_motors
+from psdmc.calibrate.motor_constants import one_quantity, refuse_constants, require_constants
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.steps import CalibrationOptions, FrictionRun, GravityRun, InertialRun, MotorRun
@@ -64,6 +65,7 @@ def calibrate_four_steps(
     """
     options = options or CalibrationOptions()
     say = progress or (lambda step: None)
+    _require_runs(runs)
     say("motors")
     motor = calibrate_motors(chain, runs.motor, options.motor) if runs.motor else None
     motors = _motors(chain, motor, runs, torque_constants or {})
@@ -89,19 +91,33 @@ def calibrate_four_steps(
     return FourSteps(motor, motors, gravity, friction, inertial)
 
 
+def _require_runs(runs: Runs) -> None:
+    """InputError where a step that the others rest on has no run."""
+    steps = {"gravity": runs.gravity, "friction": runs.friction, "inertial": runs.inertial}
+    missing = [step for step, own in steps.items() if not own]
+    if missing:
+        raise InputError(
+            f"the campaign has no {' and no '.join(missing)} run",
+            "`psdmc excite` plans all four steps; one log alone is calibrated when it is given instead of a campaign",
+        )
+
+
 def _motors(chain: Chain, motor: MotorResult | None, runs: Runs, given: Mapping[str, float]) -> Motors:
     """Identified constants, given ones where none was identified, or ones where every log holds torques.
 
     InputError where currents stay unexplained.
     """
+    require_constants(given, chain.joint_names)
     logs = [run.log for step in (runs.gravity, runs.friction, runs.inertial) for run in step]
-    quantities = sorted(dict.fromkeys(log.quantity for log in logs))
-    if "current" not in quantities:
+    quantity = one_quantity(logs)
+    if quantity != "current":
+        refuse_constants(given, logs[0])
         if motor is not None:
-            raise InputError(f"motor runs are given, but the other logs hold {', '.join(quantities)}")
+            raise InputError(
+                f"{logs[0].name}: holds {quantity}, but there are motor runs",
+                "log currents in every run, or leave the motor runs out",
+            )
         return Motors.torques(len(chain))
-    if quantities != ["current"]:
-        raise InputError(f"the logs hold {' and '.join(quantities)}: only one kind can be calibrated")
     constant, relative = np.full(len(chain), np.nan), np.zeros(len(chain))
     if motor is not None:
         constant = np.array(motor.torque_constant)

@@ -93,5 +93,5 @@ def _require_alone(run: FrictionRun, chain: Chain, k: int, states: States) -> No
     if others:
         raise InputError(
             f"{run.log.name}: joint(s) {', '.join(others)} move in the friction run of joint {run.joint}",
-            "friction needs one joint at a time: `psdmc excite --friction`",
+            "friction needs one joint at a time: `psdmc excite` plans such runs",
         )

@@ -178,7 +178,7 @@ def _even_part(
     if use.sum() < 10 * len(chain):
         raise InputError(
             f"{run.log.name}: the way back does not retrace the way there at constant speed",
-            "gravity needs each path run forwards and backwards, slowly: `psdmc excite --gravity`",
+            "gravity needs each path run forwards and backwards, slowly: `psdmc excite` plans such runs",
         )
     return (
         0.5 * (states.q[there] + states.q[back]),

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from psdmc.calibrate.check_options import CheckOptions
 from psdmc.calibrate.delivered import delivered_quality, reread
 from psdmc.calibrate.four_steps import Runs
 from psdmc.calibrate.log import Log
-from psdmc.calibrate.log_checks import CheckOptions
 from psdmc.calibrate.record import Calibration, with_model
 from psdmc.calibrate.steps import StepQuality
 from psdmc.model.mass_check import check_mass_matrix

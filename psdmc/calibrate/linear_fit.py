@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibrate.check_options import CheckOptions
 from psdmc.calibrate.filter import (
     FilterOptions,
     SplitOptions,
@@ -23,7 +24,7 @@ from psdmc.calibrate.filter import (
 )
 from psdmc.calibrate.least_squares import Consider, Estimate, FitOptions, Prior, estimate, noise_warnings
 from psdmc.calibrate.log import Array, Log
-from psdmc.calibrate.log_checks import CheckOptions, checked
+from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.prior import base_scale, torque_sizes
@@ -195,7 +196,7 @@ def _ripples(log: Log, states: States, options: LinearOptions) -> list[str]:
     """Names the joints that move by no more than noise, where the log's own check did not call them still."""
     motion = np.ptp(log.position, axis=0)
     found = [
-        f"{name} ({size:.1e} rad)" if name not in log.sliding else f"{name} ({size:.1e} m)"
+        f"{name} ({size:.1e} rad)" if name not in (log.sliding or ()) else f"{name} ({size:.1e} m)"
         for name, size, rests in zip(log.joint_names, motion, states.still, strict=True)
         if rests and size >= options.check.smallest_motion
     ]

@@ -8,12 +8,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibrate.wording import listed
 from psdmc.errors import InputError
 
 Array = NDArray[np.float64]
 Quantity = Literal["current", "motor_torque", "joint_torque"]
 
 QUANTITIES: tuple[Quantity, ...] = ("current", "motor_torque", "joint_torque")
+
+LARGEST_NUMBER = 1e20
+"""In any unit: what is beyond it is no time, angle or torque, and its square would soon overflow."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +32,7 @@ class Log:
     effort       (N, n)  A, N m or N, as `quantity` says; motor torque counts positive in the joint's positive sense
     quantity     current: of the motor; motor_torque: with friction; joint_torque: without
     notes        what reading it assumed
-    sliding      names of joints whose position is in m
+    sliding      names of joints whose position is in m, the others' being in rad; None: the log does not say
     """
 
     name: str
@@ -39,7 +43,7 @@ class Log:
     effort: Array
     quantity: Quantity
     notes: tuple[str, ...] = ()
-    sliding: tuple[str, ...] = ()
+    sliding: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joint_names", tuple(self.joint_names))
@@ -70,8 +74,8 @@ class Log:
         missing = [name for name in joint_names if name not in self.joint_names]
         if missing:
             raise InputError(
-                f"{self.name}: no columns for joint(s) {', '.join(missing)}",
-                f"the log has {', '.join(self.joint_names)}; joints are matched by name",
+                f"{self.name}: no columns for joint(s) {listed(missing)}",
+                f"the log has {listed(self.joint_names)}; joints are matched by name",
             )
         columns = [self.joint_names.index(name) for name in joint_names]
         velocity = None if self.velocity is None else self.velocity[:, columns]

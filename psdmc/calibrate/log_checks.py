@@ -2,49 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import zip_longest
+from typing import NamedTuple
 
 import numpy as np
 
-from psdmc.calibrate.log import Array, Log
+from psdmc.calibrate.check_options import CheckOptions
+from psdmc.calibrate.log import LARGEST_NUMBER, Array, Log
+from psdmc.calibrate.log_time import position_slope, time_faults, velocity_ratios
+from psdmc.calibrate.wording import first_faults, listed
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 
 
-@dataclass(frozen=True, slots=True)
-class CheckOptions:
-    """When a log is refused or remarked on.
+class Fault(NamedTuple):
+    """What forbids a log's use, and the remedy."""
 
-    largest_gap       sample periods; a longer pause is a gap, and refused
-    largest_jitter    share of the sample period; above it the log is resampled, and a note says so
-    limit_slack       share by which position and speed may exceed the chain's limits
-    free_position     rad, largest believable position of a joint without limits
-    free_speed        rad/s, largest believable speed of a joint without a limit
-    rate_disagreement share by which the logged velocity may differ from the position's slope
-    saturated_share   share of samples at the largest effort from which it counts as saturated
-    shortest          s, shortest log that is read
-    samples_per_cycle smallest sampling rate in units of the filter's cut-off
-    smallest_motion   rad or m, peak to peak; below it a joint stands still
-    """
-
-    largest_gap: float = 10.0
-    largest_jitter: float = 0.05
-    limit_slack: float = 0.05
-    free_position: float = 15.0
-    free_speed: float = 30.0
-    rate_disagreement: float = 0.25
-    saturated_share: float = 0.02
-    shortest: float = 2.0
-    samples_per_cycle: float = 4.0
-    smallest_motion: float = 1e-5
+    text: str
+    remedy: str
 
 
 def checked(log: Log, chain: Chain, cutoff: float, options: CheckOptions | None = None) -> Log:
     """The log with its joints in the chain's order and what was noticed in its notes.
 
     cutoff   Hz, of the filter that the log is meant for
-    InputError names everything that forbids its use, all at once.
+    InputError names what forbids its use: first values that are no numbers, then faults of time, then the rest.
     """
     options = options or CheckOptions()
     if len(log) < 2:
@@ -52,9 +36,14 @@ def checked(log: Log, chain: Chain, cutoff: float, options: CheckOptions | None 
             f"{log.name}: too short: {len(log)} row(s)", f"at least {options.shortest:g} s are needed"
         )
     log = log.ordered(chain.joint_names)
-    faults = [text for check in _FAULTS for text in check(log, chain, cutoff, options)]
-    if faults:
-        raise InputError("; ".join(f"{log.name}: {fault}" for fault in faults), _hint(faults))
+    for stage in _FAULTS:
+        found = [check(log, chain, cutoff, options) for check in stage]
+        # the first of each kind before the others: one wrong unit gives a fault for every joint
+        faults = [fault for same_rank in zip_longest(*found) for fault in same_rank if fault is not None]
+        if faults:
+            raise InputError(
+                f"{log.name}: {first_faults([fault.text for fault in faults])}", faults[0].remedy
+            )
     notes = [text for check in _REMARKS for text in check(log, chain, cutoff, options)]
     return replace(log, notes=(*log.notes, *(f"{log.name}: {note}" for note in notes)))
 
@@ -65,56 +54,52 @@ def still_joints(log: Log, options: CheckOptions | None = None) -> tuple[bool, .
     return tuple(bool(motion < smallest) for motion in np.ptp(log.position, axis=0))
 
 
-def _hint(faults: list[str]) -> str:
-    text = " ".join(faults)
-    if "degrees" in text:
-        return "positions are expected in rad: convert the columns"
-    if "finite" in text or "time" in text:
-        return "cut the log to a clean stretch, or record it again"
-    return "record again, or correct the file"
+def _no_numbers(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    faults = [_no_number("time", log.time, log)]
+    for what, values in (("position", log.position), ("velocity", log.velocity), ("effort", log.effort)):
+        if values is None:
+            continue
+        called = f"effort ({log.quantity})" if what == "effort" else what
+        faults += [_no_number(f"{called} of joint {name}", values[:, k], log) for k, name in _numbered(log)]
+    return [fault for fault in faults if fault is not None]
 
 
-def _not_finite(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _no_number(what: str, values: Array, log: Log) -> Fault | None:
+    """A column's first value that is not finite, or so large that it is no measurement."""
+    rows = np.flatnonzero(~(np.abs(values) < LARGEST_NUMBER))
+    if not len(rows):
+        return None
+    first = values[rows[0]]
+    word = "is not finite" if not np.isfinite(first) else f"reaches {first:.3g}"
+    return Fault(
+        f"{what} {word} in {len(rows)} row(s), the first is row {rows[0] + 1} of {len(log)}",
+        "cut the log to a clean stretch, or leave a damaged velocity out",
+    )
+
+
+def _numbered(log: Log) -> Iterator[tuple[int, str]]:
+    return enumerate(log.joint_names)
+
+
+def _units(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    """Columns in rad for joints that slide, or in m for joints that turn."""
+    if log.sliding is None:
+        return []
     faults = []
-    for what, values in (("time", log.time[:, None]), ("position", log.position), ("effort", log.effort)):
-        rows = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        if len(rows):
-            faults.append(f"{what} is not finite in {len(rows)} row(s), the first is row {rows[0]}")
+    for joint in chain.joints:
+        slides = joint.kind == "prismatic"
+        if slides != (joint.name in log.sliding):
+            found, right = ("rad", "m") if slides else ("m", "rad")
+            faults.append(
+                Fault(
+                    f"joint {joint.name}: position_{found}.{joint.name}, but it {'slides' if slides else 'turns'}",
+                    f"expected position_{right}.<joint>, and its other columns in units to match",
+                )
+            )
     return faults
 
 
-def _time_order(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
-    steps = np.diff(log.time)
-    backwards = np.flatnonzero(steps <= 0)
-    if len(backwards):
-        row = int(backwards[0]) + 1
-        before, after = log.time[row - 1], log.time[row]
-        word = "goes backwards" if after < before else "stands still"
-        return [f"time {word} at row {row} ({before:.6g} s, then {after:.6g} s), {len(backwards)} time(s)"]
-    gaps = np.flatnonzero(steps > options.largest_gap * log.period)
-    if len(gaps):
-        row = int(gaps[0])
-        return [f"time has {len(gaps)} gap(s): {steps[row]:.3g} s without a row after {log.time[row]:.6g} s"]
-    return []
-
-
-def _too_short(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
-    if log.duration < options.shortest:
-        return [f"too short: {log.duration:.3g} s, expected at least {options.shortest:g} s"]
-    return []
-
-
-def _too_slow(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
-    rate = 1.0 / log.period if log.period > 0 else np.inf
-    if rate < options.samples_per_cycle * cutoff:
-        return [
-            f"sampling at {rate:.4g} Hz is too slow for a cut-off of {cutoff:g} Hz, "
-            f"expected at least {options.samples_per_cycle * cutoff:g} Hz"
-        ]
-    return []
-
-
-def _positions(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _positions(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
     faults = []
     for k, joint in enumerate(chain.joints):
         reach = float(np.abs(log.position[:, k]).max(initial=0.0))
@@ -125,59 +110,62 @@ def _positions(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> 
         unit = "rad" if joint.kind == "revolute" else "m"
         suspicion = ": degrees?" if joint.kind == "revolute" and np.radians(reach) <= bound else ""
         faults.append(
-            f"joint {joint.name}: position reaches {reach:.4g} {unit}, limit {bound:.4g} {unit}{suspicion}"
+            Fault(
+                f"joint {joint.name}: position reaches {reach:.4g} {unit}, limit {bound:.4g} {unit}{suspicion}",
+                "positions are expected in rad: convert the columns"
+                if suspicion
+                else "correct the columns, or the limits in the robot file",
+            )
         )
     return faults
 
 
-def _speeds(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
-    if (np.diff(log.time) <= 0).any() or not np.isfinite(log.position).all():
-        return []
+def _speeds(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
     faults = []
-    slope = _slope(log)
+    slope = position_slope(log)
     for k, joint in enumerate(chain.joints):
         speed = float(np.quantile(np.abs(slope[:, k]), 0.99))
         bound = joint.limits.speed
         bound = options.free_speed if not np.isfinite(bound) else bound * (1 + options.limit_slack)
         if speed > bound:
             faults.append(
-                f"joint {joint.name}: moves at {speed:.4g} per s, limit {bound:.4g}: unit of time or position?"
+                Fault(
+                    f"joint {joint.name}: moves at {speed:.4g} per s, limit {bound:.4g}: unit of time or position?",
+                    "time is expected in s, positions in rad or m: convert the columns",
+                )
             )
     return faults
 
 
-def _rates(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _rates(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
     """The logged velocity against the position's slope: a ratio far from one is a wrong unit."""
-    if log.velocity is None or (np.diff(log.time) <= 0).any() or not np.isfinite(log.position).all():
-        return []
     faults = []
-    slope = _slope(log)
-    for k, joint in enumerate(chain.joints):
-        moving = float(np.sqrt(np.mean(slope[:, k] ** 2)))
-        if np.ptp(log.position[:, k]) < 1e-2:
+    for k, ratio in velocity_ratios(log).items():
+        if abs(ratio - 1.0) <= options.rate_disagreement:
             continue
-        ratio = float(slope[:, k] @ log.velocity[:, k]) / (len(log) * moving**2)
-        if abs(ratio - 1.0) > options.rate_disagreement:
-            suspicion = ": degrees?" if 40 < abs(ratio) < 70 or 0.014 < abs(ratio) < 0.025 else ""
-            faults.append(
-                f"joint {joint.name}: velocity is {ratio:.4g} times the position's slope{suspicion}"
+        degrees = 40 < abs(ratio) < 70 or 0.014 < abs(ratio) < 0.025
+        faults.append(
+            Fault(
+                f"joint {log.joint_names[k]}: velocity is {ratio:.4g} times the position's slope"
+                f"{': degrees?' if degrees else ''}",
+                "velocities are expected in rad/s or m/s, with the position's sign: convert the columns, "
+                "or leave them out",
             )
+        )
     return faults
 
 
-def _slope(log: Log) -> Array:
-    """Central differences over two periods: too coarse for dynamics, enough to tell units apart."""
-    slope: Array = (log.position[2:] - log.position[:-2]) / (log.time[2:] - log.time[:-2])[:, None]
-    return np.vstack([slope[:1], slope, slope[-1:]])
-
-
-def _nothing_there(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _nothing_there(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
     faults = []
     if all(still_joints(log, options)):
-        faults.append("no joint moves")
-    dead = [name for k, name in enumerate(log.joint_names) if not log.effort[:, k].any()]
-    if len(dead) == len(log.joint_names):
-        faults.append(f"{log.quantity} is zero throughout, for every joint")
+        faults.append(Fault("no joint moves", "give a log of a motion; `psdmc excite` plans one"))
+    if not log.effort.any():
+        faults.append(
+            Fault(
+                f"{log.quantity} is zero throughout, for every joint",
+                "record the motors' currents or torques too",
+            )
+        )
     return faults
 
 
@@ -201,24 +189,26 @@ def _saturation(log: Log, chain: Chain, cutoff: float, options: CheckOptions) ->
 
 def _still(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
     still = [name for name, rests in zip(log.joint_names, still_joints(log, options), strict=True) if rests]
-    return [f"joint(s) {', '.join(still)} stand still"] if still else []
+    return [f"joint(s) {listed(still)} stand still"] if still else []
 
 
 def _dead_effort(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
     dead = [name for k, name in enumerate(log.joint_names) if not log.effort[:, k].any()]
-    return [f"joint(s) {', '.join(dead)}: {log.quantity} is zero throughout"] if dead else []
+    return [f"joint(s) {listed(dead)}: {log.quantity} is zero throughout"] if dead else []
 
 
-Check = Callable[[Log, Chain, float, CheckOptions], list[str]]
+Check = Callable[[Log, Chain, float, CheckOptions], list[Fault]]
+Remark = Callable[[Log, Chain, float, CheckOptions], list[str]]
 
-_FAULTS: tuple[Check, ...] = (
-    _not_finite,
-    _time_order,
-    _too_short,
-    _too_slow,
-    _positions,
-    _speeds,
-    _rates,
-    _nothing_there,
+
+def _times(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    return [Fault(*fault) for fault in time_faults(log, cutoff, options)]
+
+
+_FAULTS: tuple[tuple[Check, ...], ...] = (
+    (_no_numbers, _units),
+    (_times,),
+    (_positions, _speeds, _rates, _nothing_there),
 )
-_REMARKS: tuple[Check, ...] = (_jitter, _saturation, _still, _dead_effort)
+"""In stages: what a later one computes makes sense only where the earlier ones found nothing."""
+_REMARKS: tuple[Remark, ...] = (_jitter, _saturation, _still, _dead_effort)

@@ -1,4 +1,4 @@
-"""Logs as files: CSV, Parquet and npz share their column names; ROS 2 bags are read through rosbags.
+"""Logs as files: CSV, Parquet and npz share their column names; ROS 2 bags have none.
 
 `time_s`, then per joint `position_rad.<joint>` (`position_m.` where it slides), optional `velocity_rad_s.<joint>`
 (`velocity_m_s.`), and one of `current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` where it slides);
@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from psdmc.atomic import make_folder, whole_file
 from psdmc.calibrate.log import Array, Log, Quantity
-from psdmc.calibrate.log_bag import read_bag
+from psdmc.calibrate.log_bag import BAGS, is_folder, read_bag
+from psdmc.calibrate.table_files import TABLES, read_columns, write_columns
+from psdmc.calibrate.wording import listed, quoted
 from psdmc.errors import InputError
 
 EFFORTS: tuple[tuple[str, Quantity], ...] = (
@@ -41,49 +41,57 @@ _EFFORT_COLUMNS: dict[Quantity, tuple[str, str]] = {
 def read_log(path: str | Path) -> Log:
     """A log from .csv, .parquet, .npz, or a ROS 2 bag (.db3, .mcap or its folder).
 
-    InputError where the file is missing, no log, or lacks a column.
+    InputError where the file is missing, no log, damaged, or lacks a column.
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    if path.suffix in (".db3", ".mcap") or path.is_dir():
+    kind = path.suffix.lower()
+    if kind in BAGS or is_folder(path):
         return read_bag(path)
-    if path.suffix not in _READERS:
-        known = ", ".join((*_READERS, ".db3", ".mcap"))
-        raise InputError(f"{path}: '{path.suffix}' is no log format", f"known are {known}")
-    return log_from_columns(path.name, _READERS[path.suffix](path))
+    if kind not in TABLES:
+        raise InputError(
+            f"{path}: '{path.suffix}' is no log format", f"known are {', '.join((*TABLES, *BAGS))}"
+        )
+    return log_from_columns(path.name, read_columns(path))
 
 
 def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
     """A log from named columns of equal length; InputError says which column is missing and what would do."""
     if "time_s" not in columns:
-        raise InputError(f"{name}: no column 'time_s'", f"it has {', '.join(columns)}")
-    joints = _joints(columns, POSITIONS)
+        raise InputError(f"{name}: no column 'time_s'", f"it has {listed(tuple(columns))}")
+    joints = _joints(name, columns, POSITIONS)
     if not joints:
-        raise InputError(f"{name}: no column 'position_rad.<joint>'", f"it has {', '.join(columns)}")
+        raise InputError(f"{name}: no column 'position_rad.<joint>'", f"it has {listed(tuple(columns))}")
     quantity, effort_names, notes = _efforts(name, columns, tuple(joints))
-    velocities = _joints(columns, VELOCITIES)
-    has_velocity = all(joint in velocities for joint in joints)
+    velocities = _joints(name, columns, VELOCITIES)
+    lacking = [joint for joint in joints if joint not in velocities]
+    if velocities and lacking:
+        notes = (*notes, f"{name}: no velocity of joint(s) {listed(lacking)}: velocities are not used")
+    _require_units(name, joints, {} if lacking else velocities, effort_names)
     return Log(
         name=name,
         joint_names=tuple(joints),
         time=columns["time_s"],
         position=np.column_stack([columns[column] for column in joints.values()]),
-        velocity=np.column_stack([columns[velocities[joint]] for joint in joints]) if has_velocity else None,
+        velocity=None if lacking else np.column_stack([columns[velocities[joint]] for joint in joints]),
         effort=np.column_stack([columns[column] for column in effort_names]),
         quantity=quantity,
         notes=notes,
-        sliding=tuple(joint for joint, column in joints.items() if column.startswith("position_m.")),
+        sliding=tuple(joint for joint, column in joints.items() if _slides(column)),
     )
 
 
-def _joints(columns: Mapping[str, Array], prefixes: tuple[str, ...]) -> dict[str, str]:
+def _joints(name: str, columns: Mapping[str, Array], prefixes: tuple[str, ...]) -> dict[str, str]:
     """Column by joint, in the file's order."""
     found: dict[str, str] = {}
     for column in columns:
         prefix, _, joint = column.partition(".")
-        if prefix in prefixes and joint:
-            found[joint] = column
+        if prefix not in prefixes:
+            continue
+        if not joint:
+            raise InputError(f"{name}: column {quoted(column)} names no joint", f"expected {prefix}.<joint>")
+        if joint in found:
+            raise InputError(f"{name}: two columns for joint {joint}: {found[joint]} and {column}")
+        found[joint] = column
     return found
 
 
@@ -93,31 +101,51 @@ def _efforts(
     present = {column.partition(".")[0] for column in columns}
     kinds = {quantity: prefix for prefix, quantity in EFFORTS if prefix in present}
     if not kinds:
-        wanted = ", ".join(f"'{prefix}.<joint>'" for prefix, _ in EFFORTS[:4:2])
-        raise InputError(
-            f"{name}: no column of current or torque", f"expected one of {wanted} or 'joint_torque_nm'"
-        )
+        wanted = "current_a.<joint>, motor_torque_nm.<joint> or joint_torque_nm.<joint>"
+        raise InputError(f"{name}: no column of current or torque", f"expected {wanted}")
     if len(kinds) > 1:
-        raise InputError(f"{name}: columns of {' and '.join(sorted(kinds))}: only one kind can be read")
+        both = " and ".join(f"{prefix} ({quantity})" for quantity, prefix in kinds.items())
+        raise InputError(f"{name}: columns of {both}: only one kind can be read", "leave the others out")
     quantity = next(iter(kinds))
     prefixes = [prefix for prefix, kind in EFFORTS if kind == quantity]
-    found = {
-        joint: f"{prefix}.{joint}"
-        for prefix in prefixes
-        for joint in joints
-        if f"{prefix}.{joint}" in columns
-    }
+    found: dict[str, str] = {}
+    for joint in joints:
+        own = [f"{prefix}.{joint}" for prefix in prefixes if f"{prefix}.{joint}" in columns]
+        if len(own) > 1:
+            raise InputError(f"{name}: joint {joint} has {' and '.join(own)}: only one can be read")
+        if own:
+            found[joint] = own[0]
     missing = [joint for joint in joints if joint not in found]
     if missing:
-        raise InputError(f"{name}: no column '{prefixes[0]}.<joint>' for joint(s) {', '.join(missing)}")
+        raise InputError(f"{name}: no column '{kinds[quantity]}.<joint>' for joint(s) {listed(missing)}")
     said = any(found[joint].startswith("effort_") for joint in joints)
     notes = (f"{name}: 'effort' is read as motor torque, friction included",) if said else ()
     return quantity, [found[joint] for joint in joints], notes
 
 
+def _require_units(
+    name: str, positions: Mapping[str, str], velocities: Mapping[str, str], efforts: list[str]
+) -> None:
+    """InputError where one column says that a joint turns and another that it slides."""
+    for (joint, position), effort in zip(positions.items(), efforts, strict=True):
+        others = [effort] if effort.partition(".")[0] != "current_a" else []
+        others += [velocities[joint]] if joint in velocities else []
+        odd = [column for column in others if _slides(column) != _slides(position)]
+        if odd:
+            raise InputError(
+                f"{name}: joint {joint}: {position} and {' and '.join(odd)}: does it turn or slide?",
+                "turning: position_rad, velocity_rad_s, torque_nm; sliding: position_m, velocity_m_s, torque_n",
+            )
+
+
+def _slides(column: str) -> bool:
+    """Whether a column's unit is one of a sliding joint."""
+    return column.partition(".")[0].endswith(("_m", "_m_s", "_n"))
+
+
 def columns_of(log: Log) -> dict[str, Array]:
     """Named columns, as files hold them."""
-    metres = [joint in log.sliding for joint in log.joint_names]
+    metres = [joint in (log.sliding or ()) for joint in log.joint_names]
     columns: dict[str, Array] = {"time_s": log.time}
     parts = (
         (POSITIONS, log.position),
@@ -134,75 +162,3 @@ def columns_of(log: Log) -> dict[str, Array]:
 def write_log(log: Log, path: str | Path) -> None:
     """Write .csv, .parquet or .npz, atomically."""
     write_columns(columns_of(log), Path(path))
-
-
-def write_columns(columns: Mapping[str, Array], path: Path) -> None:
-    """Write named columns of equal length as .csv, .parquet or .npz; a reader never sees half a file."""
-    if path.suffix not in _WRITERS:
-        raise InputError(f"{path}: cannot write '{path.suffix}'", f"known are {', '.join(_WRITERS)}")
-    make_folder(path.parent)
-    with whole_file(path) as own:
-        _WRITERS[path.suffix](columns, own)
-
-
-def read_columns(path: Path) -> dict[str, Array]:
-    """Named columns of a .csv, .parquet or .npz file."""
-    if path.suffix not in _READERS:
-        raise InputError(f"{path}: '{path.suffix}' is no table", f"known are {', '.join(_READERS)}")
-    return _READERS[path.suffix](path)
-
-
-def _read_csv(path: Path) -> dict[str, Array]:
-    with path.open(encoding="utf-8") as file:
-        names = [name.strip() for name in file.readline().rstrip("\r\n").split(",")]
-        try:
-            values = np.loadtxt(file, delimiter=",", ndmin=2)
-        except ValueError as error:
-            raise InputError(f"{path}: not a table of numbers: {error}") from error
-    if values.size and values.shape[1] != len(names):
-        raise InputError(f"{path}: {values.shape[1]} columns of numbers under {len(names)} names")
-    if len(names) != len(dict.fromkeys(names)):
-        twice = sorted(name for name in dict.fromkeys(names) if names.count(name) > 1)
-        raise InputError(f"{path}: column(s) named twice: {', '.join(twice)}")
-    return {name: values[:, k] if values.size else np.zeros(0) for k, name in enumerate(names)}
-
-
-def _write_csv(columns: Mapping[str, Array], path: Path) -> None:
-    header = ",".join(columns)
-    np.savetxt(path, np.column_stack(list(columns.values())), "%.17g", ",", header=header, comments="")
-
-
-def _read_npz(path: Path) -> dict[str, Array]:
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return {name: np.asarray(stored[name], dtype=np.float64) for name in stored.files}
-    except (ValueError, OSError) as error:
-        raise InputError(f"{path}: not a log in npz form: {error}") from error
-
-
-def _write_npz(columns: Mapping[str, Array], path: Path) -> None:
-    with path.open("wb") as file:
-        np.savez(file, **dict(columns))  # type: ignore[arg-type]
-
-
-def _read_parquet(path: Path) -> dict[str, Array]:
-    table = _parquet().read_table(path)
-    return {name: np.asarray(table.column(name).to_numpy(), dtype=np.float64) for name in table.column_names}
-
-
-def _write_parquet(columns: Mapping[str, Array], path: Path) -> None:
-    import pyarrow
-
-    _parquet().write_table(pyarrow.table(dict(columns)), path)
-
-
-def _parquet() -> Any:
-    try:
-        import pyarrow.parquet
-    except ImportError as error:
-        raise InputError("Parquet logs need pyarrow", "pip install 'psdmc[calibrate]'") from error
-    return pyarrow.parquet
-
-
-_READERS = {".csv": _read_csv, ".npz": _read_npz, ".parquet": _read_parquet}
-_WRITERS = {".csv": _write_csv, ".npz": _write_npz, ".parquet": _write_parquet}

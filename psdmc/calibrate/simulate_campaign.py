@@ -5,20 +5,25 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from psdmc.atomic import make_folder, write_whole
-from psdmc.calibrate import virtual_robot
-from psdmc.calibrate.campaign import ListedRun, listed_runs
+from psdmc.calibrate import plant_file, virtual_robot
+from psdmc.calibrate.campaign_file import ListedRun, listed_runs
+from psdmc.calibrate.log_bag import is_folder
 from psdmc.calibrate.log_files import write_log
-from psdmc.calibrate.trajectory import read_trajectory
-from psdmc.calibrate.virtual_robot import Payload, load_virtual_robot, plant_texts, simulate
+from psdmc.calibrate.plant_file import plant_texts
+from psdmc.calibrate.trajectory import read_trajectory, trajectory_joints
+from psdmc.calibrate.virtual_robot import Payload, VirtualRobot, load_virtual_robot, simulate
+from psdmc.calibrate.wording import listed
 from psdmc.errors import InputError
 
 INDEX = "simulated.json"
+LARGEST_SEED = 2**31
+"""Each run adds its number to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,32 +56,80 @@ def simulate_campaign(
     options: SimulateOptions,
     progress: Callable[[str], None] = lambda step: None,
 ) -> int:
-    """Write the log of every run of a campaign; returns how many had to be simulated, the others being up to date."""
+    """Write the log of every run of a campaign; returns how many had to be simulated, the others being up to date.
+
+    InputError, before anything is written, where the campaign is another robot's or a log would leave its folder.
+    """
     plant = Path(plant)
+    if not 0 <= options.seed <= LARGEST_SEED:
+        raise InputError(f"seed is {options.seed}, expected 0 to {LARGEST_SEED}")
+    robot = load_virtual_robot(plant, ideal_sensors=options.ideal_sensors, harness=options.harness)
     runs = listed_runs(campaign)
-    missing = [run.name for run in runs if run.trajectory is None]
-    if missing:
-        raise InputError(f"{campaign}: run(s) {', '.join(missing)} name no trajectory to simulate")
+    root = Path(campaign) if is_folder(Path(campaign)) else Path(campaign).parent
+    _require_runs(runs, root, str(campaign))
+    for run in runs:
+        _require_robot(run, robot, plant)
     jobs = [_Job(plant, options, run, options.seed + number) for number, run in enumerate(runs)]
-    keys = {str(job.run.log): _key(job) for job in jobs}
+    keys = {job.run.log: _key(job) for job in jobs}
     index_path = runs[0].log.parent / INDEX
-    known = json.loads(index_path.read_text(encoding="utf-8")) if index_path.exists() else {}
+    known = _index(index_path)
     stale = [
-        job
-        for job in jobs
-        if known.get(job.run.log.name) != keys[str(job.run.log)] or not job.run.log.exists()
+        job for job in jobs if known.get(job.run.log.name) != keys[job.run.log] or not job.run.log.exists()
     ]
     if options.workers > 1 and len(stale) > 1:
-        with ProcessPoolExecutor(options.workers, multiprocessing.get_context("spawn")) as pool:
+        workers = min(options.workers, len(stale))
+        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
             for name in pool.map(_simulated, stale):
                 progress(name)
     else:
         for job in stale:
             progress(_simulated(job))
-    index = {Path(name).name: key for name, key in sorted(keys.items())}
+    index = {path.name: key for path, key in sorted(keys.items())}
     make_folder(index_path.parent)
     write_whole(index_path, json.dumps(index, indent=1) + "\n")
     return len(stale)
+
+
+def _require_runs(runs: Sequence[ListedRun], root: Path, campaign: str) -> None:
+    """InputError where a run has no motion, or its log would be written outside the campaign or over another's."""
+    missing = [run.name for run in runs if run.trajectory is None]
+    if missing:
+        raise InputError(f"{campaign}: run(s) {listed(missing)} name no trajectory to simulate")
+    outside = [str(run.log) for run in runs if not run.log.resolve().is_relative_to(root.resolve())]
+    if outside:
+        raise InputError(
+            f"{campaign}: log(s) {listed(outside)} outside the campaign's folder",
+            "logs are written inside it only",
+        )
+    names = [run.log.name for run in runs]
+    twice = list(dict.fromkeys(name for name in names if names.count(name) > 1))
+    if twice:
+        raise InputError(f"{campaign}: several runs write log(s) {listed(twice)}", "give each run its own")
+
+
+def _require_robot(run: ListedRun, robot: VirtualRobot, plant: Path) -> None:
+    """InputError where a run moves other joints than the plant has."""
+    assert run.trajectory is not None
+    names, sliding = trajectory_joints(run.trajectory)
+    if names != robot.joint_names or (run.joint and run.joint not in names):
+        raise InputError(
+            f"{run.trajectory}: moves joints {listed(names) or 'none'}, {plant.name} has {listed(robot.joint_names)}",
+            "the campaign is another robot's: plan one with `psdmc excite` from this robot's model",
+        )
+    if sliding != robot.sliding:
+        raise InputError(
+            f"{run.trajectory}: joint(s) {listed(sliding) or 'none'} slide, "
+            f"of {plant.name} {listed(robot.sliding) or 'none'}"
+        )
+
+
+def _index(path: Path) -> dict[str, str]:
+    """Digests by log; none where the file is missing or damaged, so that everything is simulated again."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def _simulated(job: _Job) -> str:
@@ -97,11 +150,8 @@ def _key(job: _Job) -> str:
     assert job.run.trajectory is not None
     digest = hashlib.sha256()
     variant = (job.options.ideal_sensors, job.options.harness, job.seed, job.run.load)
-    for part in (
-        repr(variant),
-        *plant_texts(job.plant),
-        Path(virtual_robot.__file__).read_text(encoding="utf-8"),
-    ):
-        digest.update(part.encode("utf-8") + b"\0")
+    code = [Path(str(module.__file__)).read_bytes() for module in (virtual_robot, plant_file)]
+    for part in (repr(variant).encode("utf-8"), *plant_texts(job.plant), *code):
+        digest.update(part + b"\0")
     digest.update(job.run.trajectory.read_bytes())
     return digest.hexdigest()

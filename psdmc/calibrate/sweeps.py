@@ -12,6 +12,9 @@ from psdmc.calibrate.trajectory import Trajectory, sliding_joints
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain, Joint
 
+LONGEST_RUN = 3600.0
+"""s: 3.6 million rows at 1 kHz."""
+
 
 @dataclass(frozen=True, slots=True)
 class SweepOptions:
@@ -69,10 +72,26 @@ def sweep_speed(joint: Joint, share: float) -> float:
     return share * (joint.limits.speed if np.isfinite(joint.limits.speed) else 2.0)
 
 
+def _require_speed(joint: Joint, speed: float) -> None:
+    if not speed > 0:
+        raise InputError(f"joint {joint.name}: its speed limit is {speed:g}", "correct it in the robot file")
+
+
+def _require_short(joint: Joint, what: str, seconds: float) -> None:
+    """InputError where a joint's limits make its motion too long to run."""
+    if not seconds <= LONGEST_RUN:
+        raise InputError(
+            f"joint {joint.name}: its {what} would take {seconds:.3g} s, expected at most {LONGEST_RUN:g} s",
+            "is its speed or acceleration limit in the robot file right?",
+        )
+
+
 def single_joint_sweep(chain: Chain, joint: int, pose: Array, options: SweepOptions) -> Trajectory:
     """One joint through its range and back at constant speed, the others at `pose` (n,): (16)'s motion."""
     low, high = swept_range(chain.joints[joint], options.range)
     speed = sweep_speed(chain.joints[joint], options.speed)
+    _require_speed(chain.joints[joint], speed)
+    _require_short(chain.joints[joint], "sweep", 2.0 * (high - low) / speed)
     cruise = (high - low) / speed - options.blend
     if cruise <= 0:
         raise InputError(f"joint {chain.joints[joint].name}: too little range to sweep at {speed:.3g} per s")
@@ -97,6 +116,7 @@ def gravity_sweep(chain: Chain, seed: int, options: SweepOptions) -> Trajectory:
     for k, joint in enumerate(chain.joints):
         low, high = swept_range(joint, options.range)
         speed = sweep_speed(joint, options.speed) * rng.uniform(0.6, 1.0)
+        _require_speed(joint, speed)
         margin = 0.5 * speed * options.blend
         start = rng.uniform(low + margin, high - margin)
         pieces = _to_and_fro(low, high, start, speed, options)
@@ -118,7 +138,10 @@ def sine_series(chain: Chain, joint: int, pose: Array, options: SineOptions) -> 
     Each sine swells and fades with its envelope's first two derivatives zero at both ends.
     """
     runs: list[tuple[Array, Array, Array]] = []
-    for amplitude, frequency in sine_plan(chain.joints[joint], float(pose[joint]), options):
+    plan = sine_plan(chain.joints[joint], float(pose[joint]), options)
+    seconds = sum((options.cycles + 2) / frequency for _, frequency in plan)
+    _require_short(chain.joints[joint], "series of sines", seconds)
+    for amplitude, frequency in plan:
         runs.append(_windowed_sine(amplitude, frequency, options))
     moved, rate, acceleration = (np.concatenate(parts) for parts in zip(*runs, strict=True))
     time: Array = np.arange(len(moved), dtype=np.float64) * options.period
@@ -133,6 +156,11 @@ def sine_plan(joint: Joint, centre: float, options: SineOptions) -> list[tuple[f
     """(amplitude, frequency) of each sine of a series, within the joint's limits."""
     limits = joint.limits
     room = min(limits.upper - centre, centre - limits.lower, options.largest)
+    if not room >= options.smallest or not min(limits.speed, limits.acceleration) > 0:
+        raise InputError(
+            f"joint {joint.name}: no room for sines of {options.smallest:g} about {centre:.6g}",
+            "are its limits in the robot file right?",
+        )
     count = max(1, int(np.floor(np.log(room / options.smallest) / np.log(options.ratio))) + 1)
     plan: list[tuple[float, float]] = []
     for amplitude in options.smallest * options.ratio ** np.arange(count):

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.calibrate.log import Array
-from psdmc.calibrate.log_files import read_columns, write_columns
+from psdmc.calibrate.log import LARGEST_NUMBER, Array
+from psdmc.calibrate.table_files import column_names, read_columns, write_columns
+from psdmc.calibrate.wording import listed
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 
@@ -62,24 +63,37 @@ def _column(part: int, name: str, sliding: Sequence[str]) -> str:
 
 
 def read_trajectory(path: str | Path) -> Trajectory:
-    """A trajectory from its table; InputError where a column is missing or time is uneven."""
+    """A trajectory from its table; InputError where a column is missing, a value is not finite or time is uneven."""
     path = Path(path)
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
     columns = read_columns(path)
-    split = [column.partition(".") for column in columns]
-    names = tuple(name for prefix, _, name in split if prefix in (_TURNING[0], _SLIDING[0]))
-    sliding = tuple(name for prefix, _, name in split if prefix == _SLIDING[0])
+    names, sliding = _named(tuple(columns))
     wanted = [[_column(part, name, sliding) for name in names] for part in range(3)]
-    listed = ["time_s", *(column for part in wanted for column in part)]
-    missing = [column for column in listed if column not in columns]
+    listed_columns = ["time_s", *(column for part in wanted for column in part)]
+    missing = [column for column in listed_columns if column not in columns]
     if missing or not names:
-        raise InputError(f"{path}: no column(s) {', '.join(missing) or 'position_rad.<joint>'}")
+        raise InputError(f"{path}: no column(s) {listed(missing) or 'position_rad.<joint>'}")
+    for column in listed_columns:
+        odd = np.flatnonzero(~(np.abs(columns[column]) < LARGEST_NUMBER))
+        if len(odd):
+            raise InputError(
+                f"{path}: column '{column}', row {odd[0] + 1}: {columns[column][odd[0]]:g} is no motion"
+            )
     steps = np.diff(columns["time_s"])
-    if len(steps) < 2 or np.abs(steps - steps[0]).max() > 1e-6 * abs(steps[0]) + 1e-9:
-        raise InputError(f"{path}: a trajectory needs evenly spaced times")
+    if len(steps) < 2 or not steps[0] > 0 or np.abs(steps - steps[0]).max() > 1e-6 * steps[0] + 1e-9:
+        raise InputError(f"{path}: a trajectory needs evenly spaced, growing times")
     q, qd, qdd = (np.column_stack([columns[column] for column in part]) for part in wanted)
     return Trajectory(names, columns["time_s"] - columns["time_s"][0], q, qd, qdd, sliding)
+
+
+def trajectory_joints(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the joints that a trajectory's table moves, and of those that slide, without reading all of it."""
+    return _named(column_names(Path(path)))
+
+
+def _named(columns: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    split = [column.partition(".") for column in columns]
+    names = tuple(name for prefix, _, name in split if prefix in (_TURNING[0], _SLIDING[0]))
+    return names, tuple(name for prefix, _, name in split if prefix == _SLIDING[0])
 
 
 def sliding_joints(chain: Chain) -> tuple[str, ...]:

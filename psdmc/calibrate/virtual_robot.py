@@ -7,8 +7,8 @@ The motion is prescribed, as a stiff position controller would keep it; the moto
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.integrate import odeint
+from scipy.integrate import ODEintWarning, odeint
 
 from psdmc.calibrate.log import Log
+from psdmc.calibrate.plant_file import Harness, JointTruth, PlantRobot, Sensors, read_plant
 from psdmc.calibrate.trajectory import Trajectory
 from psdmc.errors import InputError
 
@@ -30,52 +31,6 @@ ABSOLUTE_ERROR = 1e-14
 """rad: a millionth of the stiffest joint's smallest deflection of interest."""
 LONGEST_STEP = 2e-3
 """s: no reversal of a sine below 50 Hz is stepped over."""
-
-
-@dataclass(frozen=True, slots=True)
-class JointTruth:
-    """One joint's motor and friction: K_t (N m/A) and the seven LuGre parameters of (12) to (14), SI."""
-
-    name: str
-    torque_constant: float
-    coulomb: float
-    static: float
-    stribeck_velocity: float
-    viscous: float
-    viscous_exponent: float
-    stiffness: float
-    damping: float
-
-    def bristle_limit(self, v: float) -> float:
-        """g(v), (13)."""
-        ratio = v / self.stribeck_velocity
-        peak = (self.static - self.coulomb) * math.exp(-ratio * ratio) if abs(ratio) < 25.0 else 0.0
-        return (self.coulomb + peak) / self.stiffness
-
-
-@dataclass(frozen=True, slots=True)
-class Sensors:
-    """How the log differs from the truth.
-
-    position_step   rad, quantisation
-    current_noise   A RMS, white
-    current_step    A, quantisation
-    effort_delay    s; a row's current belongs to a motion this much later
-    """
-
-    position_step: float = 0.0
-    current_noise: float = 0.0
-    current_step: float = 0.0
-    effort_delay: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Harness:
-    """A cable harness that no model here knows: a spring that saturates at `torque` (N m) beyond about `angle` (rad)."""
-
-    joints: tuple[str, ...]
-    torque: float
-    angle: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +56,13 @@ class VirtualRobot:
     def joint_names(self) -> tuple[str, ...]:
         return tuple(joint.name for joint in self.joints)
 
+    @property
+    def sliding(self) -> tuple[str, ...]:
+        """Names of the joints that slide."""
+        kinds = [self.model.joints[k].shortname() for k in range(1, self.model.njoints)]
+        pairs = zip(self.joint_names, kinds, strict=True)
+        return tuple(name for name, kind in pairs if kind == "JointModelPZ")
+
 
 def load_virtual_robot(
     path: str | Path, *, ideal_sensors: bool = False, harness: bool = False
@@ -108,75 +70,35 @@ def load_virtual_robot(
     """A plant from its TOML file; `robot` there names a DH file beside it.
 
     ideal_sensors  no noise, no steps, no delay;  harness  with the file's cable harness
+    InputError names what is wrong with either file.
     """
-    path = Path(path)
-    plant = _toml(path)
-    robot = _toml(path.parent / plant["robot"])
-    model, tip = _pinocchio_model(robot)
-    joints = tuple(JointTruth(**joint) for joint in plant["joint"])
-    names = [joint["name"] for joint in robot["joint"]]
-    if [joint.name for joint in joints] != names:
-        raise InputError(f"{path}: joints {[joint.name for joint in joints]}, the robot has {names}")
-    sensors = Sensors() if ideal_sensors else Sensors(**plant.get("sensors", {}))
-    held = _harness(path, plant) if harness else None
-    return VirtualRobot(str(robot["name"]), model, tip, joints, sensors, held)
-
-
-def plant_texts(path: str | Path) -> tuple[str, ...]:
-    """The texts that decide a plant: its own file and its robot's."""
-    path = Path(path)
-    robot = path.parent / _toml(path)["robot"]
-    return path.read_text(encoding="utf-8"), robot.read_text(encoding="utf-8")
-
-
-def _harness(path: Path, plant: Mapping[str, Any]) -> Harness:
-    if "harness" not in plant:
+    plant = read_plant(Path(path))
+    if harness and plant.harness is None:
         raise InputError(f"{path}: no [harness] in this file")
-    spring = plant["harness"]
-    return Harness(tuple(spring["joints"]), spring["torque"], spring["angle"])
+    model, tip = _pinocchio_model(plant.robot)
+    sensors = Sensors() if ideal_sensors else plant.sensors
+    held = plant.harness if harness else None
+    return VirtualRobot(plant.robot.name, model, tip, plant.joints, sensors, held)
 
 
-def _toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-
-
-def _pinocchio_model(robot: Mapping[str, Any]) -> tuple[Any, Any]:
+def _pinocchio_model(robot: PlantRobot) -> tuple[Any, Any]:
     """Pinocchio's model of a standard DH table, and the tip's placement in the last joint."""
-    if robot["convention"] != "standard":
-        raise InputError(f"{robot['name']}: a virtual robot needs standard DH", "convert the table")
     model = pin.Model()
-    model.gravity.linear = np.array(robot["gravity"], dtype=float)
+    model.gravity.linear = np.array(robot.gravity)
     parent, placement = 0, pin.SE3.Identity()
-    for row in robot["joint"]:
-        revolute = row["type"] == "revolute"
-        turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, _angle(row["theta"])), np.zeros(3))
-        rest = pin.SE3(
-            pin.rpy.rpyToMatrix(_angle(row["alpha"]), 0.0, 0.0), np.array([row["a"], 0.0, row["d"]])
-        )
-        before, after = (placement, turn * rest) if revolute else (placement * turn, rest)
-        kind = pin.JointModelRZ() if revolute else pin.JointModelPZ()
-        parent = model.addJoint(parent, kind, before, row["name"])
-        model.appendBodyToJoint(parent, _inertia(row["link"]), after)
+    for row in robot.rows:
+        turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, row.theta), np.zeros(3))
+        rest = pin.SE3(pin.rpy.rpyToMatrix(row.alpha, 0.0, 0.0), np.array([row.a, 0.0, row.d]))
+        before, after = (placement * turn, rest) if row.slides else (placement, turn * rest)
+        kind = pin.JointModelPZ() if row.slides else pin.JointModelRZ()
+        parent = model.addJoint(parent, kind, before, row.name)
+        body = pin.Inertia(row.mass, np.array(row.com), np.array(row.inertia_com))
+        model.appendBodyToJoint(parent, body, after)
         armature = np.array(model.armature)
-        armature[model.joints[parent].idx_v] = row.get("drive_inertia", 0.0)
+        armature[model.joints[parent].idx_v] = row.drive_inertia
         model.armature = armature
         placement = after
     return model, placement
-
-
-def _angle(value: float | str) -> float:
-    if isinstance(value, str):
-        return math.radians(float(value.removesuffix("deg")))
-    return float(value)
-
-
-def _inertia(link: Mapping[str, Any]) -> Any:
-    i = link["inertia_com"]
-    matrix = np.array([[i["xx"], i["xy"], i["xz"]], [i["xy"], i["yy"], i["yz"]], [i["xz"], i["yz"], i["zz"]]])
-    return pin.Inertia(link["mass"], np.array(link["com"], dtype=float), matrix)
 
 
 def simulate(
@@ -268,16 +190,21 @@ def _friction(joint: JointTruth, trajectory: Trajectory, k: int, delay: float) -
         v = speed(t)
         return [[-abs(v) / joint.bristle_limit(v)]]
 
-    bend = odeint(
-        bend_rate,
-        [0.0],
-        grid,
-        Dfun=jacobian,
-        rtol=RELATIVE_ERROR,
-        atol=ABSOLUTE_ERROR,
-        hmax=LONGEST_STEP,
-        mxstep=100_000,
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ODEintWarning)  # told below, with the joint's name
+        bend, told = odeint(
+            bend_rate,
+            [0.0],
+            grid,
+            Dfun=jacobian,
+            rtol=RELATIVE_ERROR,
+            atol=ABSOLUTE_ERROR,
+            hmax=LONGEST_STEP,
+            mxstep=100_000,
+            full_output=True,
+        )
+    if told["message"] != "Integration successful.":
+        raise InputError(f"joint {joint.name}: its friction cannot be integrated: {told['message']}")
     torque = [
         _friction_torque(joint, speed(t), float(z)) for t, z in zip(grid.tolist(), bend[:, 0], strict=True)
     ]

@@ -13,7 +13,7 @@ from psdmc.bench.run import Settings, run
 from psdmc.bench.table import as_text
 from psdmc.calibrate.calibrate import CalibrateOptions
 from psdmc.calibrate.campaign import CampaignOptions
-from psdmc.calibrate.excite import ExciteOptions
+from psdmc.calibrate.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
 from psdmc.calibrate.simulate_campaign import SimulateOptions
 from psdmc.cli.progress import steps
 from psdmc.cli.show import print_accuracy
@@ -49,16 +49,21 @@ def bench(
 def excite(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder of the campaign")],
-    duration: Annotated[float, typer.Option(min=0.1, help="s, period of the exciting motion")] = 10.0,
-    harmonics: Annotated[int, typer.Option(min=1, help="sines per joint")] = 3,
+    duration: Annotated[
+        float, typer.Option(min=0.1, max=LONGEST_DURATION, help="s, period of the exciting motion")
+    ] = 10.0,
+    harmonics: Annotated[int, typer.Option(min=1, max=MOST_HARMONICS, help="sines per joint")] = 3,
     seconds: Annotated[float, typer.Option(min=1.0, help="s, longest search")] = ExciteOptions().seconds,
     log_det: Annotated[
         bool, typer.Option("--log-det", help="maximise log det instead of the condition")
     ] = False,
-    seed: Annotated[int, typer.Option(help="of the search")] = 1,
+    seed: Annotated[int, typer.Option(min=1, help="of the search")] = 1,
     acceleration: Annotated[
         float | None, typer.Option(min=0.1, help="rad/s^2, for joints whose file gives no limit (any URDF)")
     ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="replace the campaign that is in DIR; its logs stay")
+    ] = False,
 ) -> None:
     """Plan a calibration campaign: gravity sweeps, friction sines, and an exciting motion within the limits."""
     search = ExciteOptions(
@@ -70,7 +75,7 @@ def excite(
     )
     with steps() as progress:
         found = excite_command(
-            model, output, CampaignOptions(excite=search, acceleration=acceleration), progress
+            model, output, CampaignOptions(excite=search, acceleration=acceleration), progress, force
         )
     best = found.random_conditions[0]
     print(
@@ -85,7 +90,7 @@ def simulate(
     harness: Annotated[
         bool, typer.Option("--harness", help="with a cable harness, which no model has")
     ] = False,
-    seed: Annotated[int, typer.Option(help="of the sensors' noise")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="of the sensors' noise")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 1,
 ) -> None:
     """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
@@ -145,7 +150,12 @@ def _torque_constants(text: str) -> dict[str, float] | None:
     for word in text.split(","):
         name, _, value = word.rpartition("=")
         try:
-            found[name] = float(value)
+            constant = float(value)
         except ValueError:
             raise InputError(f"--torque-constants: {word!r}", "write JOINT=NUMBER,JOINT=NUMBER") from None
+        name = name.strip()
+        if not name or name in found:
+            what = f"joint {name!r} twice" if name else f"{word!r} names no joint"
+            raise InputError(f"--torque-constants: {what}", "write JOINT=NUMBER,JOINT=NUMBER")
+        found[name] = constant
     return found

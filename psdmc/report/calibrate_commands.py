@@ -8,7 +8,7 @@ from pathlib import Path
 from psdmc.atomic import write_together, write_whole
 from psdmc.calibrate.actuators import actuator_files, calibrated_actuators
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
-from psdmc.calibrate.campaign import CampaignOptions, plan_campaign, write_campaign
+from psdmc.calibrate.campaign import CampaignOptions, plan_campaign, require_free, write_campaign
 from psdmc.calibrate.excite import Excitation
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.record import Calibration
@@ -29,13 +29,22 @@ def silent(step: str) -> None:
 
 
 def excite_command(
-    model: str | Path, folder: str | Path, options: CampaignOptions | None = None, progress: Progress = silent
+    model: str | Path,
+    folder: str | Path,
+    options: CampaignOptions | None = None,
+    progress: Progress = silent,
+    force: bool = False,
 ) -> Excitation:
-    """Plan a whole campaign for a model file: trajectories, campaign.toml, excitation.json, .csv and .svg in `folder`."""
+    """Plan a whole campaign for a model file: trajectories, campaign.toml, excitation.json, .csv and .svg in `folder`.
+
+    force   replace the plan of a campaign that is there; without it, InputError before anything is searched
+    """
     options = options or CampaignOptions()
+    if not force:
+        require_free(folder)
     known = load(model)
     runs, found = plan_campaign(known.chain, regressor_of(known, progress), known.l, options, progress)
-    campaign = write_campaign(folder, runs, found, options.table)
+    campaign = write_campaign(folder, runs, found, options.table, force=force)
     one_period = found.motion.sampled(known.joint_names, options.sweep.period)
     write_trajectory(one_period, campaign.parent / "excitation.csv")
     picture = excitation_figure(found, known.joint_names)

@@ -57,7 +57,7 @@ def run_demo(
     for name, ideal, harness in VARIANTS:
         if name not in variants:
             continue
-        campaign = write_campaign(folder / name, runs, found, "npz")
+        campaign = write_campaign(folder / name, runs, found, "npz", force=True)
         options = SimulateOptions(ideal_sensors=ideal, harness=harness, workers=workers)
         count = simulate_campaign(PLANT, campaign, options)
         step(f"{name}: {count} logs simulated, {len(runs) - count} were there")

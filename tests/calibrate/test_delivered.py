@@ -14,7 +14,7 @@ from test_four_steps import with_logs
 from test_ur10 import model as ur10_model  # noqa: F401  a fixture
 
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
-from psdmc.calibrate.campaign import read_campaign
+from psdmc.calibrate.campaign_file import read_campaign
 from psdmc.calibrate.delivered import delivered_quality
 from psdmc.calibrate.filter import filtered, smoothed_rows, thinned
 from psdmc.calibrate.linear_fit import LinearOptions

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
-from psdmc.calibrate.campaign import listed_runs, read_campaign
+from psdmc.calibrate.campaign_file import listed_runs, read_campaign
 from psdmc.calibrate.four_steps import calibrate_four_steps
 from psdmc.calibrate.gravity import calibrate_gravity, gravity_split
 from psdmc.calibrate.motor_model import Motors
@@ -214,11 +214,15 @@ def test_a_gravity_run_that_does_not_come_back_is_refused(arm, noisy):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"no \[\[run\]\]"),
-        ("[[run]]\nstep = 'dance'\nlog = 'a.csv'", "run 1: step 'dance'"),
-        ("[[run]]\nstep = 'gravity'", "run 1: no 'log'"),
-        ("[[run]]\nstep = 'friction'\nlog = 'a.csv'", "run 1: a friction run needs its 'joint'"),
-        ("[[run]]\nstep = 'motor'\njoint = 'a'\nlog = 'a.csv'\nload = 3", "run 1: load 3"),
+        ("# nothing", r"no \[\[run\]\]"),
+        ("", "is empty"),
+        ("[[run]]\nstep = 'dance'\nlog = 'a.csv'", "run 1: step: found 'dance', expected one of motor"),
+        ("[[run]]\nstep = 'gravity'", "run 1: log: missing"),
+        ("[[run]]\nstep = 'friction'\nlog = 'a.csv'", "run 1: joint: missing"),
+        (
+            "[[run]]\nstep = 'motor'\njoint = 'a'\nlog = 'a.csv'\nload = 3",
+            "run 1: load: found 3, expected a table",
+        ),
         ("step =", "not TOML"),
     ],
 )

@@ -92,7 +92,7 @@ def test_a_csv_of_words_is_refused(tmp_path: Path):
     path = tmp_path / "run.csv"
     path.write_text("time_s,position_rad.a,current_a.a\n0,zero,1\n", encoding="utf-8")
 
-    with pytest.raises(InputError, match="not a table of numbers"):
+    with pytest.raises(InputError, match=r"line 2, column 'position_rad.a': 'zero' is no number"):
         read_log(path)
 
 
