@@ -14,6 +14,9 @@ from psdmc.calibrate.log import Array, Log
 from psdmc.calibrate.position_noise import noise_like, position_noise, resting
 from psdmc.errors import InputError
 
+SMALLEST_CUTOFF, LARGEST_CUTOFF = 0.01, 10_000.0
+"""Hz: a filter slower than minutes, or faster than any log of a robot, is a slip."""
+
 
 @dataclass(frozen=True, slots=True)
 class FilterOptions:
@@ -27,6 +30,12 @@ class FilterOptions:
     cutoff: float = 15.0
     order: int = 8
     settle: float = 3.0
+
+    def __post_init__(self) -> None:
+        if not SMALLEST_CUTOFF <= self.cutoff <= LARGEST_CUTOFF:
+            raise InputError(
+                f"cut-off is {self.cutoff:g} Hz, expected {SMALLEST_CUTOFF:g} to {LARGEST_CUTOFF:g} Hz"
+            )
 
 
 @dataclass(frozen=True, slots=True)

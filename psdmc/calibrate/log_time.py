@@ -117,6 +117,6 @@ def _too_slow(log: Log, cutoff: float, options: CheckOptions) -> list[FaultAndRe
         (
             f"sampling at {rate:.4g} Hz is too slow for a cut-off of {cutoff:g} Hz, "
             f"expected at least {options.samples_per_cycle * cutoff:g} Hz",
-            f"record faster, or filter at {rate / options.samples_per_cycle:.3g} Hz or less",
+            f"record faster, or filter a plain log at {rate / options.samples_per_cycle:.3g} Hz or less: --cutoff",
         )
     ]

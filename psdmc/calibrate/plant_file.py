@@ -11,7 +11,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from psdmc.calibrate.foreign_bytes import LARGEST_TOML, opened
+import numpy as np
+
+from psdmc.calibrate.foreign_bytes import LARGEST_TOML, decoding, opened
 from psdmc.calibrate.toml_tables import TomlTable, is_number, read_toml, require_none, toml_content
 from psdmc.calibrate.wording import listed, quoted
 from psdmc.errors import InputError
@@ -35,6 +37,8 @@ LARGEST_LENGTH = 1e3
 """m, of a link;  also m/s^2 of gravity."""
 LARGEST_BODY = 1e6
 """kg, kg m^2 of a link or drive."""
+ROUNDED = 1e-12
+"""Share of an inertia's largest entry by which a principal moment may be negative: rounding."""
 LARGEST_PLANT = 100
 """Joints of a virtual robot."""
 
@@ -209,7 +213,8 @@ def read_plant_robot(path: Path) -> PlantRobot:
     with opened(path, LARGEST_TOML) as file:
         data = file.read()
     content = toml_content(data, str(path), "a robot as a DH table (.toml)")
-    read_dh(data.decode("utf-8-sig").replace("\r\n", "\n"), str(path))  # refuses what is malformed
+    with decoding(str(path), "a DH table"):
+        read_dh(data.decode("utf-8-sig").replace("\r\n", "\n"), str(path))  # refuses what is malformed
     faults: list[str] = []
     if content.get("convention", "standard") != "standard":
         faults.append("a virtual robot needs standard DH")
@@ -237,6 +242,10 @@ def _row(joint: dict[str, Any], faults: list[str]) -> PlantRow:
     xx, yy, zz, xy, xz, yz = (
         inertia.number(name, -LARGEST_BODY, LARGEST_BODY) for name in ("xx", "yy", "zz", "xy", "xz", "yz")
     )
+    matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    largest = max(abs(entry) for row in matrix for entry in row)
+    if float(np.linalg.eigvalsh(matrix)[0]) < -ROUNDED * largest:
+        faults.append(f"{where}: inertia_com: no body has it: it has a negative principal moment")
     return PlantRow(
         name=str(joint.get("name", "")),
         slides=joint.get("type", "revolute") == "prismatic",
@@ -247,7 +256,7 @@ def _row(joint: dict[str, Any], faults: list[str]) -> PlantRow:
         drive_inertia=table.number("drive_inertia", 0.0, LARGEST_BODY),
         mass=body.number("mass", 0.0, LARGEST_BODY),
         com=body.triple("com", LARGEST_LENGTH),
-        inertia_com=((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)),
+        inertia_com=matrix,
     )
 
 

@@ -12,6 +12,8 @@ from psdmc.calibrate.foreign_bytes import LARGEST_TOML, decoding, opened
 from psdmc.calibrate.wording import first_faults, listed, quoted
 from psdmc.errors import InputError
 
+LONGEST_TEXT = 500
+"""Characters of a name or path."""
 _ZIP = b"PK\x03\x04"
 
 
@@ -66,13 +68,13 @@ class TomlTable:
         return low
 
     def text(self, key: str, default: str | None = None) -> str:
-        """A text that is not empty and has no control characters."""
+        """A text that is neither empty nor longer than LONGEST_TEXT, and has no control characters."""
         if key not in self.content and default is not None:
             return default
         value = self.content.get(key)
-        if isinstance(value, str) and value and value.isprintable():
+        if isinstance(value, str) and 0 < len(value) <= LONGEST_TEXT and value.isprintable():
             return value
-        self._fault(key, value, "a text")
+        self._fault(key, value, f"a text of at most {LONGEST_TEXT} characters")
         return ""
 
     def word(self, key: str, words: tuple[str, ...]) -> str:

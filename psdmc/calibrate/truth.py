@@ -10,6 +10,8 @@ import numpy as np
 from psdmc.calibrate.lugre import PARAMETERS
 from psdmc.calibrate.record import Calibration
 from psdmc.calibrate.virtual_robot import VirtualRobot
+from psdmc.calibrate.wording import listed
+from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 
 
@@ -52,26 +54,41 @@ def compare(record: Calibration, true_model: DynamicsModel, robot: VirtualRobot)
     """Errors of a campaign's record; the model of the truth has the same base parameters as the record's."""
     assert true_model.theta_b is not None
     truth = true_model.theta_b
-    error = np.array([row.value for row in record.parameters]) - truth
     std = np.array([row.std for row in record.parameters])
     groups = np.array([row.group for row in record.parameters])
     joints = {joint.name: joint for joint in robot.joints}
-    constants = [abs(row.value / joints[row.joint].torque_constant - 1.0) for row in record.motors]
+    unknown = [row.joint for row in (*record.motors, *record.friction) if row.joint not in joints]
+    if unknown:
+        raise InputError(
+            f"{robot.name}: not the robot that was calibrated: it has no joint {listed(unknown)}"
+        )
+    error = np.array([row.value for row in record.parameters]) - truth
+    constants = [_relative(row.value, joints[row.joint].torque_constant) for row in record.motors]
     friction = {
         name: max(
-            abs(row.value / getattr(joints[row.joint], name) - 1.0)
-            for row in record.friction
-            if row.name == name
+            (
+                _relative(row.value, getattr(joints[row.joint], name))
+                for row in record.friction
+                if row.name == name
+            ),
+            default=0.0,
         )
         for name in PARAMETERS
     }
     return Comparison(
-        torque_constant=float(max(constants)),
+        torque_constant=max(constants, default=0.0),
         gravity=_largest(error, truth, groups == "gravity"),
         inertial=_largest(error, truth, groups == "inertial"),
         friction={name: float(value) for name, value in friction.items()},
         within_three_std=float(np.mean(np.abs(error) < 3.0 * std)),
     )
+
+
+def _relative(found: float, truth: float) -> float:
+    """Relative error; infinite where the truth is zero and something was found."""
+    if truth == 0.0:
+        return 0.0 if found == 0.0 else float("inf")
+    return abs(found / truth - 1.0)
 
 
 def _largest(error: np.ndarray, truth: np.ndarray, group: np.ndarray) -> float:

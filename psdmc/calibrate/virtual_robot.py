@@ -18,6 +18,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.integrate import ODEintWarning, odeint
 
+from psdmc.calibrate.foreign_bytes import decoding
 from psdmc.calibrate.log import Log
 from psdmc.calibrate.plant_file import Harness, JointTruth, PlantRobot, Sensors, read_plant
 from psdmc.calibrate.trajectory import Trajectory
@@ -75,7 +76,8 @@ def load_virtual_robot(
     plant = read_plant(Path(path))
     if harness and plant.harness is None:
         raise InputError(f"{path}: no [harness] in this file")
-    model, tip = _pinocchio_model(plant.robot)
+    with decoding(str(path), "a robot that Pinocchio takes"):
+        model, tip = _pinocchio_model(plant.robot)
     sensors = Sensors() if ideal_sensors else plant.sensors
     held = plant.harness if harness else None
     return VirtualRobot(plant.robot.name, model, tip, plant.joints, sensors, held)

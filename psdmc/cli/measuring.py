@@ -13,7 +13,10 @@ from psdmc.bench.run import Settings, run
 from psdmc.bench.table import as_text
 from psdmc.calibrate.calibrate import CalibrateOptions
 from psdmc.calibrate.campaign import CampaignOptions
+from psdmc.calibrate.campaign_file import is_campaign
 from psdmc.calibrate.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
+from psdmc.calibrate.filter import FilterOptions
+from psdmc.calibrate.linear_fit import LinearOptions
 from psdmc.calibrate.simulate_campaign import SimulateOptions
 from psdmc.cli.progress import steps
 from psdmc.cli.show import print_accuracy
@@ -119,6 +122,9 @@ def calibrate(
     torque_constants: Annotated[
         str, typer.Option(metavar="JOINT=KT,...", help="N m/A, for plain logs that hold currents")
     ] = "",
+    cutoff: Annotated[
+        float | None, typer.Option(metavar="HZ", help="of the filter of plain logs; 8, or less for slow logs")
+    ] = None,
 ) -> None:
     """Identify base parameters, friction and motor constants from logs."""
     with steps() as progress:
@@ -127,7 +133,7 @@ def calibrate(
             logs,
             output,
             report,
-            CalibrateOptions(physical=physical is not False),
+            CalibrateOptions(physical=physical is not False, linear=_linear(cutoff, logs)),
             _torque_constants(torque_constants),
             actuators,
             progress,
@@ -140,6 +146,16 @@ def calibrate(
         print(f"note: {note}")
     for warning in record.warnings:
         print(f"warning: {warning}")
+
+
+def _linear(cutoff: float | None, logs: list[Path]) -> LinearOptions:
+    """Options of the linear fit; a campaign's steps have cut-offs of their own."""
+    if cutoff is None:
+        return LinearOptions()
+    campaigns = [path for path in logs if is_campaign(path)]
+    if campaigns:
+        raise InputError(f"--cutoff is for plain logs, {campaigns[0]} is a campaign", "leave it out")
+    return LinearOptions(filter=FilterOptions(cutoff=cutoff))
 
 
 def _torque_constants(text: str) -> dict[str, float] | None:

@@ -131,7 +131,7 @@ def test_thirty_hertz_are_enough_where_the_cut_off_suits(arm, log: Log):
     assert len(checked(slow, arm.model.chain, 7.5)) == 375
     with pytest.raises(InputError) as raised:
         checked(slow, arm.model.chain, 8.0)
-    assert "filter at 7.81 Hz or less" in (raised.value.hint or "")
+    assert "filter a plain log at 7.81 Hz or less: --cutoff" in (raised.value.hint or "")
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
