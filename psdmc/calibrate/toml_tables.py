@@ -12,7 +12,9 @@ from psdmc.calibrate.foreign_bytes import LARGEST_TOML, decoding, opened
 from psdmc.calibrate.wording import first_faults, listed, quoted
 from psdmc.errors import InputError
 
-LONGEST_TEXT = 500
+LONGEST_LINE = 500
+"""Characters of a line: the time of the standard library's reader grows with the square of a dotted key's parts."""
+LONGEST_TEXT = 300
 """Characters of a name or path."""
 _ZIP = b"PK\x03\x04"
 
@@ -34,6 +36,9 @@ def toml_content(data: bytes, name: str, what: str) -> dict[str, Any]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{name}: is no text in UTF-8: expected {what}") from error
+    longest = max((len(line) for line in text.split("\n")), default=0)
+    if longest > LONGEST_LINE:
+        raise InputError(f"{name}: a line of {longest:,} characters, expected at most {LONGEST_LINE:,}")
     with decoding(name, "TOML"):
         return tomllib.loads(text.replace("\r\n", "\n"))
 

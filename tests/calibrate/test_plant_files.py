@@ -91,12 +91,14 @@ def test_many_faults_are_cut_short(arm, tmp_path: Path):
 def test_what_is_no_plant_is_told_what_a_plant_is(arm, tmp_path: Path):
     save(arm.model, tmp_path / "model.npz")
     (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"')
-    (tmp_path / "deep.toml").write_text("a = " + "[" * 100_000, encoding="utf-8")
+    (tmp_path / "deep.toml").write_text("a = " + "[\n" * 100_000, encoding="utf-8")
+    (tmp_path / "dotted.toml").write_text("a" + ".a" * 100_000 + " = 1", encoding="utf-8")
     (tmp_path / "huge.toml").write_text("#" * 300_000, encoding="utf-8")
     for name, message in (
         ("model.npz", "is a zip or npz file, such as a model: expected a plant"),
         ("latin.toml", "is no text in UTF-8: expected a plant"),
         ("deep.toml", "not TOML, or damaged"),
+        ("dotted.toml", "a line of 200,005 characters, expected at most 500"),
         ("huge.toml", "has 300,000 bytes, expected at most 262,144"),
         ("missing.toml", "no such file"),
         (".", "is not a file"),
