@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import codecs
 import csv
-import io
 from collections.abc import Sequence
 
 import numpy as np
@@ -124,7 +123,7 @@ def _with_points(body: str, separator: str, name: str) -> str:
 def _numbers(body: str, separator: str) -> Array | None:
     """(rows, columns), or None where a cell is no number or a line has more cells than another."""
     try:
-        return np.loadtxt(io.StringIO(body), delimiter=separator, comments=None, quotechar='"', ndmin=2)
+        return np.loadtxt(body.split("\n"), delimiter=separator, comments=None, quotechar='"', ndmin=2)
     except (ValueError, csv.Error):
         return None
 

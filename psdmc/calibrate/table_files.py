@@ -24,6 +24,8 @@ from psdmc.calibrate.wording import listed, quoted
 from psdmc.errors import InputError
 
 TABLES = (".csv", ".parquet", ".npz")
+LARGEST_HEADER = 1024**2
+"""Bytes of a CSV file's first line: a thousand columns with a thousand letters each."""
 
 
 def read_columns(path: Path) -> dict[str, Array]:
@@ -47,7 +49,7 @@ def column_names(path: Path) -> tuple[str, ...]:
     kind = _kind(path)
     with opened(path) as file:
         if kind == ".csv":
-            return header_names(file.readline(), str(path))
+            return header_names(file.readline(LARGEST_HEADER), str(path))
         return (npz_names if kind == ".npz" else parquet_names)(file, str(path))
 
 
