@@ -69,7 +69,7 @@ def test_currents_with_constants_give_what_torques_give(arm, log: Log):
     ]
 
     one, other = (record.model.theta_b for record in found)
-    assert one == pytest.approx(other, rel=1e-9)
+    assert one == pytest.approx(other, rel=1e-6)  # the convex solver stops at about 1e-9
 
 
 def runs_of(log: Log) -> Runs:
