@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.derive.certify import certificate
-from psdmc.derive.expand import COEFFICIENT_TOLERANCE, VALUE_NOISE, Progress, expand
+from psdmc.derive.expand import Progress, expand, precision_for
+from psdmc.derive.link_by_link import EFFECT
 from psdmc.derive.reduce import PIVOT_TOLERANCE, Reduction
 from psdmc.derive.rounding import merged
-from psdmc.derive.sampled import sampled_reduction
+from psdmc.derive.sampled import reduction_of
 from psdmc.derive.units import Scaled, parameter_units, scaled
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
@@ -25,6 +26,9 @@ Array = NDArray[np.float64]
 
 EQUATION_NOISE = 3e-14
 """Relative uncertainty of a coefficient of B: rounding, magnified by the back substitution."""
+
+LAST_DIGIT = 4e-16
+"""The same where B was found in extended precision."""
 
 
 def derive_model(
@@ -46,7 +50,7 @@ def derive_model(
     tell = progress or _silent
     robot = scaled(chain)
     tell("base parameters")
-    reduction = sampled_reduction(robot)
+    reduction = reduction_of(robot)
     if not len(reduction.pivots):
         raise DerivationError(
             f"'{chain.name}': no inertial parameter has any effect on any joint",
@@ -61,7 +65,7 @@ def derive_model(
         B=B,
         chain=chain,
         certificate=np.zeros(len(chain)),
-        provenance=_plain(dict(provenance or {}) | {"tolerances": tolerances()}),
+        provenance=_plain(dict(provenance or {}) | {"tolerances": tolerances(robot, reduction)}),
     )
     tell("certificate")
     return replace(model, certificate=certificate(model))
@@ -80,14 +84,19 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
     return plain
 
 
-def tolerances() -> dict[str, float]:
+def tolerances(robot: Scaled, reduction: Reduction) -> dict[str, float]:
     """The numbers that decided."""
+    precision = precision_for(robot, reduction)
     return {
-        "coefficient": COEFFICIENT_TOLERANCE,
-        "value_noise": VALUE_NOISE,
-        "pivot": PIVOT_TOLERANCE,
-        "equation_noise": EQUATION_NOISE,
+        "coefficient": precision.zero,
+        "value_noise": precision.noise,
+        "pivot": PIVOT_TOLERANCE if reduction.is_clear else EFFECT,
+        "equation_noise": _equation_noise(reduction),
     }
+
+
+def _equation_noise(reduction: Reduction) -> float:
+    return EQUATION_NOISE if reduction.is_clear else LAST_DIGIT
 
 
 def base_map(robot: Scaled, reduction: Reduction) -> Array:
@@ -95,9 +104,8 @@ def base_map(robot: Scaled, reduction: Reduction) -> Array:
     units = parameter_units(robot.kinds, robot.unit)[robot.leads]
     echelon = reduction.echelon * units[reduction.pivots][:, None] / units
     B = np.zeros((len(reduction.pivots), PARAMETERS_PER_LINK * len(robot.kinds)))
-    B[:, robot.leads] = merged(echelon.reshape(-1), EQUATION_NOISE * np.abs(echelon.reshape(-1))).reshape(
-        echelon.shape
-    )
+    noise = _equation_noise(reduction) * np.abs(echelon.reshape(-1))
+    B[:, robot.leads] = merged(echelon.reshape(-1), noise).reshape(echelon.shape)
     return B
 
 

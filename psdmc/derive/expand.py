@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from psdmc.derive.extended import extended, has_small_entries
 from psdmc.derive.functions import Functions
 from psdmc.derive.gravity import gravity_terms
 from psdmc.derive.inertia import mass_matrix_terms
@@ -39,6 +40,19 @@ VALUE_NOISE = 1e-14
 differ by up to 2e-15 (KR6, LBR7), different ones by more than 1e-4 there."""
 
 
+class Precision(NamedTuple):
+    """What rounding leaves of an exact zero, and of a coefficient of size one (relative for larger ones), lengths in the
+    robot's unit."""
+
+    zero: float
+    noise: float
+
+
+IN_DOUBLE = Precision(COEFFICIENT_TOLERANCE, VALUE_NOISE)
+EXTENDED = Precision(1e-15, 1e-16)
+"""Where columns are nearly dependent: coefficients of size tilt^2 count. Rounding leaves less than 1e-17 there."""
+
+
 class Expansion(NamedTuple):
     """E (5n, p) and P (n of (p, l)) in SI."""
 
@@ -49,46 +63,60 @@ class Expansion(NamedTuple):
 def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int | None = None) -> Expansion:
     """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of
     what is free)."""
-    kinds = scaled.kinds
+    kinds, precision = scaled.kinds, precision_for(scaled, reduction)
+    if precision is EXTENDED:
+        scaled = extended(scaled)
     functions = Functions(kinds)
     available = available_memory() if memory is None else memory
     refuse_beyond(grid_bytes(kinds), available, largest_function_count(kinds), len(kinds))
     progress("mass matrix")
     chosen = scaled.span[:, reduction.pivots]
-    mass = _mass_matrix(scaled, chosen, functions)
+    mass = _mass_matrix(scaled, chosen, functions, precision.zero)
     progress("gravity")
-    gravity = _gravity(scaled, chosen, functions)
+    gravity = _gravity(scaled, chosen, functions, precision.zero)
     progress("velocity terms")
     count, needed = velocity_bytes(mass, functions)
     refuse_beyond(needed, available, min(count, largest_function_count(kinds)), len(kinds))
-    velocity = velocity_terms(mass, functions, COEFFICIENT_TOLERANCE)
+    velocity = velocity_terms(mass, functions, precision.zero)
     progress("reduction matrices")
     terms = joined([gravity, acceleration_terms(mass, functions), velocity])
     units = parameter_units(kinds, scaled.unit)[scaled.leads[reduction.pivots]]
-    return Expansion(*assembled(terms, functions, units, scaled.unit))
+    return Expansion(*assembled(terms, functions, units, scaled.unit, precision.noise))
 
 
-def _mass_matrix(scaled: Scaled, chosen: Array, functions: Functions) -> dict[tuple[int, int], Terms]:
+def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
+    """Double where every coefficient is either rounding or far from it."""
+    return IN_DOUBLE if reduction.is_clear and not has_small_entries(scaled) else EXTENDED
+
+
+def _mass_matrix(
+    scaled: Scaled, chosen: Array, functions: Functions, zero: float
+) -> dict[tuple[int, int], Terms]:
     """In the chosen columns of the span; row 0 throughout."""
-    found = mass_matrix_terms(scaled.frames, scaled.link_frames, functions, COEFFICIENT_TOLERANCE)
+    found = mass_matrix_terms(scaled.frames, scaled.link_frames, functions, zero)
     return {
-        pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, COEFFICIENT_TOLERANCE)
+        pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, zero)
         for pair, terms in found.items()
     }
 
 
-def _gravity(scaled: Scaled, chosen: Array, functions: Functions) -> Terms:
+def _gravity(scaled: Scaled, chosen: Array, functions: Functions, zero: float) -> Terms:
     up: Vector = scaled.up
-    terms = gravity_terms(scaled.frames, scaled.link_frames, up, functions, COEFFICIENT_TOLERANCE)
-    return times_matrix(terms, chosen, COEFFICIENT_TOLERANCE)
+    terms = gravity_terms(scaled.frames, scaled.link_frames, up, functions, zero)
+    return times_matrix(terms, chosen, zero)
 
 
 def assembled(
-    terms: Terms, functions: Functions, units: Sequence[float] | Array, unit: float
+    terms: Terms,
+    functions: Functions,
+    units: Sequence[float] | Array,
+    unit: float,
+    value_noise: float = VALUE_NOISE,
 ) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
     """E and P in SI from torque terms (function: key, column: base parameter) in the robot's unit of length.
 
-    units   (l,) one unit of each base parameter in SI
+    units        (l,) one unit of each base parameter in SI
+    value_noise  uncertainty of a coefficient of size one, relative for larger ones
     """
     keys, place = np.unique(terms.function, return_inverse=True)
     exponents = functions.exponents(keys)
@@ -96,8 +124,8 @@ def assembled(
     shape = (len(keys), len(units))
     to_si = torque_units(kinds, unit)[terms.row]
     to_si /= function_units(exponents, kinds, unit)[place] * np.asarray(units)[terms.column]
-    noise = VALUE_NOISE * np.maximum(1.0, np.abs(terms.value)) * to_si
-    values = merged(terms.value * to_si, noise)
+    noise = value_noise * np.maximum(1.0, np.abs(terms.value)) * to_si
+    values = merged((terms.value * to_si).astype(np.float64), noise.astype(np.float64))
     matrices = []
     for joint in range(functions.n):
         own = np.flatnonzero(terms.row == joint)

@@ -12,14 +12,14 @@ from psdmc.derive.interpolate import LINEAR_SIZE
 from psdmc.derive.terms import Array, Terms, joined, summed
 from psdmc.derive.velocity import derivative
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.regressor import carried, twist_in
+from psdmc.dynamics.regressor import Placed, carried, twist_in
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK
 
 
 def gravity_terms(
     frames: Sequence[Frame],
-    link_frames: Sequence[Placement],
+    link_frames: Sequence[Placed],
     up: Vector,
     functions: Functions,
     tolerance: float,
@@ -49,7 +49,7 @@ def _carried(joint: Moving, direction: Vector, height: Array) -> tuple[Vector, A
 
 
 def _link_potential(
-    place: Placement, direction: Vector, height: Array, k: int, functions: Functions, tolerance: float
+    place: Placed, direction: Vector, height: Array, k: int, functions: Functions, tolerance: float
 ) -> Terms:
     x, y, z = place.translation.tolist()
     about_link, _ = twist_in(place, (direction, ZERO))

@@ -19,9 +19,9 @@ from psdmc.derive.interpolate import LINEAR_SIZE, QUADRATIC_SIZE, along_axes, ev
 from psdmc.derive.terms import Terms, joined
 from psdmc.dynamics.frames import Frame, joint_angle, joint_offset
 from psdmc.dynamics.motion import JointState
-from psdmc.dynamics.regressor import DRIVE, Twist, carried, own_twist, twist_in
+from psdmc.dynamics.regressor import DRIVE, Placed, Twist, carried, own_twist, twist_in
 from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
-from psdmc.robot.chain import PARAMETERS_PER_LINK, JointKind, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK, JointKind
 
 Array = NDArray[np.float64]
 
@@ -51,8 +51,13 @@ def moving(frame: Frame) -> Moving:
 def coefficients(at_points: Scalar, count: int, kind: JointKind) -> Array:
     """Coefficients of degree one from values at the formal points, the new joint's axis last: (count * 3 or
     2,)."""
-    values = np.broadcast_to(np.asarray(at_points, dtype=np.float64), (count, LINEAR_SIZE[kind]))
+    values = np.broadcast_to(_at_least_double(at_points), (count, LINEAR_SIZE[kind]))
     return np.concatenate([values[:, :1], values[:, 1:] - values[:, :1]], axis=1).reshape(-1)
+
+
+def _at_least_double(values: Scalar) -> Array:
+    found = np.asarray(values)
+    return np.asarray(found, dtype=np.result_type(found, np.float64))
 
 
 def column(v: Vector) -> Vector:
@@ -83,7 +88,7 @@ def _as_arrays(v: Vector) -> Vector:
 
 
 def mass_matrix_terms(
-    frames: Sequence[Frame], link_frames: Sequence[Placement], functions: Functions, tolerance: float
+    frames: Sequence[Frame], link_frames: Sequence[Placed], functions: Functions, tolerance: float
 ) -> dict[tuple[int, int], Terms]:
     """M_ij for i <= j as terms in codes and standard parameters (11 per link); `row` is the link.
 
@@ -132,14 +137,14 @@ def _at_nodes(twist: Array, inner: Sequence[JointKind]) -> Array:
     """(6, outer, nodes): a twist's coefficients along the outer joints, its values along the inner ones."""
     size = int(np.prod([LINEAR_SIZE[kind] for kind in inner], dtype=np.int64))
     batch = twist.reshape(-1, size)
-    values = along_axes([evaluation(kind) for kind in inner], np.ascontiguousarray(batch.T))
+    values = along_axes([evaluation(kind, twist.dtype) for kind in inner], np.ascontiguousarray(batch.T))
     return values.reshape(6, -1, values.shape[1])
 
 
 def _interpolated(products: Array, inner: Sequence[JointKind]) -> Array:
     """(10, outer * coefficients) from (10, outer, nodes)."""
     batch = products.reshape(-1, products.shape[-1])
-    found = along_axes([interpolation(kind) for kind in inner], np.ascontiguousarray(batch.T))
+    found = along_axes([interpolation(kind, products.dtype) for kind in inner], np.ascontiguousarray(batch.T))
     return found.reshape(products.shape[0], -1)
 
 

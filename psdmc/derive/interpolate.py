@@ -11,16 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.robot.chain import JointKind
+from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 
 LINEAR_SIZE: dict[JointKind, int] = {"revolute": 3, "prismatic": 2}
 QUADRATIC_SIZE: dict[JointKind, int] = {"revolute": 5, "prismatic": 3}
+DOUBLE = np.dtype(np.float64)
 
 
 def nodes(kind: JointKind) -> Array:
@@ -40,15 +43,21 @@ def quadratic_basis(kind: JointKind, q: Array) -> Array:
 
 
 @cache
-def evaluation(kind: JointKind) -> Array:
+def evaluation(kind: JointKind, precision: np.dtype[Any] = DOUBLE) -> Array:
     """(5, 3) or (3, 2): coefficients of degree one to values at the nodes."""
-    return quadratic_basis(kind, nodes(kind))[:, : LINEAR_SIZE[kind]]
+    return quadratic_basis(kind, nodes(kind).astype(precision))[:, : LINEAR_SIZE[kind]]
 
 
 @cache
-def interpolation(kind: JointKind) -> Array:
+def interpolation(kind: JointKind, precision: np.dtype[Any] = DOUBLE) -> Array:
     """(5, 5) or (3, 3): values at the nodes to coefficients of degree two."""
     inverse: Array = np.asarray(np.linalg.inv(quadratic_basis(kind, nodes(kind))), dtype=np.float64)
+    if precision == DOUBLE:
+        return inverse
+    basis = quadratic_basis(kind, nodes(kind).astype(precision))
+    twice = 2.0 * np.eye(len(basis), dtype=precision)
+    for _ in range(2):  # each step squares the error
+        inverse = times(inverse, twice - times(basis, inverse))
     return inverse
 
 
@@ -62,6 +71,7 @@ def along_axes(matrices: Sequence[Array], values: Array) -> Array:
     product.
     """
     for matrix in matrices:
-        values = values.reshape(matrix.shape[1], -1).T @ matrix.T
+        turned = values.reshape(matrix.shape[1], -1).T
+        values = turned @ matrix.T if values.dtype == DOUBLE else times(turned, matrix.T)
     size = int(np.prod([matrix.shape[0] for matrix in matrices], dtype=np.int64))
     return values.reshape(-1, size)

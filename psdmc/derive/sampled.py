@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from psdmc.derive.link_by_link import reduction_link_by_link
 from psdmc.derive.reduce import Reduction, reduced
 from psdmc.derive.units import Scaled
 from psdmc.dynamics.regressor import regressor
@@ -19,6 +20,20 @@ SEED = 20_210_156
 
 STATES_PER_JOINT = 24
 """Sampled states for each joint; n rows each. Eleven would do for the rank, more condition it."""
+
+
+SAMPLED_JOINTS = 10
+"""Longest chain that is sampled as a whole; its rows grow as n^3."""
+
+
+def reduction_of(scaled: Scaled) -> Reduction:
+    """The base parameters: from sampled rows of doubles where these are few and no column is nearly dependent, else
+    link by link in extended precision."""
+    if len(scaled.kinds) <= SAMPLED_JOINTS:
+        reduction = sampled_reduction(scaled)
+        if reduction.is_clear:
+            return reduction
+    return reduction_link_by_link(scaled)
 
 
 def sampled_reduction(scaled: Scaled) -> Reduction:

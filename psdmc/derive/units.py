@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.dynamics.frames import Frame, frames_of
+from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, JointKind, Placement
 
@@ -75,7 +76,7 @@ class Scaled:
 
     kinds: tuple[JointKind, ...]
     frames: tuple[Frame, ...]
-    link_frames: tuple[Placement, ...]
+    link_frames: tuple[Placed, ...]
     unit: float
     span: Array
     leads: NDArray[np.int64]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +34,7 @@ def inertia_of(second: Array) -> Array:
 
 def inertia_matrix(x: Array) -> Array:
     """3 x 3 inertia matrix, kg m^2, from standard parameters of one link."""
-    matrix = np.zeros((3, 3))
+    matrix = np.zeros((3, 3), np.asarray(x).dtype)
     for (row, column), value in zip(_INERTIA_ENTRIES, x[4:BODY_PARAMETERS], strict=True):
         matrix[row, column] = matrix[column, row] = value
     return matrix
@@ -45,7 +47,10 @@ def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
 
 def moved(x: Array, frame: Placement) -> Array:
     """Ten standard parameters about a frame, about the frame that it is placed in instead."""
-    r, p = frame.rotation, frame.translation
+    return _moved(x, frame.rotation, frame.translation)
+
+
+def _moved(x: Array, r: Array, p: Array) -> Array:
     moment = times(r, x[1:4])
     crossed = np.outer(moment, p)
     turned = times(times(r, second_moments(inertia_matrix(x))), r.T)
@@ -55,7 +60,13 @@ def moved(x: Array, frame: Placement) -> Array:
 
 def joint_frame_map(link_frame: Placement) -> Array:
     """(10, 10) ten standard parameters about a link frame to those about the joint frame it is placed in."""
-    return np.column_stack([moved(unit, link_frame) for unit in np.eye(BODY_PARAMETERS)])
+    return moving_map(link_frame.rotation, link_frame.translation)
+
+
+def moving_map(rotation: NDArray[Any], translation: NDArray[Any]) -> NDArray[Any]:
+    """(10, 10) ten standard parameters about a frame to those about the frame it is placed in, in the arrays' precision."""
+    units = np.eye(BODY_PARAMETERS, dtype=rotation.dtype)
+    return np.column_stack([_moved(unit, rotation, translation) for unit in units])
 
 
 def bodies_of(chain: Chain, x: Array) -> tuple[Body, ...]:

@@ -7,6 +7,9 @@ of each joint below it, carried into the body's frame.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
 
 from psdmc.dynamics.frames import Frame, from_previous, outward
 from psdmc.dynamics.motion import PLAIN, JointState, LinkMotion, Rates, spin_of, sweep_outward
@@ -20,7 +23,7 @@ from psdmc.dynamics.scalar import (
     transform,
     transpose,
 )
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK
 
 Twist = tuple[Vector, Vector]
 """Linear velocity of a frame's origin and angular velocity, along the frame's axes."""
@@ -28,9 +31,19 @@ Twist = tuple[Vector, Vector]
 DRIVE = PARAMETERS_PER_LINK - 1
 
 
+class Placed(Protocol):
+    """Where a frame sits in another: a Placement, or one in another precision."""
+
+    @property
+    def rotation(self) -> NDArray[Any]: ...
+
+    @property
+    def translation(self) -> NDArray[Any]: ...
+
+
 def regressor(
     frames: Sequence[Frame],
-    link_frames: Sequence[Placement],
+    link_frames: Sequence[Placed],
     wanted: Collection[int],
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
@@ -91,7 +104,7 @@ def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
     )
 
 
-def twist_in(place: Placement, twist: Twist) -> Twist:
+def twist_in(place: Placed, twist: Twist) -> Twist:
     """A joint-frame twist at and along a frame placed in it."""
     rotation, translation = _plain(place)
     linear, angular = twist
@@ -100,7 +113,7 @@ def twist_in(place: Placement, twist: Twist) -> Twist:
     return transform(rows, moved), transform(rows, angular)
 
 
-def seen_from(place: Placement, motion: LinkMotion, rates: Rates) -> LinkMotion:
+def seen_from(place: Placed, motion: LinkMotion, rates: Rates) -> LinkMotion:
     """A joint frame's motion as that of a frame placed in it."""
     rotation, translation = _plain(place)
     rows = transpose(rotation)
@@ -110,7 +123,7 @@ def seen_from(place: Placement, motion: LinkMotion, rates: Rates) -> LinkMotion:
     return LinkMotion(transform(rows, acceleration), spin_of(Rates(w, w if same else w_r, dw_r)))
 
 
-def _plain(place: Placement) -> tuple[Matrix, Vector]:
+def _plain(place: Placed) -> tuple[Matrix, Vector]:
     rows = tuple(tuple(row) for row in place.rotation.tolist())
     return rows, tuple(place.translation.tolist())  # type: ignore[return-value]
 

@@ -1,0 +1,152 @@
+"""Random robots as URDF text, one per seed: any joints, right angles and nearly right ones, rotated inertias.
+
+The text is all that psdmc, Pinocchio and MuJoCo get to see; each reads it by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+Array = np.ndarray
+
+RIGHT = (0.0, math.pi / 2, -math.pi / 2, math.pi)
+ROUNDED = (1.5708, -1.5708, 3.1416, 1.570796)
+"""Right angles as files round them."""
+
+TILTS = (1e-9, 1e-1)
+"""rad; tilts between nearly parallel axes are log-uniform between these, or exactly zero."""
+
+STYLES = ("tidy", "parallel", "tilted", "rounded", "oblique", "mixed")
+"""What the angles between axes are like: right angles; all parallel but for tilts; right angles and tilts; right angles
+as files round them; any; and one of these anew for every joint."""
+
+LENGTHS = (0.05, 0.6)
+"""m, from one joint to the next along an axis of the frame, where not zero or nearly so."""
+
+KINDS = ("revolute", "continuous", "prismatic")
+KIND_SHARES = (0.65, 0.15, 0.2)
+JOINT_SHARES = (1, 2, 3, 3, 3, 4, 2, 2, 2)
+"""How often a robot has 1, 2 ... 9 joints."""
+
+LARGEST = len(JOINT_SHARES)
+
+
+@dataclass(frozen=True, slots=True)
+class RandomRobot:
+    """A robot's file.
+
+    joints   their names, base to tip
+    tilts    rad, the tilts drawn, zeros left out
+    """
+
+    seed: int
+    text: str
+    style: str
+    joints: tuple[str, ...]
+    tilts: tuple[float, ...]
+
+
+def random_robot(seed: int) -> RandomRobot:
+    """The robot of a seed: nothing else decides it."""
+    rng = np.random.default_rng([10, seed])
+    n = int(rng.choice(np.arange(1, LARGEST + 1), p=np.array(JOINT_SHARES) / sum(JOINT_SHARES)))
+    style = str(rng.choice(STYLES))
+    tilts: list[float] = []
+    parts = ["<link name='base'/>"]
+    previous = "base"
+    for k in range(n):
+        kind = str(rng.choice(KINDS, p=KIND_SHARES))
+        if k and rng.random() < 0.15:
+            parts += [_fixed(rng, k, previous, tilts), _link(rng, f"plate{k}", 0.4)]
+            previous = f"plate{k}"
+        parts.append(_joint(rng, k, kind, previous, style, tilts))
+        parts.append(_link(rng, f"link{k}", 0.75**k))
+        previous = f"link{k}"
+    body = "\n".join(parts)
+    text = f"<?xml version='1.0'?>\n<robot name='random{seed}'>\n{body}\n</robot>\n"
+    return RandomRobot(seed, text, style, tuple(f"joint{k}" for k in range(n)), tuple(tilts))
+
+
+def _fixed(rng: np.random.Generator, k: int, parent: str, tilts: list[float]) -> str:
+    place = _origin(_lengths(rng), _angles(rng, "mixed", tilts))
+    return f"<joint name='mount{k}' type='fixed'><parent link='{parent}'/><child link='plate{k}'/>{place}</joint>"
+
+
+def _joint(rng: np.random.Generator, k: int, kind: str, parent: str, style: str, tilts: list[float]) -> str:
+    place = _origin(_lengths(rng), _angles(rng, style, tilts))
+    limit = "" if kind == "continuous" else "<limit lower='-3' upper='3' effort='100' velocity='3'/>"
+    return (
+        f"<joint name='joint{k}' type='{kind}'><parent link='{parent}'/><child link='link{k}'/>{place}"
+        f"<axis xyz='{_numbers(_axis(rng))}'/>{limit}</joint>"
+    )
+
+
+def _axis(rng: np.random.Generator) -> Array:
+    """Mostly z; one of the others; seldom oblique."""
+    draw = rng.random()
+    if draw < 0.9:
+        axis = np.eye(3)[2 if draw < 0.7 else int(rng.integers(3))]
+        return axis * (1.0 if rng.random() < 0.7 else -1.0)
+    oblique = rng.normal(size=3)
+    return np.asarray(oblique / np.linalg.norm(oblique))
+
+
+def _lengths(rng: np.random.Generator) -> Array:
+    """Each a decimal length, zero, or (nearly intersecting axes) a tiny one."""
+    lengths = np.round(rng.uniform(*LENGTHS, 3) * rng.choice([-1.0, 1.0], 3), 4)
+    draw = rng.random(3)
+    tiny = _log_uniform(rng, TILTS, 3)
+    return np.where(draw < 0.35, 0.0, np.where(draw < 0.45, tiny, lengths))
+
+
+def _angles(rng: np.random.Generator, style: str, tilts: list[float]) -> Array:
+    """Roll, pitch, yaw."""
+    if style == "mixed":
+        style = str(rng.choice(STYLES[:-1]))
+    if style == "oblique":
+        return rng.uniform(-math.pi, math.pi, 3)
+    if style == "parallel":
+        across = _tilts(rng, 2, tilts)
+        return np.array([*across, rng.choice([0.0, math.pi / 2, rng.uniform(-math.pi, math.pi)])])
+    plain = rng.choice(RIGHT, 3) * (rng.random(3) < 0.5)
+    if style == "rounded":
+        return np.where(plain != 0.0, rng.choice(ROUNDED, 3), 0.0)
+    if style == "tilted":
+        return plain * (rng.random(3) < 0.3) + _tilts(rng, 3, tilts)
+    return plain
+
+
+def _tilts(rng: np.random.Generator, count: int, tilts: list[float]) -> Array:
+    """Tilts of either sign, some exactly zero, noted in `tilts`."""
+    drawn = _log_uniform(rng, TILTS, count) * rng.choice([-1.0, 1.0], count) * (rng.random(count) < 0.6)
+    tilts += [abs(float(tilt)) for tilt in drawn if tilt]
+    return drawn
+
+
+def _log_uniform(rng: np.random.Generator, limits: tuple[float, float], count: int) -> Array:
+    low, high = np.log(limits)
+    return np.exp(rng.uniform(low, high, count))
+
+
+def _link(rng: np.random.Generator, name: str, size: float) -> str:
+    """A physical body: principal moments of a box, centre of mass and axes anywhere."""
+    mass = float(np.round(rng.uniform(1.0, 10.0) * size, 4))
+    a, b, c = rng.uniform(0.05, 0.3, 3) ** 2 * mass / 12.0
+    centre = np.round(rng.uniform(-0.15, 0.15, 3) * (rng.random(3) < 0.8), 4)
+    turn = rng.uniform(-math.pi, math.pi, 3) if rng.random() < 0.5 else np.zeros(3)
+    moments = f"ixx='{float(b + c)!r}' iyy='{float(a + c)!r}' izz='{float(a + b)!r}' ixy='0' ixz='0' iyz='0'"
+    return (
+        f"<link name='{name}'><inertial>{_origin(centre, turn)}<mass value='{mass!r}'/>"
+        f"<inertia {moments}/></inertial></link>"
+    )
+
+
+def _origin(xyz: Array, rpy: Array) -> str:
+    return f"<origin xyz='{_numbers(xyz)}' rpy='{_numbers(rpy)}'/>"
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)
