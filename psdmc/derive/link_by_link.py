@@ -16,16 +16,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from psdmc.derive.extended import Long, extended
-from psdmc.derive.reduce import Reduction, graded_pivots, halving_shares, lengths
+from psdmc.derive.reduce import Reduction
 from psdmc.derive.units import Scaled
 from psdmc.dynamics.motion import PLAIN, LinkMotion, sweep_outward
 from psdmc.dynamics.parameters import BODY_PARAMETERS, moving_map
 from psdmc.dynamics.regressor import DRIVE, unit_wrench
 from psdmc.robot.chain import PARAMETERS_PER_LINK
+from psdmc.robot.graded import graded_pivots, halving_shares, lengths
 from psdmc.robot.small import times
 
 SEED = 20_210_157
@@ -103,23 +103,21 @@ def _reduced(rows: Long) -> Reduction:
     work = np.array(rows, order="C")
     found, _, _ = graded_pivots(work, np.ones(work.shape[1]), halving_shares(EXACT))
     pivots = np.array(found, dtype=np.int64)
-    echelon = _back_substituted(work[: len(pivots)], pivots)
-    echelon = np.where(np.abs(echelon) < EXACT, 0.0, echelon).astype(np.float64)
+    others = np.setdiff1d(np.arange(work.shape[1]), pivots)
+    shares = _solved(work[: len(pivots), pivots], work[: len(pivots), others])
+    echelon = np.zeros((len(pivots), work.shape[1]))
     echelon[:, pivots] = np.eye(len(pivots))
+    echelon[:, others] = np.where(np.abs(shares) < EXACT, 0.0, shares)
     order = np.argsort(pivots)
     return Reduction(pivots[order], echelon[order], False)
 
 
-def _back_substituted(rows: Long, pivots: NDArray[np.int64]) -> Long:
-    """Rows that are triangular in the pivots, combined so that each holds one pivot alone, as itself.
-
-    What rounding left below the triangle goes first: it is nothing in a row, but not in one of 1e-13 scaled to one.
-    """
-    echelon = rows.copy()
-    for r, pivot in enumerate(pivots):
-        echelon[r + 1 :, pivot] = 0.0
-    for r in reversed(range(len(pivots))):
-        echelon[r] /= echelon[r, pivots[r]]
-        above = np.flatnonzero(echelon[:r, pivots[r]])
-        echelon[above] -= np.outer(echelon[above, pivots[r]], echelon[r])
-    return echelon
+def _solved(triangle: Long, right: Long) -> Long:
+    """The solution x of triangle @ x = right, triangle (l, l) but for what rounding left below its diagonal: that is
+    nothing in a row of length one, but much in a row of 1e-13."""
+    solution = right.copy()
+    for r in reversed(range(len(triangle))):
+        solution[r] /= triangle[r, r]
+        above = np.flatnonzero(triangle[:r, r])
+        solution[above] -= triangle[above, r, None] * solution[r]
+    return solution

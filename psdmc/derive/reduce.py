@@ -6,16 +6,15 @@ of its: mass matrix and gravity alone span the row space.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from psdmc.derive.terms import Terms
+from psdmc.robot.graded import graded_pivots, halving_shares
 
 Array = NDArray[np.float64]
 
@@ -32,14 +31,6 @@ NOISE = 1e-13
 ECHELON_TOLERANCE = 1e-12
 """Smaller entries of the echelon form are zero, lengths in the robot's unit. Rounding leaves less than
 1e-13."""
-
-
-def halving_shares(last: float) -> tuple[float, ...]:
-    """1/2, 1/4, ... down to `last`: the parameters are gone through once for each of these, in their own order, and one
-    becomes a pivot where what earlier pivots leave of its column exceeds this share of it. One pass with `last` alone
-    would find as many, but would divide by small residuals where large ones are to be had."""
-    count = math.ceil(-math.log2(last))
-    return (*(0.5**k for k in range(1, count)), last)
 
 
 _BLOCK_ROWS = 8192
@@ -103,55 +94,6 @@ def reduced(rows: Array) -> Reduction:
     pivots, taken, left = graded_pivots(work, norms, halving_shares(PIVOT_TOLERANCE))
     is_clear = taken >= CLEAR and max(left, dropped) <= NOISE
     return _back_substituted(work[: len(pivots)], np.array(pivots, dtype=np.int64), is_clear)
-
-
-def graded_pivots(
-    work: NDArray[Any], norms: NDArray[Any], shares: Sequence[float]
-) -> tuple[list[int], float, float]:
-    """Columns of `work` (m, k) in the order they become pivots, the smallest share at which one did, and the largest
-    share left of any other. Turns `work` in place so that its first rows are triangular in them.
-
-    norms   (k,)  the columns' lengths beforehand
-    """
-    pivots: list[int] = []
-    taken = 1.0
-    others = np.ones(work.shape[1], dtype=bool)
-    for share in shares:
-        rest = work[len(pivots) :]
-        hopeful = others & (lengths(rest) > 0.5 * share * norms)
-        for column in np.flatnonzero(hopeful).tolist():
-            residual = np.linalg.norm(work[len(pivots) :, column])
-            if residual > share * norms[column]:
-                _reflect(work[len(pivots) :], column, residual)
-                pivots.append(column)
-                others[column] = False
-                taken = share
-        if len(pivots) == len(work):
-            break
-    left = lengths(work[len(pivots) :]) / np.where(norms > 0, norms, 1.0)
-    return pivots, taken, float(left[others].max(initial=0.0))
-
-
-def lengths(rows: NDArray[Any]) -> NDArray[Any]:
-    """(k,) lengths of the columns of (m, k) rows, in their precision and without BLAS."""
-    return np.asarray(np.sqrt(np.einsum("ij,ij->j", rows, rows)))
-
-
-def _reflect(rows: NDArray[Any], column: int, length: Any) -> None:
-    """Turn the rows, in place, so that the column keeps its first entry only (Householder). Rows that the column does
-    not reach stay as they are: a long chain's rows are zero for all links before their own.
-
-    einsum and no BLAS: its sums do not hang on the number of threads.
-    """
-    mirror = rows[:, column].copy()
-    mirror[0] += np.copysign(length, mirror[0])
-    mirror /= np.linalg.norm(mirror)
-    used = np.flatnonzero(mirror)
-    if len(used) == len(mirror):
-        rows -= np.outer(mirror, 2.0 * np.einsum("i,ij->j", mirror, rows))
-        return
-    part, mirror = rows[used], mirror[used]
-    rows[used] = part - np.outer(mirror, 2.0 * np.einsum("i,ij->j", mirror, part))
 
 
 def _back_substituted(rows: Array, pivots: NDArray[np.int64], is_clear: bool) -> Reduction:

@@ -7,9 +7,11 @@ parameter costs depends on its neighbours, so a search by PROGRAM cost refines t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,10 +22,14 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.tableau import Long, Tableau
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Placement
+from psdmc.robot.graded import graded_pivots, halving_shares, lengths
 from psdmc.robot.small import times
 
 PSEUDO_NAMES = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz", "Im")
 """A link's parameters in pseudo-inertia form, in the order of carriers."""
+
+LENGTH_ORDER = (0, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2)
+"""Exponent of metre in each one's unit, a sliding joint's drive inertia apart."""
 
 WEIGHTS = {
     "m": 6.0,
@@ -51,6 +57,13 @@ EXACT = 3e-14
 FAIR_SHARE = 1e-3
 """Exchanges that would multiply the carriers' values by more than the inverse of this are not considered."""
 
+FAIR_GROWTH = 1e3
+"""Carriers' values may be this many times theta_b, lengths in the chain's unit, before they are chosen more carefully:
+nearly parallel axes make columns that are small or nearly equal, whose differences would be lost in double."""
+
+EFFECT = 1e-15
+"""Share of the longest column, lengths in the chain's unit, that a carrier adds at least where chosen so."""
+
 STATES = 48
 SEED = 20211
 
@@ -76,6 +89,27 @@ def link_map(place: Placement) -> Array:
     return np.asarray(times(pseudo_map(), matrix))
 
 
+class Careful(NamedTuple):
+    """Columns that double precision cannot tell apart.
+
+    rows    (r, 11 n + l)  the parameters' and the model's columns
+    units   (11 n,)  one unit of each parameter in SI, for a unit of length near the chain's size
+    """
+
+    rows: Long
+    units: Array
+
+    def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
+        """A basis of little weight, ascending, that takes no column whose part beside the others is much smaller than
+        what another one has there."""
+        count = len(self.units)
+        order = np.array(sorted(range(count), key=lambda j: (weights[j], j)))
+        work = (self.rows[:, :count] * self.units)[:, order]
+        work /= lengths(work).max()
+        chosen, _, _ = graded_pivots(work, np.ones(count), halving_shares(EFFECT))
+        return tuple(sorted(order[chosen].tolist()))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CarrierSpace:
     """Which link parameters can carry a model, and how.
@@ -86,11 +120,13 @@ class CarrierSpace:
                          basis of their span
     tableau   the same columns in a basis of themselves, and behind them the model's l: what theta_b has to give
     whole     (l,)  lengths of the model's columns
+    careful   where columns are nearly dependent, all of the above in extended precision; None where none are
     """
 
     columns: Array
     tableau: Tableau
     whole: Array
+    careful: Careful | None = None
 
     @property
     def count(self) -> int:
@@ -99,6 +135,8 @@ class CarrierSpace:
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
         """The basis of least weight, ascending; ties go to the earlier parameter. Where rounding hides the last directions
         from this order, the basis that the tableau started with."""
+        if self.careful is not None:
+            return self.careful.lightest(weights)
         chosen = _lightest(self.columns, weights)
         return chosen if len(chosen) == len(self.tableau.basis) else self.tableau.basis
 
@@ -133,6 +171,8 @@ class CarrierSpace:
 
     def _coordinates(self, carriers: Sequence[int]) -> Array:
         """All columns and the model's in the basis of the carriers."""
+        if self.careful is not None:  # exchanges would magnify what rounding left of the smallest columns
+            return Tableau.of(self.careful.rows, carriers).entries.astype(np.float64)
         return self.tableau.within(carriers).entries.astype(np.float64)
 
 
@@ -158,7 +198,49 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     basis = _lightest(compact, [1.0] * compact.shape[1])
     target = times(samples, lift)
     whole = np.linalg.norm(target.astype(np.float64), axis=0)
-    return CarrierSpace(compact, Tableau.of(np.hstack([samples, target]), basis), whole)
+    both = np.hstack([samples, target])
+    space = CarrierSpace(compact, Tableau.of(both, basis), whole)
+    units = _units(reframed, representative)
+    if rank >= len(whole) and _growth(space, units) <= FAIR_GROWTH:
+        return space
+    return _careful_space(samples, target, units[0])
+
+
+def _careful_space(samples: Long, target: Long, units: Array) -> CarrierSpace:
+    """The space with rank decided in extended precision, on columns in a common unit."""
+    count = len(units)
+    work = np.hstack([samples * units, target])
+    longest = lengths(work[:, :count]).max()
+    work /= longest
+    limits = np.where(np.arange(work.shape[1]) < count, 1.0, np.inf)
+    chosen, _, _ = graded_pivots(work, limits, halving_shares(EFFECT))
+    rows = work[: len(chosen)] * longest
+    rows[:, :count] /= units
+    careful = Careful(rows, units)
+    tableau = Tableau.of(rows, careful.lightest([1.0] * count))
+    whole = lengths(rows[:, count:]).astype(np.float64)
+    return CarrierSpace(rows[:, :count].astype(np.float64), tableau, whole, careful)
+
+
+def _growth(space: CarrierSpace, units: tuple[Array, Array]) -> float:
+    """Largest multiple of theta_b among the values of the first carriers that come to mind, in the chain's unit."""
+    start = space.lightest([WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)])
+    carriers, parameters = units
+    multiples = space.transfer(start) * parameters / carriers[list(start), None]
+    return float(np.abs(multiples).max(initial=0.0))
+
+
+def _units(reframed: Reframed, representative: Array) -> tuple[Array, Array]:
+    """What one unit of each carrier and of each base parameter is in SI, for a unit of length near the chain's size."""
+    longest = max(
+        math.hypot(*translation)
+        for frame, place in zip(reframed.frames, reframed.link_frames, strict=True)
+        for translation in (frame.translation, place.translation.tolist())
+    )
+    unit = 2.0 ** round(math.log2(longest)) if longest > 0 else 1.0
+    leads = np.argmax(representative != 0.0, axis=0) % PARAMETERS_PER_LINK
+    carriers = np.tile(unit ** np.array(LENGTH_ORDER, dtype=np.float64), len(reframed.frames))
+    return carriers, unit ** np.array(LENGTH_ORDER, dtype=np.float64)[leads]
 
 
 def _lightest(columns: Array, weights: Sequence[float]) -> tuple[int, ...]:
