@@ -16,7 +16,7 @@ from psdmc.derive.link_by_link import EFFECT
 from psdmc.derive.reduce import PIVOT_TOLERANCE, Reduction
 from psdmc.derive.rounding import merged
 from psdmc.derive.sampled import reduction_of
-from psdmc.derive.units import Scaled, parameter_units, scaled
+from psdmc.derive.units import Scaled, length_unit, parameter_units, scaled
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
@@ -26,6 +26,12 @@ Array = NDArray[np.float64]
 
 EQUATION_NOISE = 3e-14
 """Relative uncertainty of a coefficient of B: rounding, magnified by the back substitution."""
+
+LARGEST_CHAIN = 200
+"""Joints; beyond, base parameters alone take more than a minute and 2 GiB."""
+
+SIZES = (1e-12, 1e12)
+"""m; a robot's longest step lies between these, or squares of its lengths leave double precision behind."""
 
 LAST_DIGIT = 4e-16
 """The same where B was found in extended precision."""
@@ -45,9 +51,11 @@ def derive_model(
     progress    called with the name of each step as it begins
     provenance  plain JSON values to keep with the model; the tolerances used are added
     memory      bytes that the expansion may take; default: most of what the machine has free
-    Raises DerivationError where the expansion does not fit, or no parameter has any effect.
+    Raises DerivationError where the expansion would take too much memory or time, the chain is longer than
+    LARGEST_CHAIN, its numbers are beyond double precision, or no parameter has any effect.
     """
     tell = progress or _silent
+    _refuse_absurd(chain)
     robot = scaled(chain)
     tell("base parameters")
     reduction = reduction_of(robot)
@@ -72,6 +80,21 @@ def derive_model(
 
 
 _expanded = expand
+
+
+def _refuse_absurd(chain: Chain) -> None:
+    if len(chain) > LARGEST_CHAIN:
+        raise DerivationError(
+            f"'{chain.name}': {len(chain)} joints, psdmc derives chains of up to {LARGEST_CHAIN}",
+            "cut the chain with --base and --tip",
+        )
+    unit = length_unit(chain)
+    if not SIZES[0] < unit < SIZES[1]:
+        raise DerivationError(
+            f"'{chain.name}': its longest step from joint to joint is about {unit:.1g} m, expected "
+            f"{SIZES[0]:g} to {SIZES[1]:g}",
+            "check the units of lengths: they are metres",
+        )
 
 
 def _silent(step: str) -> None:

@@ -18,6 +18,7 @@ from psdmc.derive.memory import (
     grid_bytes,
     largest_function_count,
     refuse_beyond,
+    refuse_long,
     velocity_bytes,
 )
 from psdmc.derive.reduce import Reduction
@@ -68,6 +69,7 @@ def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int
         scaled = extended(scaled)
     functions = Functions(kinds)
     available = available_memory() if memory is None else memory
+    refuse_long(0, kinds)
     refuse_beyond(grid_bytes(kinds), available, largest_function_count(kinds), len(kinds))
     progress("mass matrix")
     chosen = scaled.span[:, reduction.pivots]
@@ -76,6 +78,7 @@ def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int
     gravity = _gravity(scaled, chosen, functions, precision.zero)
     progress("velocity terms")
     count, needed = velocity_bytes(mass, functions)
+    refuse_long(count, kinds)
     refuse_beyond(needed, available, min(count, largest_function_count(kinds)), len(kinds))
     velocity = velocity_terms(mass, functions, precision.zero)
     progress("reduction matrices")

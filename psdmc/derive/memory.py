@@ -6,6 +6,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from psdmc.derive.functions import Functions
 from psdmc.derive.interpolate import LINEAR_SIZE, QUADRATIC_SIZE
 from psdmc.derive.terms import Terms
@@ -13,15 +15,24 @@ from psdmc.derive.velocity import slope_count
 from psdmc.errors import DerivationError
 from psdmc.robot.chain import JointKind
 
-BYTES_PER_TERM = 250
+WITHOUT = "base parameters, regressor and generated code then come without E and P"
+
+BYTES_PER_TERM = 280
 """Peak of the whole expansion per velocity term: 123 to collect, sort and sum it, some 200 with the matrices
-made of them (measured on six and seven joints with oblique axes)."""
+made of them (measured on six and seven joints with oblique axes; 225 in double, 255 in extended precision)."""
 
 _GRID_COPIES = 5
 """Grids of ten features held at once: twists, products, two steps of the interpolation, magnitudes. A first,
 optimistic check: with oblique axes the mass matrix keeps up to six times the largest grid (measured on seven
 joints), and only then is the number of velocity terms known."""
 
+
+LARGEST_EXPANSION = 25_000_000
+"""Velocity terms beyond which an expansion is refused, whatever the memory: at some 1.6 us each, certificate included, these
+take well under a minute (measured on six, seven and eight joints with oblique axes)."""
+
+LARGEST_GRID = 5**8
+"""Grid points of the mass matrix beyond which an expansion is refused: nine revolute joints, a few seconds each way."""
 
 HEADROOM = 0.75
 """Part of the free memory that an expansion may plan for: the estimate is one, and others run on the machine, too."""
@@ -71,7 +82,22 @@ def refuse_beyond(needed: int, available: int, functions: int, n: int) -> None:
     raise DerivationError(
         f"expanding this {n}-joint robot takes up to {functions:,} functions and about "
         f"{needed / 2**30:.1f} GiB of memory, but no more than {available / 2**30:.1f} GiB should be taken here",
-        "derive with --no-expand: base parameters, regressor and generated code then come without E and P",
+        "derive with --no-expand: " + WITHOUT,
+    )
+
+
+def refuse_long(terms: int, kinds: Sequence[JointKind]) -> None:
+    """DerivationError where an expansion would take more than about a minute: too many velocity terms, or, while these
+    are unknown (0), too large a grid."""
+    grid = int(np.prod([QUADRATIC_SIZE[kind] for kind in kinds[1:]], dtype=float))
+    if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:
+        return
+    what = f"{terms:,} velocity terms (limit {LARGEST_EXPANSION:,})"
+    if not terms:
+        what = f"a grid of {grid:,} points for the mass matrix alone (limit {LARGEST_GRID:,})"
+    raise DerivationError(
+        f"expanding this {len(kinds)}-joint robot takes {what}: minutes",
+        "derive with --no-expand: " + WITHOUT,
     )
 
 

@@ -26,9 +26,9 @@ _LENGTH_ORDER = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
 
 def length_unit(chain: Chain) -> float:
     """Metres: the power of two nearest to the longest step from joint to joint; one where all are zero."""
-    steps = [np.linalg.norm(joint.placement.translation) for joint in chain.joints[1:]]
-    steps += [np.linalg.norm(joint.link_frame.translation) for joint in chain.joints]
-    longest = float(max(steps))
+    steps = [math.hypot(*joint.placement.translation) for joint in chain.joints[1:]]
+    steps += [math.hypot(*joint.link_frame.translation) for joint in chain.joints]
+    longest = max(steps)
     return 2.0 ** round(math.log2(longest)) if longest > 0 else 1.0
 
 
