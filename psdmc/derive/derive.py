@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from psdmc.derive.certify import certificate
 from psdmc.derive.expand import Progress, expand, precision_for
 from psdmc.derive.link_by_link import EFFECT
+from psdmc.derive.memory import refuse_long
 from psdmc.derive.reduce import PIVOT_TOLERANCE, Reduction
 from psdmc.derive.rounding import merged
 from psdmc.derive.sampled import reduction_of
@@ -56,6 +57,8 @@ def derive_model(
     """
     tell = progress or _silent
     _refuse_absurd(chain)
+    if expand:
+        refuse_long(0, [joint.kind for joint in chain.joints])
     robot = scaled(chain)
     tell("base parameters")
     reduction = reduction_of(robot)

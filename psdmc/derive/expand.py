@@ -69,7 +69,6 @@ def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int
         scaled = extended(scaled)
     functions = Functions(kinds)
     available = available_memory() if memory is None else memory
-    refuse_long(0, kinds)
     refuse_beyond(grid_bytes(kinds), available, largest_function_count(kinds), len(kinds))
     progress("mass matrix")
     chosen = scaled.span[:, reduction.pivots]
