@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo clean
+.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo campaign clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -38,6 +38,11 @@ demo: $(READY) ## derive, emit, build, check and benchmark the bundled Denso VS-
 
 test: $(READY) ## run all tests
 	$(RUN)/python -m pytest -n $(JOBS) tests
+
+CAMPAIGN ?= --robots 10000
+campaign: $(READY) ## 10,000 random robots against Pinocchio and MuJoCo, an hour or more of two cores; CAMPAIGN='--robots 500' for less
+	@mkdir -p $(GENERATED)
+	$(RUN)/python tests/campaign/campaign_run.py $(CAMPAIGN) --json $(GENERATED)/campaign.json
 
 FAST := tests/test_architecture.py tests/program tests/robot tests/dynamics tests/model
 

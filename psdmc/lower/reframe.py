@@ -28,6 +28,9 @@ NEARLY_PARALLEL = 2e-2
 """Sine of the angle below which two axes are treated as parallel but for the rotation between them: their common
 normal may lie kilometres away, and torques would be differences of huge numbers."""
 
+LITTLE = 1e-2
+"""Part of a vector across an axis below which rounding has turned it off the perpendicular: it is made so once more."""
+
 DECIMALS = 12
 """A length this near to one of so many decimals is that one, so that equal lengths stay equal; see ROUNDING."""
 
@@ -184,12 +187,20 @@ def _across(direction: Array, axis: Array) -> Array:
     return direction if abs(along) < EXACT else _clean(direction - along * axis)
 
 
+def _perpendicular(vector: Array, axis: Array) -> Array:
+    """The part of a vector across a unit axis, at right angles to it also where little is left."""
+    part = vector - axis * times(axis, vector)
+    if length(part) < LITTLE * length(vector):
+        part = part - axis * times(axis, part)
+    return np.asarray(part)
+
+
 def _normal(axis: Array, following: Array, step: Array) -> Array | None:
     """Direction of the common normal of two axes; None where every perpendicular would do. Nearly parallel axes take
     the step from one origin to the next instead."""
     normal = np.cross(axis, following)
     if _parallel(axis, following):
-        normal = step - axis * times(axis, step)
+        normal = _perpendicular(step, axis)
         if np.linalg.norm(normal) < EXACT:
             return None
     return _clean(normal / length(normal))
@@ -197,7 +208,7 @@ def _normal(axis: Array, following: Array, step: Array) -> Array | None:
 
 def _first_x(chain: Chain, first: Placement, axis: Array) -> Array:
     """The base is free to turn about the first axis: with gravity across it, x goes along gravity's part across."""
-    across = chain.gravity - axis * times(axis, chain.gravity)
+    across = _perpendicular(chain.gravity, axis)
     if np.linalg.norm(across) < EXACT * (1.0 + float(np.linalg.norm(chain.gravity))):
         return np.asarray(first.rotation[:, 0])
     local = times(first.rotation.T, across)

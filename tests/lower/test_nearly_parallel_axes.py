@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,6 +16,7 @@ from psdmc.lower.carriers import carrier_space
 from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe
 from psdmc.program.interpret import interpret
+from psdmc.robot.chain import Placement
 
 ACCURACY = 1e-11
 BUDGET = 12
@@ -47,3 +49,15 @@ def test_carriers_are_no_large_multiples_of_theta_b() -> None:
     carriers = space.lightest([1.0] * space.count)
     assert space.careful is not None
     assert np.abs(space.transfer(carriers)).max() < 100.0
+
+
+@pytest.mark.parametrize("tilt", [1e-9, 1e-7, 1e-5, 1e-3])
+def test_frames_stay_orthonormal_where_gravity_is_nearly_along_the_first_axis(tilt: float) -> None:
+    """x goes along gravity's part across the axis, which is the small rest of a difference."""
+    c, s = np.cos(tilt), np.sin(tilt)
+    chain = tilted_chain(0, "RR", tilt)
+    place = Placement(np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]), np.zeros(3))
+    first, second = chain.joints
+    chain = replace(chain, joints=(replace(first, placement=place), second))
+    axes = np.array(reframe(chain, ("previous", "previous")).base_axes)
+    assert np.abs(axes.T @ axes - np.eye(3)).max() < 1e-15
