@@ -43,7 +43,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A name to write to, renamed to `path` at the end and removed after an error; errors as write_whole."""
-    with one_line(path):
+    with system_errors_at(path):
         target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
         if _is_stream(target):
             yield target
@@ -58,7 +58,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 def write_together(root: Path, files: Mapping[str, str]) -> None:
     """Write files (path under root -> text) that belong together: all content is on disk before any is renamed,
     in the given order. Errors as write_whole."""
-    with one_line(root), contextlib.ExitStack() as all_of_them:
+    with system_errors_at(root), contextlib.ExitStack() as all_of_them:
         ready = []
         for path, text in files.items():
             target = root / path
@@ -75,14 +75,14 @@ def write_together(root: Path, files: Mapping[str, str]) -> None:
 
 def make_folder(path: str | os.PathLike[str]) -> None:
     """Make a folder and those above it where they are missing; errors as write_whole."""
-    with one_line(path):
+    with system_errors_at(path):
         Path(path).mkdir(parents=True, exist_ok=True)
 
 
 def check_place(path: str | os.PathLike[str]) -> None:
     """InputError where no file can be written at `path`: to be said before hours of work, not after."""
     target = Path(path)
-    with one_line(path):
+    with system_errors_at(path):
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
         if not target.parent.is_dir():
@@ -93,7 +93,7 @@ def check_place(path: str | os.PathLike[str]) -> None:
 
 
 @contextlib.contextmanager
-def one_line(path: str | os.PathLike[str]) -> Iterator[None]:
+def system_errors_at(path: str | os.PathLike[str]) -> Iterator[None]:
     """An OSError as the error of psdmc that says what would help; it names `path`, not a temporary file."""
     try:
         yield

@@ -2,38 +2,86 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import os
 import sys
 
-from psdmc.cli.commands import app
-from psdmc.errors import InternalError, PsdmcError
+from psdmc.cli import interrupt
+from psdmc.cli.commands import app, needs_measuring
+from psdmc.cli.one_line import one_line
+from psdmc.errors import InternalError, PsdmcError, ToolchainError
 
+CLOSED_STATUS = 1
+"""Whoever read the output went away (`psdmc show m.npz | head`): nothing is wrong, and not everything was said."""
 INTERNAL_STATUS = 70
-INTERRUPTED_STATUS = 130
 
 
-def main(arguments: list[str] | None = None) -> None:
+def run(arguments: list[str] | None = None) -> None:
     """Run the command line."""
     words = sys.argv[1:] if arguments is None else arguments
+    _accept_any_text()
     try:
-        app(words)
+        _run(words)
     except PsdmcError as error:
         _fail(words, error.message, error.hint, error.exit_status)
     except InternalError as error:
         _fail(words, f"internal: {error}", "this is a bug in psdmc: please report it", INTERNAL_STATUS)
-    except KeyboardInterrupt:
-        _fail(words, "interrupted", None, INTERRUPTED_STATUS)
+    except (KeyboardInterrupt, interrupt.Interrupted):
+        _fail(words, "interrupted", None, interrupt.STATUS)
+    except BrokenPipeError:
+        _silence(sys.stdout)
+        sys.exit(CLOSED_STATUS)
+    except MemoryError:
+        hint = "close other programs; or leave E and P out: derive --no-expand"
+        _fail(words, "not enough memory", hint, ToolchainError.exit_status)
+    except OSError as error:
+        _fail(words, _described(error), None, ToolchainError.exit_status)
+
+
+def _run(words: list[str]) -> None:
+    """The command, and all that it said on its way out: a full disk behind standard output shows here."""
+    if needs_measuring(words):
+        with interrupt.at_once():
+            from psdmc.cli.measuring import add_commands
+        add_commands(app)
+    try:
+        app(words)
+    except SystemExit as left:
+        with contextlib.suppress(BrokenPipeError) if left.code else contextlib.nullcontext():
+            sys.stdout.flush()
+        raise
+
+
+def _described(error: OSError) -> str:
+    """What the system refused, where no stage said it in words of its own."""
+    if error.filename is None:
+        _silence(sys.stdout)
+        return f"standard output: {error.strerror or error}"
+    return f"{error.filename}: {error.strerror}"
 
 
 def _fail(words: list[str], message: str, hint: str | None, status: int) -> None:
     """Print and leave; inside an `except`, so that --debug can show where it came from."""
     if "--debug" in words:
         raise
-    print("error: " + one_line(message), file=sys.stderr)
-    if hint:
-        print("hint: " + one_line(hint), file=sys.stderr)
+    said = [f"error: {one_line(message)}", *([f"hint: {one_line(hint)}"] if hint else [])]
+    with contextlib.suppress(OSError):
+        if sys.stderr is not None:  # closed by the caller
+            print("\n".join(said), file=sys.stderr)
     sys.exit(status)
 
 
-def one_line(text: str) -> str:
-    """Untrusted text on one line of a terminal: control characters escaped."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+def _accept_any_text() -> None:
+    """Names that the terminal's encoding lacks are printed as escapes."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _silence(stream: object) -> None:
+    """What is still in a stream's buffer goes nowhere: Python would complain of it after the last word."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        target = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(target, stream.fileno())  # type: ignore[attr-defined]
+        os.close(target)

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from psdmc import compiler
-from psdmc.cli import measuring
+from psdmc.cli.output import check_output
 from psdmc.cli.progress import steps
-from psdmc.cli.show import print_check, print_cost, print_mass_check, print_model, print_terms
+from psdmc.cli.show import megabytes, print_check, print_cost, print_mass_check, print_model, print_terms
 from psdmc.errors import InputError
 from psdmc.lower.kernels import Lowering
 from psdmc.model.check import check_model
@@ -19,6 +19,7 @@ from psdmc.model.store import load
 from psdmc.robot.load import load_robot
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.build_package import build_package
+from psdmc.toolchain.cache_room import cache_contents, clear_cache
 from psdmc.version import psdmc_version
 
 app = typer.Typer(
@@ -80,6 +81,8 @@ def derive(
     ] = True,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
+    target = output or Path(robot.stem + ".npz")
+    check_output(target, robot)
     with steps() as progress:
         model = compiler.derive(
             robot,
@@ -92,7 +95,6 @@ def derive(
             expand,
             progress,
         )
-    target = output or Path(robot.stem + ".npz")
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"
     print(f"{target}: {model.n} joints, {sizes}, largest torque error {model.certificate.max():.1e}")
@@ -204,5 +206,22 @@ def build(
     print(f"{directory}: built, self-test passed")
 
 
-for command in (measuring.bench, measuring.excite, measuring.simulate, measuring.calibrate):
-    app.command()(command)
+@app.command()
+def cache(
+    clear: Annotated[bool, typer.Option("--clear", help="remove every entry")] = False,
+) -> None:
+    """Show where compiled libraries are kept and how many, or remove them."""
+    if clear:
+        print(f"{clear_cache()} entries removed")
+    found = cache_contents()
+    print(f"{found.place}: {found.entries} entries, {megabytes(found.size)} of {megabytes(found.limit)}")
+
+
+PIPELINE = frozenset({"derive", "show", "check", "emit-c", "build", "cache", "--version"})
+"""First words that need no other command."""
+
+
+def needs_measuring(words: list[str]) -> bool:
+    """Whether a command line may be about the commands beside the pipeline, or about all: those load for a second."""
+    first = next((word for word in words if word != "--debug"), "")
+    return first not in PIPELINE

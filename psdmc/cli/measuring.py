@@ -18,6 +18,7 @@ from psdmc.calibrate.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptio
 from psdmc.calibrate.filter import FilterOptions
 from psdmc.calibrate.linear_fit import LinearOptions
 from psdmc.calibrate.simulate_campaign import SimulateOptions
+from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
 from psdmc.cli.show import print_accuracy
 from psdmc.errors import InputError
@@ -29,6 +30,14 @@ WRONG_STATUS = 5
 """A contestant's results disagreed with the others'."""
 
 
+def add_commands(app: typer.Typer) -> None:
+    """Add the commands of this module to the command line, once."""
+    if any(known.callback is bench for known in app.registered_commands):
+        return
+    for command in (bench, excite, simulate, calibrate):
+        app.command()(command)
+
+
 def bench(
     models: Annotated[list[Path], typer.Argument(metavar="MODEL...", help="model files")],
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="write a page")] = None,
@@ -37,6 +46,8 @@ def bench(
     counts: Annotated[bool, typer.Option("--counts", help="count instructions too (valgrind)")] = False,
 ) -> None:
     """Time generated code against Pinocchio, CasADi and MuJoCo in the same run."""
+    check_output(report, *models)
+    check_output(json, *models, *([report] if report else []))
     cases = [Case(path.stem, load(path)) for path in models]
     with steps() as progress:
         result = run(cases, Settings(rounds=rounds, count=counts), progress)
@@ -127,6 +138,8 @@ def calibrate(
     ] = None,
 ) -> None:
     """Identify base parameters, friction and motor constants from logs."""
+    check_output(output, model, *logs)
+    check_report(report, model, output, *logs)
     with steps() as progress:
         record = calibrate_command(
             model,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from psdmc.calibrate.record import Calibration
 from psdmc.compiler import admitted, left_out
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.check import CheckRow, readers
@@ -18,6 +18,9 @@ from psdmc.model.mass_check import MassCheck
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
 from psdmc.robot.chain import Joint
+
+if TYPE_CHECKING:
+    from psdmc.calibrate.record import Calibration
 
 WIDTH = 160
 """Columns of a table where the output is no terminal, so that nothing is cut."""
@@ -123,6 +126,10 @@ def print_cost(model: DynamicsModel, lowerings: Sequence[Lowering]) -> None:
                 figures = (one.mul, one.add, one.total, one.div, one.sincos, one.fused)
                 table.add_row(name, lowering, *map(str, figures), f"{lanes.total} + {lanes.sincos} sincos")
     console().print(table)
+
+
+def megabytes(size: int) -> str:
+    return f"{size / 2**20:.1f} MiB"
 
 
 def print_check(rows: Sequence[CheckRow]) -> None:

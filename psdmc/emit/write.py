@@ -12,7 +12,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from psdmc.atomic import one_line, remove_leftovers, write_together, write_whole
+from psdmc.atomic import remove_leftovers, system_errors_at, write_together, write_whole
 from psdmc.emit.manifest import GENERATOR, digest
 from psdmc.emit.own_files import JOURNAL, MANIFEST, Digests, digest_of, link_in, listed
 from psdmc.errors import InputError
@@ -30,7 +30,7 @@ def write_package(
     two files is known again from its journal, and finished or replaced by the next emission.
     """
     root = Path(directory)
-    with one_line(root):
+    with system_errors_at(root):
         return _write(root, files, force)
 
 

@@ -7,11 +7,9 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import matplotlib as mpl
-from matplotlib.figure import Figure
-
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.report.bench_view import FUNCTION_TITLES, OURS, PINOCCHIO
+from psdmc.report.drawing import Figure, new_figure, style
 
 INK = "#010203"
 """Stands for the page's own text colour, which it becomes after drawing."""
@@ -61,11 +59,11 @@ def scaling(result: BenchResult, function: str) -> str:
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
-        for rival, style in ((OURS, "-o"), ("psdmc expanded", "--s"), (PINOCCHIO, "-^")):
+        for rival, line in ((OURS, "-o"), ("psdmc expanded", "--s"), (PINOCCHIO, "-^")):
             points = [(case.n, best.ns) for case in result.scaling if (best := case.best(rival, function))]
             if points:
                 colour = COLOURS["psdmc" if rival.startswith("psdmc") else rival]
-                axes.plot(*zip(*points, strict=True), style, color=colour, label=rival)
+                axes.plot(*zip(*points, strict=True), line, color=colour, label=rival)
         axes.set_yscale("log")
         axes.set_xlabel("joints")
         axes.set_ylabel("ns per call")
@@ -77,8 +75,8 @@ def scaling(result: BenchResult, function: str) -> str:
 
 def svg(draw: Callable[[Figure], None], size: tuple[float, float]) -> str:
     """What `draw` puts on a figure of `size` (inches), as an <svg> element that scales with the page."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=size, layout="constrained")
+    with style(STYLE):
+        figure = new_figure(figsize=size)
         draw(figure)
         text = io.StringIO()
         metadata: dict[str, Any] = {"Date": None, "Creator": None}

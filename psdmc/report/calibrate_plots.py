@@ -5,16 +5,12 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
-import matplotlib
-
-matplotlib.use("Agg")
-
 import numpy as np
-from matplotlib.figure import Figure
 
 from psdmc.calibrate.excite import Excitation
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.steps import Sample, StepQuality
+from psdmc.report.drawing import Axes, Figure, new_figure, style
 
 POINTS = 600
 """Points drawn per curve; more only make the file heavy."""
@@ -25,7 +21,7 @@ MEASURED, PREDICTED, RESIDUAL, HELD_OUT = "#4878a8", "#d95f02", "#888888", "#f3e
 def step_figure(step: StepQuality) -> str:
     """Observed and predicted torque of every joint, the residual below zero's line, held-out stretches shaded."""
     rows = (len(step.samples) + 1) // 2
-    figure = Figure(figsize=(11, 2.3 * rows), layout="constrained")
+    figure = new_figure(figsize=(11, 2.3 * rows))
     axes = figure.subplots(rows, 2, squeeze=False)
     for axis, sample in zip(axes.flat, step.samples, strict=False):
         _sample(axis, sample)
@@ -35,7 +31,7 @@ def step_figure(step: StepQuality) -> str:
     return svg_text(figure)
 
 
-def _sample(axis: matplotlib.axes.Axes, sample: Sample) -> None:
+def _sample(axis: Axes, sample: Sample) -> None:
     order = (
         np.argsort(sample.x, kind="stable")
         if sample.abscissa.startswith("position")
@@ -59,7 +55,7 @@ def _thin(count: int) -> Array:
     return np.unique(np.linspace(0, count - 1, min(count, POINTS)).astype(int))
 
 
-def _shade(axis: matplotlib.axes.Axes, x: Array, held_out: Array) -> None:
+def _shade(axis: Axes, x: Array, held_out: Array) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], held_out.astype(int), [0]])))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         axis.axvspan(x[first], x[min(last, len(x) - 1)], color=HELD_OUT, linewidth=0)
@@ -68,7 +64,7 @@ def _shade(axis: matplotlib.axes.Axes, x: Array, held_out: Array) -> None:
 def excitation_figure(found: Excitation, joint_names: Sequence[str]) -> str:
     """The exciting motion's positions, speeds and accelerations, and how its condition was reached."""
     motion = found.motion.sampled(tuple(joint_names), found.motion.duration / 400)
-    figure = Figure(figsize=(11, 6), layout="constrained")
+    figure = new_figure(figsize=(11, 6))
     axes = figure.subplots(2, 2)
     series = (
         ("position [rad]", motion.q),
@@ -89,7 +85,7 @@ def excitation_figure(found: Excitation, joint_names: Sequence[str]) -> str:
 
 def svg_text(figure: Figure) -> str:
     """A figure as inline SVG: the same bytes for the same numbers."""
-    with matplotlib.rc_context({"svg.hashsalt": "psdmc", "svg.fonttype": "none", "path.simplify": True}):
+    with style({"svg.hashsalt": "psdmc", "svg.fonttype": "none", "path.simplify": True}):
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()

@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from psdmc.atomic import make_folder, one_line
+from psdmc.atomic import make_folder, system_errors_at
 from psdmc.emit.own_files import edited_files
 from psdmc.errors import InputError, ToolchainError
 from psdmc.toolchain.compiler_command import find_compiler, run
@@ -54,7 +54,7 @@ def _check_files(root: Path, edited: bool) -> None:
 @contextlib.contextmanager
 def _own_build(folder: Path) -> Iterator[None]:
     """Nothing is built on what an interrupted build left: it may hold half an object file."""
-    with one_line(folder):
+    with system_errors_at(folder):
         if (folder / UNFINISHED).is_file() and not folder.is_symlink():
             shutil.rmtree(folder)
         make_folder(folder)

@@ -21,7 +21,7 @@ def typed(*words: object, cwd: Path | None = None, **environment: str) -> subpro
         cwd=cwd,
         env=os.environ | environment,
         capture_output=True,
-        text=True,
+        encoding=environment.get("PYTHONIOENCODING", "utf-8"),
         timeout=SECONDS,
         check=False,
     )

@@ -1,0 +1,51 @@
+"""Ctrl-C: at once while modules load, as an error of one line afterwards; never a traceback."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType
+
+STATUS = 130
+"""Of a process that Ctrl-C ended, as shells say it: 128 + SIGINT."""
+
+
+class Interrupted(BaseException):
+    """Ctrl-C. Not KeyboardInterrupt: libraries on the way up turn that into statuses and words of their own."""
+
+
+def at_once() -> contextlib.AbstractContextManager[None]:
+    """Leave where Ctrl-C comes: nothing is half done yet, and modules that load pass no exception on unharmed."""
+    return _handled(_leave)
+
+
+def as_error() -> contextlib.AbstractContextManager[None]:
+    """Raise Interrupted where Ctrl-C comes."""
+    return _handled(_raise)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    os.write(2, b"error: interrupted\n")
+    os._exit(STATUS)
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
+    raise Interrupted
+
+
+@contextlib.contextmanager
+def _handled(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """In place of Python's own handler only: a caller's, or a shell's wish to ignore Ctrl-C, stays."""
+    before = signal.getsignal(signal.SIGINT)
+    is_ours = before is signal.default_int_handler and threading.current_thread() is threading.main_thread()
+    if not is_ours:
+        yield
+        return
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

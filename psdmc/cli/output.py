@@ -1,0 +1,42 @@
+"""Whether a command may write where it was told: said before its work, not after."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from psdmc.atomic import check_place
+from psdmc.errors import InputError
+
+
+def check_output(output: Path | None, *inputs: Path) -> None:
+    """InputError where a file cannot be written there, or where it is one of the inputs."""
+    if output is None:
+        return
+    for source in inputs:
+        if _is_same(output, source):
+            raise InputError(
+                f"{output}: would overwrite {source}, which is read", "give another name for the output"
+            )
+    check_place(output)
+
+
+def check_report(report: Path | None, *others: Path) -> None:
+    """The same for a report and for the JSON that is written beside it; its folder may be missing."""
+    if report is None:
+        return
+    numbers = report.with_suffix(".json")
+    if _is_same(report, numbers):
+        raise InputError(
+            f"{report}: the report's numbers go there, beside the page", "call the page FILE.html"
+        )
+    for path in (report, numbers):
+        if path.parent.exists():
+            check_output(path, *others)
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return os.path.abspath(one) == os.path.abspath(other)
