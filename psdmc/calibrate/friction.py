@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +14,7 @@ from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.quality import quality
 from psdmc.calibrate.steps import FrictionOptions, FrictionRun, JointQuality, Sample, StepOptions, StepQuality
+from psdmc.calibrate.workers import in_processes
 from psdmc.robot.chain import Chain
 
 
@@ -98,10 +97,11 @@ _Task = tuple[str, JointRun, FrictionOptions, JointFriction | None]
 
 def _fitted(tasks: list[_Task], workers: int) -> list[JointFriction]:
     """Joints are independent: one process each, where more than one is allowed."""
-    if workers <= 1 or len(tasks) <= 1:
-        return [fit_joint(*task) for task in tasks]
-    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-        return list(pool.map(fit_joint, *zip(*tasks, strict=True)))
+    return list(in_processes(_fit, tasks, workers))
+
+
+def _fit(task: _Task) -> JointFriction:
+    return fit_joint(*task)
 
 
 def _judged(name: str, data: JointRun, joint: JointFriction) -> tuple[JointQuality, Sample]:

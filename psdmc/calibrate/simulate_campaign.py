@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +17,7 @@ from psdmc.calibrate.plant_file import plant_texts
 from psdmc.calibrate.trajectory import read_trajectory, trajectory_joints
 from psdmc.calibrate.virtual_robot import Payload, VirtualRobot, load_virtual_robot, simulate
 from psdmc.calibrate.wording import listed
+from psdmc.calibrate.workers import in_processes
 from psdmc.errors import InputError
 
 INDEX = "simulated.json"
@@ -76,14 +75,8 @@ def simulate_campaign(
     stale = [
         job for job in jobs if known.get(job.run.log.name) != keys[job.run.log] or not job.run.log.exists()
     ]
-    if options.workers > 1 and len(stale) > 1:
-        workers = min(options.workers, len(stale))
-        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-            for name in pool.map(_simulated, stale):
-                progress(name)
-    else:
-        for job in stale:
-            progress(_simulated(job))
+    for name in in_processes(_simulated, stale, min(options.workers, len(stale))):
+        progress(name)
     index = {path.name: key for path, key in sorted(keys.items())}
     make_folder(index_path.parent)
     write_whole(index_path, json.dumps(index, indent=1) + "\n")
