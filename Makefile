@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo campaign clean
+.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-lowest audit
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -44,6 +44,29 @@ campaign: $(READY) ## 10,000 random robots against Pinocchio and MuJoCo, an hour
 	@mkdir -p $(GENERATED)
 	$(RUN)/python tests/campaign/campaign_run.py $(CAMPAIGN) --json $(GENERATED)/campaign.json
 
+test-processes: $(READY) ## kill every command 50 times at random moments, and whatever else takes long
+	PSDMC_KILLS=50 $(RUN)/python -m pytest -q -rs tests/end_to_end/test_killed.py tests/end_to_end/test_full_disk.py
+
+LOWEST := .venv-lowest
+LOWEST_TESTS = $(FAST) tests/test_atomic.py tests/emit/test_package.py tests/emit/test_write.py tests/toolchain/test_call.py \
+  tests/toolchain/test_cache.py tests/bench/test_results.py tests/calibrate/test_log_files.py tests/calibrate/test_linear_fit.py
+
+$(LOWEST)/ready: pyproject.toml constraints/lowest.txt
+	$(PYTHON) -m venv --clear $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints/lowest.txt \
+	  --editable '.[calibrate]' pytest pytest-xdist pytest-benchmark hypothesis example-robot-data mpmath
+	@touch $@
+
+test-lowest: $(LOWEST)/ready ## run the fast tests with the oldest dependencies that pyproject.toml admits
+	$(LOWEST)/bin/python -m pytest -q -m 'not slow' $(LOWEST_TESTS)
+
+audit: $(READY) ## ask the advisory databases about every installed dependency (pip-audit; needs the network)
+	@test -x $(AUDIT)/bin/pip-audit || { $(PYTHON) -m venv $(AUDIT) && $(AUDIT)/bin/python -m pip install --quiet --disable-pip-version-check pip-audit; }
+	$(RUN)/python -m pip freeze --exclude-editable > $(AUDIT)/installed.txt
+	$(AUDIT)/bin/pip-audit --requirement $(AUDIT)/installed.txt --no-deps --disable-pip --strict
+
+AUDIT := .venv-audit
+
 FAST := tests/test_architecture.py tests/program tests/robot tests/dynamics tests/model
 
 check: $(READY) ## format, lint, types and the fast tests: seconds
@@ -70,6 +93,6 @@ calibrate-demo: $(READY) ## excite, simulate and calibrate the virtual Denso; pa
 	$(RUN)/python -m psdmc.report.calibrate_demo
 
 clean: ## remove the environment and everything generated but the reference robot
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
+	rm -rf $(VENV) $(LOWEST) $(AUDIT) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
 	find $(GENERATED) -mindepth 1 -maxdepth 1 ! -name two_link ! -name .gitkeep -exec rm -rf {} +
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

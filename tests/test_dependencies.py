@@ -1,0 +1,34 @@
+"""What pyproject.toml asks of dependencies, and what `make test-lowest` tests of it, are the same."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+UNTESTED = {"ruff", "mypy"}
+"""Tools of `make check`: no test imports them."""
+
+
+def lowest() -> dict[str, str]:
+    text = (ROOT / "constraints" / "lowest.txt").read_text(encoding="utf-8")
+    return dict(line.split("==") for line in text.splitlines() if line and not line.startswith("#"))
+
+
+def bounds() -> dict[str, str]:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    asked = [*project["dependencies"], *extras["test"], *extras["calibrate"]]
+    found = (re.fullmatch(r"([\w-]+)>=([\d.]+)", one) for one in asked)
+    return {match[1]: match[2] for match in found if match}
+
+
+def padded(version: str) -> str:
+    return ".".join([*version.split("."), "0", "0"][:3])
+
+
+def test_every_lower_bound_is_tested():
+    asked = {name: padded(version) for name, version in bounds().items() if name not in UNTESTED}
+    tested = {name: padded(version) for name, version in lowest().items()}
+    assert tested == asked
