@@ -147,6 +147,8 @@ def test_a_killed_command_leaves_nothing_half_done(name: str, root: Path):
     command = COMMANDS[name]
     reference = prepared(command, root, "reference")
     expected_packages["old"] = files_in(reference / "c") if (reference / "c").exists() else {}
+    if name == "emit-c":
+        run(command.words, prepared(command, root, "warm"))  # lowers: later runs find that in the cache
     start = time.monotonic()
     assert run(command.words, reference) == 0, (root / "reference.said").read_text()
     seconds = time.monotonic() - start
