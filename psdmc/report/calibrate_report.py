@@ -14,6 +14,7 @@ from psdmc.atomic import write_together
 from psdmc.calibrate.excite import Excitation
 from psdmc.calibrate.quality import Quality
 from psdmc.calibrate.record import Calibration, NumberRow
+from psdmc.calibrate.visibility import WEAK
 from psdmc.emit.render import environment
 from psdmc.report.calibrate_plots import excitation_figure, step_figure
 
@@ -42,6 +43,7 @@ class ReportView:
     robot: str
     summary: str
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
     accuracy_table: str
     parameter_table: str
     joint_table: str
@@ -75,6 +77,7 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
         robot=record.robot,
         summary=_summary(record),
         warnings=record.warnings,
+        notes=record.notes,
         accuracy_table=accuracy_table(record),
         parameter_table=parameter_table(record),
         joint_table=joint_table(record),
@@ -87,8 +90,9 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
 
 def _summary(record: Calibration) -> str:
     seen = sum(row.identifiable for row in record.parameters)
+    weak = sum(row.visibility == WEAK for row in record.parameters)
     return (
-        f"Method: {record.method}. {seen} of {len(record.parameters)} base parameters identified, "
+        f"Method: {record.method}. {seen} of {len(record.parameters)} base parameters identified, {weak} weakly visible, "
         f"{len(record.joint_names)} joints."
     )
 
@@ -119,15 +123,14 @@ def _r2(value: float) -> str:
 
 def parameter_table(record: Calibration) -> str:
     """Table 4: base parameter, value, uncertainty, equation."""
-    head = ["Parameter", "Value", "±", "Relative", "Unit", "Group", "Equation"]
+    head = ["Parameter", "Value", "±", "Relative", "Unit", "Group", "Equation", "In the data"]
     rows = []
     for row in record.parameters:
-        if row.identifiable:
-            numbers = [f"{row.value:.6g}", f"{row.std:.2g}", f"{row.relative:.2%}" if row.value else "–"]
-        else:
-            numbers = ["not identifiable", "–", "–"]
-        rows.append([row.name, *numbers, row.unit, row.group, row.equation])
-    return table(head, rows, text_columns=(6,))
+        numbers = [f"{row.value:.6g}", "–", "–"]
+        if math.isfinite(row.std):
+            numbers[1:] = [f"{row.std:.2g}", f"{row.relative:.2%}" if row.value else "–"]
+        rows.append([row.name, *numbers, row.unit, row.group, row.equation, row.visibility])
+    return table(head, rows, text_columns=(6, 7))
 
 
 def joint_table(record: Calibration) -> str:
@@ -144,7 +147,7 @@ def _number(row: NumberRow | None) -> str:
     if row is None:
         return "–"
     if not row.seen:
-        word = "given" if row.name == "torque_constant" else "not seen"
+        word = "given" if row.name == "torque_constant" else row.visibility or "not seen"
         return f"({row.value:.4g}: {word})" if math.isfinite(row.value) else "not identifiable"
     return f"{row.value:.4g} ± {row.std:.1g}"
 

@@ -28,13 +28,23 @@ def record() -> Calibration:
         model=None,  # type: ignore[arg-type]
         parameters=(
             ParameterRow("theta_1", "gravity", 7.4174, 0.01, "kg", "m1 + mx1/a1 <i>", True),
-            ParameterRow("theta_2", "inertial", 0.0, float("inf"), "kg m^2", "Izz1", False),
+            ParameterRow(
+                "theta_2",
+                "inertial",
+                0.25,
+                float("inf"),
+                "kg m^2",
+                "Izz1",
+                False,
+                "not visible: kept at the file's value",
+            ),
         ),
         motors=(NumberRow("a", "torque_constant", 36.1, 0.02, "Nm/A"),),
         friction=(NumberRow("a", "stribeck_velocity", 0.02, 0.5, "rad/s", seen=False),),
         steps=(StepQuality("All", {"a": quality}, (SAMPLE,)),),
         warnings=("joint a: <script>alert(1)</script>",),
         facts={"rank": 31, "singular_values": [3.0, 0.5]},
+        notes=("physical consistency moved the parameters by 3 standard deviations",),
     )
 
 
@@ -45,7 +55,9 @@ def test_it_shows_every_number(record: Calibration):
         "7.4174",
         "m1 + mx1/a1 &lt;i&gt;",
         "0.9876",
-        "not identifiable",
+        "1 of 2 base parameters identified",
+        "not visible: kept at the file&#x27;s value",
+        "physical consistency moved",
         "36.1 ± 0.02",
         "not seen",
         "3, 0.5",
