@@ -9,7 +9,6 @@ from pathlib import Path
 from psdmc.calibrate.campaign_file import is_campaign, read_campaign
 from psdmc.calibrate.four_steps import Runs, calibrate_four_steps
 from psdmc.calibrate.judged_record import judged_record
-from psdmc.calibrate.least_squares import noise_factor
 from psdmc.calibrate.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibrate.log import Array, Log
 from psdmc.calibrate.log_files import read_log
@@ -17,6 +16,7 @@ from psdmc.calibrate.motor_constants import motors_of_logs
 from psdmc.calibrate.physical import PhysicalOptions, nearest_physical, require_cvxpy, whitening_of
 from psdmc.calibrate.predictor import ChainRegressor, Regressor
 from psdmc.calibrate.record import Calibration, four_step_record, linear_record
+from psdmc.calibrate.residuals import noise_factor
 from psdmc.calibrate.steps import CalibrationOptions
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel

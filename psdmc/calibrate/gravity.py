@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibrate.filter import States, away_from, filtered, held_out
-from psdmc.calibrate.least_squares import Consider, Estimate, Prior, estimate, noise_warnings
+from psdmc.calibrate.least_squares import Consider, Estimate, Prior, estimate
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor, gravity_regressor, payload_torque
 from psdmc.calibrate.prior import base_scale, torque_sizes
+from psdmc.calibrate.residuals import noise_warnings
 from psdmc.calibrate.steps import GravityRun, StepOptions, StepQuality, judged
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain

@@ -16,13 +16,14 @@ from psdmc.calibrate.filter import States, filtered, held_out, thinned
 from psdmc.calibrate.friction import FrictionResult
 from psdmc.calibrate.friction_fit import JointFriction
 from psdmc.calibrate.gravity import GravityResult, gravity_split
-from psdmc.calibrate.least_squares import Consider, Estimate, Prior, estimate, noise_warnings
+from psdmc.calibrate.least_squares import Consider, Estimate, Prior, estimate
 from psdmc.calibrate.log import Array
 from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.lugre import Lugre, friction_torque
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor, payload_torque
 from psdmc.calibrate.prior import base_scale, torque_sizes
+from psdmc.calibrate.residuals import noise_warnings
 from psdmc.calibrate.steps import InertialRun, StepOptions, StepQuality, judged
 from psdmc.robot.chain import Chain
 

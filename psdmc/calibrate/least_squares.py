@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibrate.log import Array
+from psdmc.calibrate.residuals import noise_factor, sample_correlation, spread
 
 Method = Literal["ols", "wls", "irls"]
 
@@ -171,52 +171,6 @@ def _weights(residual: Array, use: NDArray[np.bool_], options: FitOptions) -> Ar
         return np.broadcast_to(1.0 / sigma, residual.shape)
     size = np.maximum(np.abs(residual) / sigma, 1e-12)
     return np.asarray(np.sqrt(np.minimum(1.0, options.huber / size)) / sigma)
-
-
-def spread(residual: Array, use: NDArray[np.bool_]) -> Array:
-    """(n,) RMS of each joint's usable residuals; zero where it has none."""
-    count = np.maximum(use.sum(axis=0), 1)
-    return np.asarray(np.sqrt(np.sum(np.where(use, residual, 0.0) ** 2, axis=0) / count))
-
-
-def sample_correlation(residual: Array, use: NDArray[np.bool_]) -> Array:
-    """(n,) lag-one autocorrelation of each joint's usable residuals about zero."""
-    both = use[1:] & use[:-1]
-    product = np.sum(np.where(both, residual[1:] * residual[:-1], 0.0), axis=0)
-    power = np.sum(np.where(both, 0.5 * (residual[1:] ** 2 + residual[:-1] ** 2), 0.0), axis=0)
-    return np.asarray(np.divide(product, power, out=np.zeros_like(product), where=power > 0))
-
-
-CORRELATED = 0.5
-"""Correlation of neighbouring residuals above which they are called no noise: filtered white noise gives 0 +- 0.1."""
-
-
-def noise_factor(solved: Estimate) -> float:
-    """By how much the standard deviations are too small at least, for residuals that are no noise; one where they are."""
-    correlated = solved.correlation[solved.correlation > CORRELATED]
-    if not len(correlated) and solved.optimism < OPTIMISTIC:
-        return 1.0
-    by_joint = np.sqrt((1.0 + correlated) / (1.0 - np.minimum(correlated, 0.999)))
-    return float(max([*by_joint.tolist(), solved.optimism]))
-
-
-def noise_warnings(step: str, joint_names: Sequence[str], solved: Estimate) -> tuple[str, ...]:
-    """Says so where residuals are no noise, for then the standard deviations are too small, and by how much at least."""
-    found = [
-        (name, rho) for name, rho in zip(joint_names, solved.correlation, strict=True) if rho > CORRELATED
-    ]
-    factor = noise_factor(solved)
-    if factor == 1.0:
-        return ()
-    where = ", ".join(f"{name} ({rho:.2f})" for name, rho in found) or "all joints together"
-    return (
-        f"{step}: the residual is no noise but correlated from sample to sample, joint(s) {where}: the model lacks an "
-        f"effect there, and standard deviations are too small, by a factor of {factor:.1f} or more",
-    )
-
-
-OPTIMISTIC = 1.7
-"""Robust over white standard deviation above which the latter is called too small."""
 
 
 NUMERICAL = 1e-9

@@ -22,12 +22,13 @@ from psdmc.calibrate.filter import (
     smoothed_rows,
     thinned,
 )
-from psdmc.calibrate.least_squares import Consider, Estimate, FitOptions, Prior, estimate, noise_warnings
+from psdmc.calibrate.least_squares import Consider, Estimate, FitOptions, Prior, estimate
 from psdmc.calibrate.log import Array, Log
 from psdmc.calibrate.log_checks import checked
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.prior import base_scale, torque_sizes
+from psdmc.calibrate.residuals import noise_warnings
 from psdmc.robot.chain import Chain
 
 

@@ -13,7 +13,7 @@ from shared_data import UR10_LOG
 from test_four_steps import with_logs
 from test_ur10 import model as ur10_model  # noqa: F401  a fixture
 
-from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
+from psdmc.calibrate.calibrate import CalibrateOptions, calibrate, calibrate_campaign
 from psdmc.calibrate.campaign_file import read_campaign
 from psdmc.calibrate.delivered import delivered_quality
 from psdmc.calibrate.filter import filtered, smoothed_rows, thinned
@@ -22,6 +22,7 @@ from psdmc.calibrate.log import Log
 from psdmc.calibrate.log_files import read_log
 from psdmc.calibrate.predictor import ChainRegressor
 from psdmc.calibrate.record import Calibration
+from psdmc.calibrate.steps import InertialRun
 from psdmc.cli import main
 from psdmc.cli.show import print_accuracy
 from psdmc.compiler import emit_c
@@ -172,3 +173,29 @@ def test_physical_is_the_default_of_the_command(
     assert "physical consistency moved the parameters" in capsys.readouterr().out
     assert min(coulomb("--physical")) >= 0
     assert "note: --physical is the default now" in capsys.readouterr().out
+
+
+def test_a_campaign_that_shows_little_keeps_the_files_values(
+    arm, campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """The fast run moves the shoulder alone: what only the elbow's acceleration shows stays at the file's value."""
+    folder = with_logs(arm, campaign, "delivered_noisy")
+    runs = read_campaign(folder)
+    poor = replace(runs, inertial=[InertialRun(runs.friction[0].log)])
+    plain = CalibrateOptions()
+    lugre = replace(plain.campaign.lugre, law="coulomb_viscous")
+    options = replace(plain, campaign=replace(plain.campaign, passes=1, lugre=lugre))
+    wrong = arm.model.theta_b + 0.05 * (np.arange(arm.model.l) == 6)
+
+    model = replace(arm.model, theta_b=wrong)
+    record = calibrate_campaign(model, poor, options, arm.regressor, None, lambda step: None)
+
+    elbow_drive = record.parameters[6]
+    assert elbow_drive.equation == "Im2"
+    assert elbow_drive.value == pytest.approx(wrong[6], rel=1e-3)
+    assert elbow_drive.visibility.startswith("not visible: kept at")
+    assert "the file's value" in elbow_drive.visibility
+    assert np.isinf(elbow_drive.std)
+    assert record.parameters[2].identifiable
+    assert any("theta_7: not visible" in warning for warning in record.warnings)
+    require_delivered(record, poor, tmp_path, capsys)

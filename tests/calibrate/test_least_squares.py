@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.calibrate.least_squares import Consider, FitOptions, estimate, noise_warnings
+from psdmc.calibrate.least_squares import Consider, FitOptions, estimate
+from psdmc.calibrate.residuals import noise_warnings
 
 RNG_SEED = 7
 TRUE = np.array([2.0, -1.0, 0.5])
