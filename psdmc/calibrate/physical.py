@@ -106,6 +106,11 @@ def nearest_physical(
     found = np.asarray(span @ inner.value)
     _require_physical(model, found)
     rest = np.zeros(0) if extra is None else np.asarray(extra.value)
+    if bounded[l:].any() and float(rest[bounded[l:]].min()) < -SOLVER_SLACK * float(np.abs(rest).max()):
+        raise InputError(
+            f"physical consistency: friction came out at {float(rest[bounded[l:]].min()):.3g}",
+            "see the unconstrained fit with --no-physical",
+        )
     rest = np.where(bounded[l:], np.maximum(rest, 0.0), rest)
     whole = np.concatenate([model.B @ found, rest])
     return Physical(found, whole, float(np.linalg.norm(whitening @ (whole - values))))
@@ -139,6 +144,8 @@ def _require_physical(model: DynamicsModel, x: Array) -> None:
             )
 
 
+SOLVER_SLACK = 1e-5
+"""Of the largest friction or offset: by this much the solver may leave a bound, and it then counts as kept."""
 ROUNDING = 1e-9
 """Negative eigenvalue of a pseudo-inertia, relative to its largest entry, that counts as zero."""
 
