@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from psdmc.calibrate.api import calibrate
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.model.dynamics_model import DynamicsModel
@@ -20,6 +21,7 @@ __all__ = [
     "InternalError",
     "PsdmcError",
     "ToolchainError",
+    "calibrate",
     "compile",
     "derive",
     "emit_c",
@@ -28,12 +30,16 @@ __all__ = [
 
 _MODULES = {name: "psdmc.errors" for name in __all__ if name.endswith("Error")}
 _MODULES |= dict.fromkeys(("compile", "derive", "emit_c"), "psdmc.compiler")
-_MODULES |= {"DynamicsModel": "psdmc.model.dynamics_model", "load": "psdmc.model.store"}
+_MODULES |= {
+    "calibrate": "psdmc.calibrate.api",
+    "DynamicsModel": "psdmc.model.dynamics_model",
+    "load": "psdmc.model.store",
+}
 """Where each name is: loaded when it is first used, so that the command line's first words cost nothing."""
 
 
 class _Package(ModuleType):
-    """The package, in which the function `derive` is not hidden by the folder of that name once that is imported."""
+    """The package, in which the functions `calibrate` and `derive` are not hidden by the folders of these names."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _MODULES and isinstance(value, ModuleType)):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from psdmc.calibrate.campaign_file import is_campaign, read_campaign
 from psdmc.calibrate.four_steps import Runs, calibrate_four_steps
+from psdmc.calibrate.judge import VerdictOptions
 from psdmc.calibrate.judged_record import judged_record
 from psdmc.calibrate.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibrate.log import Array, Log
@@ -18,6 +19,7 @@ from psdmc.calibrate.predictor import ChainRegressor, Regressor
 from psdmc.calibrate.record import Calibration, four_step_record, linear_record
 from psdmc.calibrate.residuals import noise_factor
 from psdmc.calibrate.steps import CalibrationOptions
+from psdmc.calibrate.verdict_on import with_verdict_on_campaign, with_verdict_on_logs
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 
@@ -31,12 +33,14 @@ class CalibrateOptions:
     physical   whether the result must be what a robot can have: links of positive mass distribution, drive inertias
                and friction not negative; False shows the unconstrained fit
     campaign   options of the four steps;  linear  of the linear fit;  consistency  of the physical estimate
+    verdict    limits of the verdict
     """
 
     physical: bool = True
     campaign: CalibrationOptions = field(default_factory=CalibrationOptions)
     linear: LinearOptions = field(default_factory=LinearOptions)
     consistency: PhysicalOptions = field(default_factory=PhysicalOptions)
+    verdict: VerdictOptions = field(default_factory=VerdictOptions)
 
 
 def calibrate(
@@ -94,14 +98,16 @@ def calibrate_campaign(
         return four_step_record(model, found, theta_b, options.campaign)
 
     progress("reading the result back")
-    plain = judged_record(record(inertial.theta_b), runs)
-    if not options.physical:
-        return plain
-    progress("physical consistency")
-    factor = max(noise_factor(found.gravity.estimate), noise_factor(inertial.estimate))
-    whitening = whitening_of(factor**2 * inertial.covariance + inertial.prior_covariance)
-    near = nearest_physical(model, inertial.theta_b, whitening, None, options.consistency)
-    return judged_record(record(near.values), runs, plain, near.distance)
+    result = plain = judged_record(record(inertial.theta_b), runs)
+    if options.physical:
+        progress("physical consistency")
+        factor = max(noise_factor(found.gravity.estimate), noise_factor(inertial.estimate))
+        whitening = whitening_of(factor**2 * inertial.covariance + inertial.prior_covariance)
+        near = nearest_physical(model, inertial.theta_b, whitening, None, options.consistency)
+        result = judged_record(record(near.values), runs, plain, near.distance)
+    progress("verdict")
+    step = options.campaign.inertial.filter
+    return with_verdict_on_campaign(result, model, regressor, runs, found.motors, step, options.verdict)
 
 
 def calibrate_logs(
@@ -119,12 +125,14 @@ def calibrate_logs(
     found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b)
     solved = found.estimate
     progress("reading the result back")
-    plain = judged_record(linear_record(model, found, solved.values, linear), logs, check=linear.check)
-    if not options.physical:
-        return plain
-    progress("physical consistency")
-    near = nearest_physical(
-        model, solved.values, solved.whitening, found.problem.never_negative, options.consistency
-    )
-    record = linear_record(model, found, near.values, linear)
-    return judged_record(record, logs, plain, near.distance, linear.check)
+    record = linear_record(model, found, solved.values, linear)
+    result = plain = judged_record(record, logs, check=linear.check)
+    if options.physical:
+        progress("physical consistency")
+        near = nearest_physical(
+            model, solved.values, solved.whitening, found.problem.never_negative, options.consistency
+        )
+        record = linear_record(model, found, near.values, linear)
+        result = judged_record(record, logs, plain, near.distance, linear.check)
+    progress("verdict")
+    return with_verdict_on_logs(result, model, regressor, logs, motors, linear.filter, options.verdict)

@@ -15,7 +15,9 @@ from psdmc.calibrate.motor import MotorResult
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.prediction import FrictionRunConstants, Prediction
 from psdmc.calibrate.steps import CalibrationOptions, StepOptions, StepQuality
+from psdmc.calibrate.verdict import Verdict
 from psdmc.calibrate.visibility import IDENTIFIED, Visibility, visibility, visibility_warnings, weak_notes
+from psdmc.errors import InternalError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import base_parameters
 
@@ -65,6 +67,7 @@ class Calibration:
     prediction  what else a prediction needs
     notes       what a reader should know and need not worry about
     facts       plain values: ranks, condition numbers, singular values, delay, options
+    verdict     whether it can be used; None before it was judged
     """
 
     robot: str
@@ -79,10 +82,12 @@ class Calibration:
     facts: dict[str, Any] = field(default_factory=dict)
     prediction: Prediction | None = None
     notes: tuple[str, ...] = ()
+    verdict: Verdict | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Plain values; numbers that are not finite become null."""
-        return {
+        judged = {} if self.verdict is None else {"verdict": self.verdict.as_json()}
+        return judged | {
             "robot": self.robot,
             "method": self.method,
             "joints": list(self.joint_names),
@@ -240,6 +245,18 @@ def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration
     provenance = {**record.model.provenance, "calibration": record.as_json()}
     theta = record.model.theta_b if theta_b is None else theta_b
     return replace(record, model=replace(record.model, theta_b=theta, provenance=provenance))
+
+
+def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:
+    """The same calibration with its verdict, in the model's provenance, too."""
+    return with_model(replace(record, verdict=verdict))
+
+
+def verdict_of(record: Calibration) -> Verdict:
+    """The verdict of a record that calibration has finished."""
+    if record.verdict is None:
+        raise InternalError(f"{record.robot}: calibrated, but not judged")
+    return record.verdict
 
 
 MOVED = 1e-6

@@ -17,10 +17,12 @@ from psdmc.calibrate.campaign_file import is_campaign
 from psdmc.calibrate.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
 from psdmc.calibrate.filter import FilterOptions
 from psdmc.calibrate.linear_fit import LinearOptions
+from psdmc.calibrate.record import verdict_of
 from psdmc.calibrate.simulate_campaign import SimulateOptions
+from psdmc.cli.one_line import one_line
 from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
-from psdmc.cli.show import print_accuracy
+from psdmc.cli.show import print_accuracy, print_verdict
 from psdmc.errors import InputError
 from psdmc.model.store import load
 from psdmc.report.bench_page import write_page
@@ -136,8 +138,11 @@ def calibrate(
     cutoff: Annotated[
         float | None, typer.Option(metavar="HZ", help="of the filter of plain logs; 8, or less for slow logs")
     ] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="write the model file even where the verdict is: not usable")
+    ] = False,
 ) -> None:
-    """Identify base parameters, friction and motor constants from logs."""
+    """Identify base parameters, friction and motor constants from logs; the verdict comes first, exit 6: not usable."""
     check_output(output, model, *logs)
     check_report(report, model, output, *logs)
     with steps() as progress:
@@ -150,15 +155,23 @@ def calibrate(
             _torque_constants(torque_constants),
             actuators,
             progress,
+            keep=keep,
         )
+    verdict = verdict_of(record)
+    print_verdict(verdict)
     print_accuracy(record)
-    print(f"{output}: calibrated model")
+    if verdict.usable or keep:
+        print(f"{output}: calibrated model")
+    else:
+        print(f"{output}: not written; --keep writes it all the same")
     if physical:
         print("note: --physical is the default now and need not be given")
     for note in record.notes:
-        print(f"note: {note}")
+        print(f"note: {one_line(note)}")
     for warning in record.warnings:
-        print(f"warning: {warning}")
+        print(f"warning: {one_line(warning)}")
+    if not verdict.usable:
+        raise typer.Exit(verdict.exit_status)
 
 
 def _linear(cutoff: float | None, logs: list[Path]) -> LinearOptions:

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from psdmc.cli.one_line import one_line
 from psdmc.compiler import admitted, left_out
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.check import CheckRow, readers
@@ -21,6 +22,7 @@ from psdmc.robot.chain import Joint
 
 if TYPE_CHECKING:
     from psdmc.calibrate.record import Calibration
+    from psdmc.calibrate.verdict import Verdict
 
 WIDTH = 160
 """Columns of a table where the output is no terminal, so that nothing is cut."""
@@ -151,6 +153,12 @@ def print_mass_check(mass: MassCheck | None) -> None:
         print("mass matrix: not tested, for the base parameters are unknown")
         return
     print(f"{'pass' if mass.passed else 'FAIL'}: {mass.reason}")
+
+
+def print_verdict(verdict: Verdict) -> None:
+    """Whether a calibration can be used, and what speaks against it."""
+    for line in verdict.lines():
+        print(one_line(line))
 
 
 def print_accuracy(record: Calibration) -> None:

@@ -11,7 +11,7 @@ from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
 from psdmc.calibrate.campaign import CampaignOptions, plan_campaign, require_free, write_campaign
 from psdmc.calibrate.excite import Excitation
 from psdmc.calibrate.predictor import Regressor
-from psdmc.calibrate.record import Calibration
+from psdmc.calibrate.record import Calibration, verdict_of
 from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibrate.trajectory import write_trajectory
 from psdmc.compiler import compile as compile_model
@@ -71,12 +71,14 @@ def calibrate_command(
     torque_constants: Mapping[str, float] | None = None,
     actuators: str | Path | None = None,
     progress: Progress = silent,
+    keep: bool = False,
 ) -> Calibration:
     """Calibrate a model file from a campaign or from logs.
 
     output     the calibrated model file, which emit-c takes
     report     an HTML page, with the numbers as JSON beside it
     actuators  a folder for C: friction and motors
+    keep       whether model and C are written even where the verdict is `not usable`
     """
     known = load(model)
     record = calibrate(
@@ -87,9 +89,11 @@ def calibrate_command(
         torque_constants=torque_constants,
         progress=progress,
     )
-    save(record.model, output)
     if report is not None:
         write_report(record, report)
+    if not (verdict_of(record).usable or keep):
+        return record
+    save(record.model, output)
     if actuators is not None:
         write_actuators(record.model, actuators)
     return record

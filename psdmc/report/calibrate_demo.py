@@ -15,7 +15,7 @@ import numpy as np
 from psdmc.atomic import write_whole
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
 from psdmc.calibrate.campaign import CampaignOptions, excitation_json, plan_campaign, write_campaign
-from psdmc.calibrate.record import Calibration
+from psdmc.calibrate.record import Calibration, verdict_of
 from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibrate.truth import Comparison, compare
 from psdmc.calibrate.virtual_robot import load_virtual_robot
@@ -94,7 +94,8 @@ def _accuracy(record: Calibration) -> list[str]:
     for step in record.steps:
         values = " ".join(f"{np.round(both.held_out.r2, 4):8.4f}" for both in step.joints.values())
         lines.append(f"  R² held out, {step.step:<9}{values}")
-    return [*lines, *(f"  warning: {warning}" for warning in record.warnings)]
+    verdict = [f"  {line}" for line in verdict_of(record).lines()]
+    return [*verdict, *lines, *(f"  warning: {warning}" for warning in record.warnings)]
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ from psdmc.atomic import write_together
 from psdmc.calibrate.excite import Excitation
 from psdmc.calibrate.quality import Quality
 from psdmc.calibrate.record import Calibration, NumberRow
+from psdmc.calibrate.verdict import Verdict
 from psdmc.calibrate.visibility import WEAK
 from psdmc.emit.render import environment
 from psdmc.report.calibrate_plots import excitation_figure, step_figure
@@ -37,11 +38,22 @@ class FigureView:
 
 
 @dataclass(frozen=True, slots=True)
+class VerdictView:
+    """The verdict's word, what it rests on as (kind, text), and its figures joint by joint."""
+
+    word: str
+    usable: bool
+    lines: tuple[tuple[str, str], ...]
+    joint_table: str
+
+
+@dataclass(frozen=True, slots=True)
 class ReportView:
     """What the page's template fills in; tables are finished markup, all other text is escaped there."""
 
     robot: str
     summary: str
+    verdict: VerdictView | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     accuracy_table: str
@@ -55,7 +67,7 @@ def write_report(record: Calibration, path: str | Path, found: Excitation | None
     """Write the page and, beside it, its numbers as JSON; returns both paths."""
     page = Path(path)
     numbers = page.with_suffix(".json")
-    text = json.dumps(record.as_json(), indent=1, sort_keys=True) + "\n"
+    text = json.dumps(record.as_json(), indent=1) + "\n"
     write_together(page.parent, {page.name: report_html(record, found), numbers.name: text})
     return page, numbers
 
@@ -76,6 +88,7 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
     view = ReportView(
         robot=record.robot,
         summary=_summary(record),
+        verdict=None if record.verdict is None else verdict_view(record.verdict),
         warnings=record.warnings,
         notes=record.notes,
         accuracy_table=accuracy_table(record),
@@ -86,6 +99,44 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
     )
     template = environment().overlay(autoescape=True).get_template("report/calibration.html.jinja")
     return template.render(view=view)
+
+
+def verdict_view(verdict: Verdict) -> VerdictView:
+    """What the page says first."""
+    kinds = (
+        ("not usable", verdict.reasons),
+        ("likely", verdict.suspects),
+        ("doubt", verdict.doubts),
+    )
+    lines = tuple((kind, text) for kind, texts in kinds for text in texts)
+    return VerdictView(verdict.word, verdict.usable, lines, verdict_table(verdict))
+
+
+def verdict_table(verdict: Verdict) -> str:
+    """What each joint was judged by; a gain in brackets says nothing, as the file's torque is too small there."""
+    head = ["Joint", "R²", "RMSE", "Gain against the file", "Power of friction [W]", "Residual / noise"]
+    rows = []
+    for joint in verdict.joints:
+        gain = _with_std(joint.gain, joint.gain_std)
+        rows.append(
+            [
+                joint.joint,
+                _r2(joint.r2),
+                _or_dash(joint.rmse),
+                gain if joint.visible or gain == "–" else f"({gain})",
+                _with_std(joint.friction_power, joint.friction_power_std),
+                _or_dash(joint.noise_ratio),
+            ]
+        )
+    return table(head, rows)
+
+
+def _with_std(value: float, std: float) -> str:
+    return f"{value:.3g} ± {std:.1g}" if math.isfinite(value) else "–"
+
+
+def _or_dash(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "–"
 
 
 def _summary(record: Calibration) -> str:

@@ -14,6 +14,8 @@ from psdmc.calibrate.log import Log
 from psdmc.calibrate.predictor import ChainRegressor
 from psdmc.calibrate.steps import Load
 from psdmc.calibrate.sweeps import SineOptions, SweepOptions
+from psdmc.calibrate.trajectory import Trajectory
+from psdmc.calibrate.virtual_robot import load_virtual_robot, simulate
 from psdmc.derive.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot
@@ -146,3 +148,19 @@ def smooth_log(
 @pytest.fixture
 def log(arm: Arm) -> Log:
     return smooth_log(arm)
+
+
+@pytest.fixture(scope="session")
+def plant_log(arm: Arm) -> Log:
+    """Torques of PLANT (Pinocchio, LuGre friction, sensors) through two sines a joint, 30 s at 100 Hz."""
+    time = np.arange(3000) / 100.0
+    q, qd, qdd = (np.zeros((len(time), 2)) for _ in range(3))
+    for size, hertz, phase in ((0.9, (0.17, 0.23), (0.0, 0.7)), (0.35, (0.41, 0.57), (1.1, 0.2))):
+        w = 2 * np.pi * np.array(hertz)
+        angle = w * time[:, None] + np.array(phase)
+        q += size * np.sin(angle)
+        qd += size * w * np.cos(angle)
+        qdd -= size * w**2 * np.sin(angle)
+    motion = Trajectory(arm.model.joint_names, time, q, qd, qdd)
+    log = simulate(load_virtual_robot(arm.plant), motion)
+    return replace(log, name="plant", effort=log.effort * np.array([12.0, 5.0]), quantity="motor_torque")

@@ -67,6 +67,13 @@ def test_with_sensors_the_truth_lies_within_the_standard_deviations(arm, noisy):
     assert record.warnings == ()
 
 
+def test_a_campaign_with_ideal_or_with_real_sensors_is_usable(ideal, noisy):
+    for _, record in (ideal, noisy):
+        assert record.verdict is not None
+        assert record.verdict.word == "usable"
+        assert record.verdict.samples_per_unknown > 16
+
+
 def test_the_calibrated_model_is_a_model_file(arm, noisy, tmp_path: Path):
     save(noisy[1].model, tmp_path / "calibrated.npz")
 
@@ -95,6 +102,9 @@ def test_a_harness_that_the_model_lacks_is_noticed(arm, campaign: Path):
     assert "the residual is no noise" in told
     assert "elbow" in told
     assert "standard deviations are too small" in told
+    assert record.verdict is not None
+    assert record.verdict.word == "usable, with doubts"
+    assert any("lacks an effect" in doubt and "elbow" in doubt for doubt in record.verdict.doubts)
 
 
 def test_plain_coulomb_and_viscous_friction_for_those_who_want_no_more(arm, noisy):

@@ -12,6 +12,7 @@ import pytest
 from psdmc.calibrate.quality import Quality
 from psdmc.calibrate.record import Calibration, NumberRow, ParameterRow
 from psdmc.calibrate.steps import JointQuality, Sample, StepQuality
+from psdmc.calibrate.verdict import JointFigures, Verdict
 from psdmc.report.calibrate_report import report_html, write_report
 
 X = np.linspace(0.0, 1.0, 50)
@@ -93,3 +94,27 @@ def test_the_numbers_stand_beside_it_as_json(record: Calibration, tmp_path: Path
 
     assert data["base_parameters"][1]["std"] is None
     assert data["quality"]["All"]["a"]["held_out"]["r2"] == 0.9876
+
+
+def test_the_verdict_comes_first_with_its_figures(record: Calibration, tmp_path: Path):
+    figures = JointFigures("a", 0.25, 0.2, -1.02, 0.03, True, -4.5, 0.1, float("nan"), 0.7)
+    hidden = replace(figures, joint="b", gain=11.6, visible=False)
+    verdict = Verdict(
+        ("friction <gives> power",), ("few samples",), ("a & b swapped",), (figures, hidden), 5.0
+    )
+
+    page, numbers = write_report(replace(record, robot="arm", verdict=verdict), tmp_path / "page.html")
+    text = page.read_text(encoding="utf-8")
+
+    assert text.index("Verdict: not usable") < text.index("Warnings") < text.index("Accuracy")
+    for part in (
+        "friction &lt;gives&gt; power",
+        "a &amp; b swapped",
+        "few samples",
+        "-1.02 ± 0.03",
+        "(11.6 ± 0.03)",
+    ):
+        assert part in text
+    data = json.loads(numbers.read_text(encoding="utf-8"))
+    assert next(iter(data)) == "verdict"
+    assert data["verdict"]["joints"]["a"]["noise_ratio"] is None

@@ -1,0 +1,114 @@
+"""What a calibration is worth: usable, usable with these doubts, or not usable, and the figures that say so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Word = Literal["usable", "usable, with doubts", "not usable"]
+
+NOT_USABLE_STATUS = 6
+"""Exit status of `psdmc calibrate` where the verdict is `not usable`."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointFigures:
+    """What one joint's share of the verdict is judged from; NaN where a figure does not exist.
+
+    r2, rmse       on held-out data, whole torque (N m, N where the joint slides)
+    gain, gain_std measured torque, friction apart, per torque by the file's own theta_b: one where the file is right
+    visible        whether the file's torque stands out enough for its gain to say anything
+    friction_power, friction_power_std   W, mean power that friction takes: positive on any real joint
+    noise_ratio    residual over the sensor noise that passes the filter
+    speed          rad/s (m/s), RMS
+    """
+
+    joint: str
+    r2: float
+    rmse: float
+    gain: float
+    gain_std: float
+    visible: bool
+    friction_power: float
+    friction_power_std: float
+    noise_ratio: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The verdict with everything that speaks against the calibration.
+
+    reasons    why it is not usable; empty where it is
+    doubts     what a user should know before using it
+    suspects   what would explain a bad fit: joints swapped, signs turned, units
+    joints     figures, in the model's order
+    samples_per_unknown   independent samples per fitted unknown, the smallest of all steps
+    """
+
+    reasons: tuple[str, ...]
+    doubts: tuple[str, ...]
+    suspects: tuple[str, ...]
+    joints: tuple[JointFigures, ...]
+    samples_per_unknown: float
+
+    @property
+    def usable(self) -> bool:
+        return not self.reasons
+
+    @property
+    def word(self) -> Word:
+        if self.reasons:
+            return "not usable"
+        return "usable, with doubts" if self.doubts else "usable"
+
+    @property
+    def exit_status(self) -> int:
+        """Of the command line: 0 for both usable verdicts."""
+        return 0 if self.usable else NOT_USABLE_STATUS
+
+    def lines(self) -> list[str]:
+        """The verdict as text: the word first, then what it rests on."""
+        return [
+            f"verdict: {self.word}",
+            *(f"  not usable: {reason}" for reason in self.reasons),
+            *(f"  likely: {suspect}" for suspect in self.suspects),
+            *(f"  doubt: {doubt}" for doubt in self.doubts),
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values; numbers that are not finite become null."""
+        return {
+            "verdict": self.word,
+            "usable": self.usable,
+            "reasons": list(self.reasons),
+            "suspects": list(self.suspects),
+            "doubts": list(self.doubts),
+            "samples_per_unknown": _plain(self.samples_per_unknown),
+            "joints": {figures.joint: _figures(figures) for figures in self.joints},
+        }
+
+
+def _figures(figures: JointFigures) -> dict[str, Any]:
+    numbers = (
+        "r2",
+        "rmse",
+        "gain",
+        "gain_std",
+        "friction_power",
+        "friction_power_std",
+        "noise_ratio",
+        "speed",
+    )
+    return {name: _plain(getattr(figures, name)) for name in numbers} | {"visible": figures.visible}
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def listed(names: Sequence[str]) -> str:
+    """'a', 'a and b', 'a, b and c'."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
