@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from psdmc.calibrate.campaign_file import is_campaign, read_campaign
 from psdmc.calibrate.four_steps import Runs, calibrate_four_steps
-from psdmc.calibrate.judge import VerdictOptions
+from psdmc.calibrate.judge import NOT_PHYSICAL, VerdictOptions
 from psdmc.calibrate.judged_record import judged_record
 from psdmc.calibrate.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibrate.log import Array, Log
 from psdmc.calibrate.log_files import read_log
 from psdmc.calibrate.motor_constants import motors_of_logs
-from psdmc.calibrate.physical import PhysicalOptions, nearest_physical, require_cvxpy, whitening_of
+from psdmc.calibrate.physical import (
+    NotPhysical,
+    PhysicalOptions,
+    nearest_physical,
+    require_cvxpy,
+    whitening_of,
+)
 from psdmc.calibrate.predictor import ChainRegressor, Regressor
 from psdmc.calibrate.record import Calibration, four_step_record, linear_record
 from psdmc.calibrate.residuals import noise_factor
@@ -98,16 +104,31 @@ def calibrate_campaign(
         return four_step_record(model, found, theta_b, options.campaign)
 
     progress("reading the result back")
-    result = plain = judged_record(record(inertial.theta_b), runs)
-    if options.physical:
-        progress("physical consistency")
+    plain = judged_record(record(inertial.theta_b), runs)
+
+    def consistent() -> Calibration:
         factor = max(noise_factor(found.gravity.estimate), noise_factor(inertial.estimate))
         whitening = whitening_of(factor**2 * inertial.covariance + inertial.prior_covariance)
         near = nearest_physical(model, inertial.theta_b, whitening, None, options.consistency)
-        result = judged_record(record(near.values), runs, plain, near.distance)
+        return judged_record(record(near.values), runs, plain, near.distance)
+
+    result = _physical(plain, consistent, options, progress)
     progress("verdict")
     step = options.campaign.inertial.filter
     return with_verdict_on_campaign(result, model, regressor, runs, found.motors, step, options.verdict)
+
+
+def _physical(
+    plain: Calibration, consistent: Callable[[], Calibration], options: CalibrateOptions, progress: Progress
+) -> Calibration:
+    """The physically consistent record where it is wanted and there is one; else the bare fit's, which says so."""
+    if not options.physical:
+        return plain
+    progress("physical consistency")
+    try:
+        return consistent()
+    except NotPhysical as error:
+        return replace(plain, facts={**plain.facts, NOT_PHYSICAL: error.message})
 
 
 def calibrate_logs(
@@ -125,14 +146,14 @@ def calibrate_logs(
     found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b)
     solved = found.estimate
     progress("reading the result back")
-    record = linear_record(model, found, solved.values, linear)
-    result = plain = judged_record(record, logs, check=linear.check)
-    if options.physical:
-        progress("physical consistency")
-        near = nearest_physical(
-            model, solved.values, solved.whitening, found.problem.never_negative, options.consistency
-        )
+    plain = judged_record(linear_record(model, found, solved.values, linear), logs, check=linear.check)
+
+    def consistent() -> Calibration:
+        bounded = found.problem.never_negative
+        near = nearest_physical(model, solved.values, solved.whitening, bounded, options.consistency)
         record = linear_record(model, found, near.values, linear)
-        result = judged_record(record, logs, plain, near.distance, linear.check)
+        return judged_record(record, logs, plain, near.distance, linear.check)
+
+    result = _physical(plain, consistent, options, progress)
     progress("verdict")
     return with_verdict_on_logs(result, model, regressor, logs, motors, linear.filter, options.verdict)

@@ -75,6 +75,8 @@ class Demand:
 
 ALONE = ("Motor", "Friction")
 """Steps that excite one joint alone, so that each must be followed."""
+NOT_PHYSICAL = "not_physical"
+"""Fact of a record whose physically consistent version could not be found: why not."""
 NOISE_FLOOR = 1e-4
 """Of the torque's variation: less noise above the cut-off is a log that was smoothed, or no sensor's."""
 
@@ -105,7 +107,13 @@ class _Judge:
         self.held_out = [_whole_torque(record, name, held_out=True) for name in self.names]
 
     def verdict(self) -> Verdict:
-        reasons = [*self._too_few(), *self._wrong_gains(), *self._powered(), *self._poor()]
+        reasons = [
+            *self._unphysical(),
+            *self._too_few(),
+            *self._wrong_gains(),
+            *self._powered(),
+            *self._poor(),
+        ]
         doubts = [*self._doubts()]
         named = [] if self._starved else [suspect(self.evidence), unit_suspect(self.gains)]
         suspects = tuple(text for text in named if text is not None)
@@ -133,6 +141,11 @@ class _Judge:
                     f"{demand.samples} independent samples for {demand.unknowns} unknowns ({demand.step}): "
                     f"{demand.per_unknown:.1f} each, at least {self.limits.fewest_samples:g} are needed"
                 )
+
+    def _unphysical(self) -> Iterator[str]:
+        failed = self.record.facts.get(NOT_PHYSICAL)
+        if failed:
+            yield f"no mass distribution of a real robot is near the fit ({failed})"
 
     def _wrong_gains(self) -> Iterator[str]:
         low, high = self.limits.gains
@@ -286,12 +299,16 @@ class _Judge:
     def _open_parameters(self) -> Iterator[str]:
         """What the data leave open, or know so badly that it matters to the torque."""
         rows = self.record.parameters
-        unseen = [row.name for row in rows if not row.identifiable]
+        fixed = np.array([np.isfinite(row.std) for row in rows])
+        unseen = [row.name for row, seen in zip(rows, fixed, strict=True) if not seen]
         if unseen:
-            yield f"{len(unseen)} of {len(rows)} base parameters are not seen: {_some(unseen)} stay as in the file, or zero"
+            yield (
+                f"{len(unseen)} of {len(rows)} base parameters are not fixed by the data: {_some(unseen)} "
+                "stay near the file's values, or zero"
+            )
         columns = self.evidence.columns()
         share = np.sqrt(np.mean(columns**2, axis=0)) / np.maximum(self.variation, 1e-300)[:, None]
-        std = np.array([row.std if row.identifiable else 0.0 for row in rows])
+        std = np.where(fixed, [row.std for row in rows], 0.0)
         badly = np.flatnonzero(
             np.max(share * std, axis=0, initial=0.0, where=self._moved()) > self.limits.settled
         )

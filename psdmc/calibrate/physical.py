@@ -27,6 +27,10 @@ SETTLING = 1e-6
 leaves open, moves nothing that it fixes."""
 
 
+class NotPhysical(InputError):
+    """No parameters that a real robot could have were found near an estimate."""
+
+
 @dataclass(frozen=True, slots=True)
 class PhysicalOptions:
     """How far inside, and how near to the file's bodies.
@@ -76,7 +80,7 @@ def nearest_physical(
     whitening       (l + k, l + k)  W: the cost of v is |W (v - values)|^2, in variances (Estimate.whitening)
     never_negative  (l + k,)  entries that may not be negative
     For a linear fit that cost is what v adds to its sum of squares: one problem, its weights, and the prior where the
-    data see nothing. InputError where cvxpy is missing or no solution is found.
+    data see nothing. InputError where cvxpy is missing, NotPhysical where no solution is found.
     """
     options = options or PhysicalOptions()
     cp: Any = require_cvxpy()
@@ -100,9 +104,12 @@ def nearest_physical(
     problem = cp.Problem(cp.Minimize(loss + settle + divergence), constraints)
     with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; what matters is checked below
         warnings.simplefilter("ignore", UserWarning)
-        problem.solve(solver=cp.CLARABEL)
+        try:
+            problem.solve(solver=cp.CLARABEL)
+        except cp.error.SolverError:
+            raise NotPhysical("physical consistency: clarabel failed") from None
     if inner.value is None:
-        raise InputError(f"physical consistency: clarabel found no solution ({problem.status})")
+        raise NotPhysical(f"physical consistency: clarabel found no solution ({problem.status})")
     found = np.asarray(span @ inner.value)
     _require_physical(model, found)
     rest = np.zeros(0) if extra is None else np.asarray(extra.value)
@@ -139,7 +146,7 @@ def _require_physical(model: DynamicsModel, x: Array) -> None:
         matrix[3, 3] = link[0]
         smallest = float(np.linalg.eigvalsh(matrix)[0])
         if smallest < -ROUNDING * float(np.abs(matrix).max()):
-            raise InputError(
+            raise NotPhysical(
                 f"physical consistency: link {joint.link_name} came out with pseudo-inertia {smallest:.3g}"
             )
 
