@@ -8,7 +8,6 @@ from pathlib import Path
 
 from psdmc.calibrate.campaign_file import is_campaign, read_campaign
 from psdmc.calibrate.four_steps import Runs, calibrate_four_steps
-from psdmc.calibrate.judge import NOT_PHYSICAL, VerdictOptions
 from psdmc.calibrate.judged_record import judged_record
 from psdmc.calibrate.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibrate.log import Array, Log
@@ -22,9 +21,11 @@ from psdmc.calibrate.physical import (
     whitening_of,
 )
 from psdmc.calibrate.predictor import ChainRegressor, Regressor
+from psdmc.calibrate.reasons import NOT_PHYSICAL
 from psdmc.calibrate.record import Calibration, four_step_record, linear_record
 from psdmc.calibrate.residuals import noise_factor
 from psdmc.calibrate.steps import CalibrationOptions
+from psdmc.calibrate.verdict_limits import VerdictOptions
 from psdmc.calibrate.verdict_on import with_verdict_on_campaign, with_verdict_on_logs
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel

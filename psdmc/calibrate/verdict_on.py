@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 from psdmc.calibrate.evidence import Motion, evidence_of
 from psdmc.calibrate.filter import FilterOptions
+from psdmc.calibrate.findings import Demand
 from psdmc.calibrate.four_steps import Runs
-from psdmc.calibrate.judge import Demand, VerdictOptions, judge
+from psdmc.calibrate.judge import judge
 from psdmc.calibrate.log import Log
 from psdmc.calibrate.motor_model import Motors
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.record import Calibration, with_verdict
+from psdmc.calibrate.verdict_limits import VerdictOptions
 from psdmc.model.dynamics_model import DynamicsModel
 
 
