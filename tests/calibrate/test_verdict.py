@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ import psdmc
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibrate.log import Log
 from psdmc.calibrate.log_files import write_log
+from psdmc.calibrate.physical import NotPhysical
 from psdmc.calibrate.spoiled import ALL, MOVED, decimated, noise_only, scaled, swapped, turned
 from psdmc.calibrate.verdict import NOT_USABLE_STATUS, Verdict, listed
 
@@ -87,6 +89,18 @@ def test_noise_is_not_usable(arm, plant_log):
 
         assert not found.usable
         assert found.suspects == ()
+
+
+def test_a_fit_that_no_body_is_near_is_not_usable_and_says_so(arm, plant_log, monkeypatch):
+    def fails(*_: object) -> None:
+        raise NotPhysical("clarabel failed")
+
+    monkeypatch.setattr(sys.modules["psdmc.calibrate.calibrate"], "nearest_physical", fails)
+
+    found = verdict_on(arm, plant_log)
+
+    assert not found.usable
+    assert found.reasons == ("no mass distribution of a real robot is near the fit (clarabel failed)",)
 
 
 def test_too_few_samples_are_not_usable_however_good_the_fit(arm, plant_log):
