@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from psdmc.calibrate.findings import Findings
-from psdmc.calibrate.least_squares import CORRELATED
+from psdmc.calibrate.residuals import CORRELATED
 from psdmc.calibrate.verdict import listed
 
 ALONE = ("Motor", "Friction")
