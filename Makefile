@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-lowest audit
+.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-lowest audit fuzz
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -91,6 +91,14 @@ bench-compare: $(READY) ## fail where operations or instructions grew beyond tha
 
 calibrate-demo: $(READY) ## excite, simulate and calibrate the virtual Denso; page in generated/
 	$(RUN)/python -m psdmc.report.calibrate_demo
+
+FUZZ := $(if $(FORMAT),--format $(FORMAT)) $(if $(COUNT),--count $(COUNT)) $(if $(ENGINE),--engine $(ENGINE))
+FUZZ += --seconds $(or $(SECONDS),$(if $(COUNT),1000000,240)) $(FUZZ_OPTIONS)
+
+fuzz: $(READY) ## hostile files and command lines, minutes: SECONDS=, COUNT=, FORMAT=, ENGINE=; figures in generated/fuzz/
+	@$(RUN)/python -c 'import atheris' 2>/dev/null || $(RUN)/python -m pip install --quiet --only-binary :all: '.[fuzz]' \
+	  || echo "atheris does not install here: mutation without guidance by coverage"
+	$(RUN)/python tests/fuzz/fuzz.py $(FUZZ)
 
 clean: ## remove the environment and everything generated but the reference robot
 	rm -rf $(VENV) $(LOWEST) $(AUDIT) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info

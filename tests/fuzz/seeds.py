@@ -1,0 +1,127 @@
+"""What mutations start from: the bundled and example files, other people's URDFs, and a small file of every kind."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import shlex
+import shutil
+import sysconfig
+from pathlib import Path
+
+import fixtures
+import numpy as np
+from fixtures import FIT_TO_READ, FIT_TO_USE, SHORT, log, text, trajectory, write_bag, write_files
+from target_packages import manifest_seed
+
+from psdmc.calibrate.log_files import columns_of, write_log
+from psdmc.calibrate.trajectory import write_trajectory
+from psdmc.compiler import derive
+from psdmc.model.store import file_bytes
+
+ROOT = Path(__file__).parents[2]
+LARGEST_URDF = 20_000
+"""bytes; larger ones repeat what smaller ones have and take their time"""
+
+
+def write_seeds(below: Path) -> Path:
+    """The folder, made where it is missing, with seeds of every format in a folder each, and what stands around mutated
+    files. Its name tells what it was made by; whole or not at all, as several processes may want it.
+    """
+    made_by = b"".join(
+        path.read_bytes()
+        for path in (Path(__file__), Path(fixtures.__file__), *sorted(fixtures.FILES.iterdir()))
+    )
+    folder = below / f"around-{hashlib.sha256(made_by).hexdigest()[:8]}"
+    if folder.exists():
+        return folder
+    own = folder.with_name(f".{folder.name}.{os.getpid()}")
+    shutil.rmtree(own, ignore_errors=True)
+    own.mkdir(parents=True)
+    write_files(own / "files")
+    write_bag(own / "bag", mcap=False)
+    write_bag(own / "mcap", mcap=True)
+    for name in ("two_link.toml", "plant.toml", "campaign"):
+        source = own / "files" / name
+        shutil.copytree(source, own / name) if source.is_dir() else shutil.copy(source, own / name)
+    shutil.copytree(ROOT / "generated" / "two_link", own / "files" / "package")
+    shutil.copy(ROOT / "examples" / "robots" / "denso_wall.toml", own / "denso_wall.toml")
+    for format, seeds in _seeds(own).items():
+        target = own / "seeds" / format
+        target.mkdir(parents=True)
+        for number, data in enumerate(seeds):
+            (target / f"{number:02d}").write_bytes(data)
+    try:
+        own.rename(folder)
+    except OSError:
+        shutil.rmtree(own)
+    return folder
+
+
+def read_seeds(folder: Path, format: str) -> list[bytes]:
+    return [path.read_bytes() for path in sorted((folder / "seeds" / format).iterdir())]
+
+
+def _seeds(own: Path) -> dict[str, list[bytes]]:
+    robots = sorted((ROOT / "examples" / "robots").iterdir())
+    tables = [path.read_bytes() for path in robots if path.suffix == ".toml"]
+    dh = [text(name).encode() for name in ("sliding.toml", "two_link.toml", "unknown.toml")]
+    plants = sorted((ROOT / "examples" / "plants").iterdir())
+    sizes = (SHORT, FIT_TO_READ, FIT_TO_USE)
+    return {
+        "urdf": [text("arm.urdf").encode(), text("pendulum.urdf").encode(), *_urdfs(robots)],
+        "dh": [*dh, *tables],
+        "model": [*_models(robots), (own / "files" / "arm.npz").read_bytes()],
+        **{
+            f"log-{kind}": [_log(own, f".{kind}", *size) for size in sizes]
+            for kind in ("csv", "npz", "parquet")
+        },
+        "log-db3": [path.read_bytes() for path in (own / "bag").glob("*.db3")],
+        "log-mcap": [path.read_bytes() for path in (own / "mcap").glob("*.mcap")],
+        "bag": [(own / "bag" / "metadata.yaml").read_bytes()],
+        "trajectory": [_trajectory(own)],
+        "campaign": [text("campaign.toml").encode()],
+        "simulated": [json.dumps({"short.csv": "0" * 64, "short.npz": "1" * 64}).encode(), b"{}"],
+        "plant": [
+            text("plant.toml").encode(),
+            *(path.read_bytes().replace(b"../robots/", b"") for path in plants),
+        ],
+        "plant-robot": dh[:2],
+        "package": [
+            manifest_seed().encode(),
+            (ROOT / "generated" / "two_link" / "manifest.json").read_bytes(),
+        ],
+        "argv": [json.dumps(shlex.split(line)).encode() for line in text("commands.txt").splitlines()],
+    }
+
+
+def _urdfs(bundled: list[Path]) -> list[bytes]:
+    """Bundled ones, and those of the example-robot-data wheel where it is installed."""
+    wheel = Path(sysconfig.get_path("purelib"), "cmeel.prefix", "share", "example-robot-data", "robots")
+    foreign = [path for path in sorted(wheel.rglob("*.urdf")) if path.stat().st_size <= LARGEST_URDF]
+    return [path.read_bytes() for path in [*bundled, *foreign] if path.suffix == ".urdf"]
+
+
+def _models(robots: list[Path]) -> list[bytes]:
+    """Small ones: expanded and not, known and unknown parameters, with their sources."""
+    named = {path.stem: path for path in robots}
+    small = [derive(named["two_link"])]
+    small += [derive(named[name], expand=False) for name in ("scara_zeros", "rounded_arm")]
+    return [file_bytes(model) for model in small]
+
+
+def _log(own: Path, suffix: str, seconds: float, rate: float) -> bytes:
+    run = log(seconds, rate)
+    if suffix == ".npz":
+        stream = io.BytesIO()
+        np.savez_compressed(stream, **columns_of(run))  # type: ignore[arg-type]
+        return stream.getvalue()
+    write_log(run, own / f"log{suffix}")
+    return (own / f"log{suffix}").read_bytes()
+
+
+def _trajectory(own: Path) -> bytes:
+    write_trajectory(trajectory(), own / "motion.csv")
+    return (own / "motion.csv").read_bytes()

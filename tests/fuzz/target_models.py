@@ -1,0 +1,31 @@
+"""Model files: read, shown and evaluated; now and then checked and emitted."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from pathlib import Path
+
+import numpy as np
+
+from psdmc import compiler
+from psdmc.cli.show import print_model
+from psdmc.emit.package import package_files
+from psdmc.model.check import check_model
+from psdmc.model.store import file_bytes, load
+
+
+def model(data: bytes, folder: Path, deep: bool) -> None:
+    file = folder / "model.npz"
+    file.write_bytes(data)
+    found = load(file)
+    with contextlib.redirect_stdout(io.StringIO()):
+        print_model(found)
+    if found.theta_b is not None:
+        found.inverse_dynamics(*np.full((3, 1, found.n), 0.3))
+    if deep:
+        file_bytes(found)
+        check_model(found)
+        package_files(
+            compiler._package(found, "auto", ["gravity"], compiler.EmitOptions(), None, compiler.silent)
+        )

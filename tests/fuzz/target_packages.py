@@ -1,0 +1,59 @@
+"""Emitted packages: a manifest that is given, files of psdmc's and of others around it, and an emission over them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+from fixtures import digest
+from mutate_package import OUTSIDE
+from outcome import BrokenRule
+
+from psdmc.emit.write import write_package
+
+EARLIER = {"a.h": "/* old a.h */\n", "src/b.c": "/* old b.c */\n", "stale.c": "/* stale */\n"}
+NEW = {
+    "a.h": "/* new a.h */\n",
+    "src/b.c": "/* new b.c */\n",
+    "manifest.json": '{"generator": "psdmc"}\n',
+}
+VICTIM, FOREIGN = "/* outside, with a digest that a manifest lists */\n", "/* written by somebody else */\n"
+OTHERS = {"outside/victim.c": VICTIM, "package/foreign.txt": FOREIGN}
+"""No manifest may have these changed: the one is not in the folder, the other has a digest that none lists."""
+
+
+def manifest_seed() -> str:
+    """The manifest of an earlier emission; one digest is the victim's, for forgeries to use."""
+    files = {path: digest(text) for path, text in EARLIER.items()} | {"gone.c": digest(VICTIM)}
+    return json.dumps({"schema": 1, "generator": "psdmc", "name": "arm", "files": files}, indent=2) + "\n"
+
+
+def package(data: bytes, folder: Path, deep: bool) -> None:
+    """What others wrote, inside the folder and outside it, is there afterwards."""
+    root = folder / "package"
+    _write(folder, data.replace(OUTSIDE.encode(), str(folder / "outside").encode()))
+    try:
+        write_package(root, NEW)
+    finally:
+        for name, text in OTHERS.items():
+            file = folder / name
+            if not file.is_file() or file.read_text(encoding="utf-8") != text:
+                said = f"{name} is no longer what it was"
+                raise BrokenRule("TouchedOthers", f"psdmc/emit/write.py:{name}", said)
+
+
+def _write(folder: Path, manifest: bytes) -> None:
+    for name in ("package", "outside"):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    root = folder / "package"
+    (root / "src").mkdir(parents=True)
+    (folder / "outside").mkdir()
+    for path, text in EARLIER.items():
+        (root / path).write_text(text, encoding="utf-8")
+    for name, text in OTHERS.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    (root / "link").symlink_to("../outside")
+    (root / "linked.c").symlink_to("../outside/victim.c")
+    (root / "dangling").symlink_to("nowhere")
+    (root / "manifest.json").write_bytes(manifest)

@@ -1,0 +1,63 @@
+"""Robot files: read; now and then derived, checked, and held against Pinocchio's own reading."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from oracle import torque_error
+from outcome import BrokenRule
+
+from psdmc.compiler import provenance
+from psdmc.derive.derive import derive_model
+from psdmc.errors import DerivationError
+from psdmc.model.check import check_model
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.load import LoadedRobot, SourceFormat, load_robot, load_robot_text
+
+MOST_EXPANDED = 4
+"""joints; beyond, E and P are left out: they take seconds"""
+
+TORQUE_LIMIT = 1e-8
+"""Share of the largest torque, between psdmc without snapping and Pinocchio."""
+
+
+def urdf(data: bytes, folder: Path, deep: bool) -> None:
+    _robot(data, folder / "robot.urdf", "urdf", deep)
+
+
+def dh(data: bytes, folder: Path, deep: bool) -> None:
+    _robot(data, folder / "robot.toml", "dh", deep)
+
+
+def _robot(data: bytes, file: Path, source_format: SourceFormat, deep: bool) -> None:
+    file.write_bytes(data)
+    loaded = load_robot(file)
+    if deep:
+        _derived(loaded, source_format)
+
+
+def _derived(loaded: LoadedRobot, source_format: SourceFormat) -> None:
+    """The model passes its own check; without snapping its torques are Pinocchio's."""
+    model = _model(loaded)
+    failed = [f"{row.name}: {row.error:.2g}" for row in check_model(model) if not row.passed]
+    if failed:
+        raise BrokenRule("CheckFails", "psdmc/model/check.py", "; ".join(failed))
+    if loaded.snap_report:
+        loaded = load_robot_text(loaded.source_text, source_format, snap=0.0)
+        model = _model(loaded)
+    error = torque_error(loaded.source_text, source_format, model)
+    if error is not None and not error < TORQUE_LIMIT:
+        raise BrokenRule(
+            "WrongTorque", "psdmc/derive/derive.py", f"off Pinocchio by {error:.2g} of the largest"
+        )
+
+
+def _model(loaded: LoadedRobot) -> DynamicsModel:
+    """Expanded where it is small; a refusal to expand is followed by --no-expand, as its hint says."""
+    kept = provenance(loaded)
+    if len(loaded.chain) <= MOST_EXPANDED:
+        try:
+            return derive_model(loaded.chain, provenance=kept)
+        except DerivationError:
+            pass
+    return derive_model(loaded.chain, expand=False, provenance=kept)
