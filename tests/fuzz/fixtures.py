@@ -73,7 +73,7 @@ def write_files(folder: Path) -> None:
     write_trajectory(trajectory(), folder / "campaign" / "trajectories" / "short.csv")
 
 
-def write_bag(folder: Path, *, mcap: bool) -> None:
+def write_bag(folder: Path, size: tuple[float, float], *, mcap: bool) -> None:
     """A ROS 2 bag of joint states."""
     import rosbags.rosbag2 as bags
     from rosbags.typesys import Stores, get_typestore
@@ -84,7 +84,7 @@ def write_bag(folder: Path, *, mcap: bool) -> None:
     plugin = bags.StoragePlugin.MCAP if mcap else bags.StoragePlugin.SQLITE3
     with bags.Writer(folder, version=9, storage_plugin=plugin) as writer:
         connection = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
-        run = log(*FIT_TO_READ)
+        run = log(*size)
         assert run.velocity is not None
         for time, *row in zip(run.time, run.position, run.velocity, run.effort, strict=True):
             at = int(time * 1e9)

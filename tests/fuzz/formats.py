@@ -73,7 +73,7 @@ FORMATS = {
         Format("simulated", ".json", target_campaigns.simulated, mutate_package, _TEXT, 0.005, 1, target_campaigns.set_up),
         Format("plant", ".toml", target_campaigns.plant, mutate_toml, _TEXT, 0.05, 20, target_campaigns.set_up),
         Format("plant-robot", ".toml", target_campaigns.plant_robot, mutate_toml, _TEXT, 0.03, 20, target_campaigns.set_up),
-        Format("package", ".json", target_packages.package, mutate_package, _TEXT, 0.04, 1),
+        Format("package", ".json", target_packages.package, mutate_package, _TEXT, 0.04, 3),
         Format("argv", ".json", target_commands.command, mutate_argv, _TEXT, 0.02, 1),
     )
 }  # fmt: skip

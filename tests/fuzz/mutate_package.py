@@ -12,15 +12,28 @@ OUTSIDE = "@OUTSIDE@"
 """Stands for the absolute path of a folder beside the package (target_packages.py)."""
 
 FORGED = (
+    *("../outside/arm/victim.h", "include/arm/victim.h", f"{OUTSIDE}/arm/victim.h", "src/linked.c"),
     *(
-        "../outside/victim.c",
-        "link/victim.c",
-        f"{OUTSIDE}/victim.c",
-        "src/../../outside/victim.c",
-        "linked.c",
+        "src/../../outside/arm/victim.h",
+        "src/foreign.c",
+        "include",
+        "include/..",
+        "test/a.c",
+        "src",
+        ".",
+        "",
+        "/",
     ),
-    *("dangling", "link", "link/..", ".", "", "/", "src", "./a.h", "src//b.c", "SRC/b.c", "manifest.json"),
-    *("foreign.txt", "a\u0000b", "a" * 5000),
+    *(
+        "./Makefile",
+        "src//b.c",
+        "SRC/b.c",
+        "manifest.json",
+        "README.md",
+        "src/a\u0000b.c",
+        "src/é.c",
+        "a" * 5000,
+    ),
 )
 
 

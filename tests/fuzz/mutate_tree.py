@@ -10,6 +10,8 @@ from nasty import anything, near, text
 
 Path = tuple[Any, ...]
 
+DEEPEST = 40
+
 
 def mutate_tree(value: Any, rng: Random, edits: int = 0) -> Any:
     """A deep copy with some nodes replaced, dropped, repeated, renamed or moved."""
@@ -20,11 +22,13 @@ def mutate_tree(value: Any, rng: Random, edits: int = 0) -> Any:
 
 
 def paths(value: Any) -> list[Path]:
-    """Keys and indices that lead to every node below the root."""
+    """Keys and indices that lead to every node below the root, down to DEEPEST levels."""
     found: list[Path] = []
     open_nodes: list[tuple[Path, Any]] = [((), value)]
     while open_nodes:
         here, node = open_nodes.pop()
+        if len(here) == DEEPEST:
+            continue
         items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
         below = [((*here, key), inner) for key, inner in items]
         found += [path for path, _ in below]

@@ -27,7 +27,10 @@ def torque_error(text: str, source_format: str, model: DynamicsModel) -> float |
     """
     if model.theta_b is None:
         return None
-    reference = _urdf_model(text) if source_format == "urdf" else _dh_model(text)
+    try:
+        reference = _urdf_model(text) if source_format == "urdf" else _dh_model(text)
+    except (ValueError, RuntimeError):  # how Pinocchio refuses a file, and a body that cannot be
+        return None
     if reference is None or not set(model.joint_names) <= set(reference.names):
         return None
     rng = np.random.default_rng(SEED)
@@ -63,10 +66,7 @@ def _urdf_model(text: str) -> Any:
     for link in root.findall("link"):
         for picture in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(picture)
-    try:
-        return pin.buildModelFromXML(tostring(root, encoding="unicode"))
-    except ValueError:
-        return None
+    return pin.buildModelFromXML(tostring(root, encoding="unicode"))
 
 
 def _dh_model(text: str) -> Any:

@@ -14,7 +14,6 @@ from formats import Format
 from isolated import died
 from limits import STUCK_SECONDS
 from recorder import Recorder
-from seeds import ROOT
 
 BATCH = 30_000
 """Inputs per process: what libraries leak is returned."""
@@ -86,7 +85,7 @@ def _one_worker(format: Format, budget: Budget, course: Course, seed: int, recor
 def _environment(state: Path) -> dict[str, str]:
     """One thread, and caches of its own."""
     own = {"PSDMC_CACHE_DIR": str(state / "cache"), "MPLCONFIGDIR": str(state / "matplotlib")}
-    return os.environ | own | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    return os.environ | own | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
 def _status(process: subprocess.Popen[bytes]) -> int | None:

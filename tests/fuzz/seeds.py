@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
 import os
 import shlex
 import shutil
+import sqlite3
 import sysconfig
 from pathlib import Path
 
@@ -41,8 +43,10 @@ def write_seeds(below: Path) -> Path:
     shutil.rmtree(own, ignore_errors=True)
     own.mkdir(parents=True)
     write_files(own / "files")
-    write_bag(own / "bag", mcap=False)
-    write_bag(own / "mcap", mcap=True)
+    write_bag(own / "bag", FIT_TO_READ, mcap=False)
+    for size in (SHORT, FIT_TO_READ):
+        write_bag(own / "bags" / str(size[0]), size, mcap=False)
+        write_bag(own / "mcap" / str(size[0]), size, mcap=True)
     for name in ("two_link.toml", "plant.toml", "campaign"):
         source = own / "files" / name
         shutil.copytree(source, own / name) if source.is_dir() else shutil.copy(source, own / name)
@@ -78,8 +82,8 @@ def _seeds(own: Path) -> dict[str, list[bytes]]:
             f"log-{kind}": [_log(own, f".{kind}", *size) for size in sizes]
             for kind in ("csv", "npz", "parquet")
         },
-        "log-db3": [path.read_bytes() for path in (own / "bag").glob("*.db3")],
-        "log-mcap": [path.read_bytes() for path in (own / "mcap").glob("*.mcap")],
+        "log-db3": [_repacked(path) for path in sorted((own / "bags").rglob("*.db3"))],
+        "log-mcap": [path.read_bytes() for path in sorted((own / "mcap").rglob("*.mcap"))],
         "bag": [(own / "bag" / "metadata.yaml").read_bytes()],
         "trajectory": [_trajectory(own)],
         "campaign": [text("campaign.toml").encode()],
@@ -120,6 +124,14 @@ def _log(own: Path, suffix: str, seconds: float, rate: float) -> bytes:
         return stream.getvalue()
     write_log(run, own / f"log{suffix}")
     return (own / f"log{suffix}").read_bytes()
+
+
+def _repacked(database: Path) -> bytes:
+    """The bag in small pages: 7 KB instead of 40."""
+    with contextlib.closing(sqlite3.connect(database)) as connection:
+        connection.execute("PRAGMA page_size = 512")
+        connection.execute("VACUUM")
+    return database.read_bytes()
 
 
 def _trajectory(own: Path) -> bytes:

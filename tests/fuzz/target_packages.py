@@ -10,30 +10,32 @@ from fixtures import digest
 from mutate_package import OUTSIDE
 from outcome import BrokenRule
 
+from psdmc.emit.own_files import JOURNAL, MANIFEST, edited_files
 from psdmc.emit.write import write_package
 
-EARLIER = {"a.h": "/* old a.h */\n", "src/b.c": "/* old b.c */\n", "stale.c": "/* stale */\n"}
-NEW = {
-    "a.h": "/* new a.h */\n",
-    "src/b.c": "/* new b.c */\n",
-    "manifest.json": '{"generator": "psdmc"}\n',
-}
+EARLIER = {"Makefile": "old:\n", "src/b.c": "/* old b.c */\n", "src/stale.c": "/* stale */\n"}
+NEW = {"Makefile": "new:\n", "src/b.c": "/* new b.c */\n", MANIFEST: '{"generator": "psdmc"}\n'}
 VICTIM, FOREIGN = "/* outside, with a digest that a manifest lists */\n", "/* written by somebody else */\n"
-OTHERS = {"outside/victim.c": VICTIM, "package/foreign.txt": FOREIGN}
+OTHERS = {"outside/arm/victim.h": VICTIM, "package/src/foreign.c": FOREIGN}
 """No manifest may have these changed: the one is not in the folder, the other has a digest that none lists."""
 
 
 def manifest_seed() -> str:
     """The manifest of an earlier emission; one digest is the victim's, for forgeries to use."""
-    files = {path: digest(text) for path, text in EARLIER.items()} | {"gone.c": digest(VICTIM)}
+    files = {path: digest(text) for path, text in EARLIER.items()} | {"src/gone.c": digest(VICTIM)}
     return json.dumps({"schema": 1, "generator": "psdmc", "name": "arm", "files": files}, indent=2) + "\n"
 
 
 def package(data: bytes, folder: Path, deep: bool) -> None:
-    """What others wrote, inside the folder and outside it, is there afterwards."""
+    """What others wrote, inside the folder and outside it, is there afterwards. Deep: as a killed emission's journal."""
     root = folder / "package"
-    _write(folder, data.replace(OUTSIDE.encode(), str(folder / "outside").encode()))
+    given = data.replace(OUTSIDE.encode(), str(folder / "outside").encode())
+    _write(folder)
+    (root / MANIFEST).write_bytes(manifest_seed().encode() if deep else given)
+    if deep:
+        (root / JOURNAL).write_bytes(given)
     try:
+        edited_files(root)
         write_package(root, NEW)
     finally:
         for name, text in OTHERS.items():
@@ -43,17 +45,16 @@ def package(data: bytes, folder: Path, deep: bool) -> None:
                 raise BrokenRule("TouchedOthers", f"psdmc/emit/write.py:{name}", said)
 
 
-def _write(folder: Path, manifest: bytes) -> None:
+def _write(folder: Path) -> None:
     for name in ("package", "outside"):
         shutil.rmtree(folder / name, ignore_errors=True)
     root = folder / "package"
     (root / "src").mkdir(parents=True)
-    (folder / "outside").mkdir()
+    (folder / "outside" / "arm").mkdir(parents=True)
     for path, text in EARLIER.items():
         (root / path).write_text(text, encoding="utf-8")
     for name, text in OTHERS.items():
         (folder / name).write_text(text, encoding="utf-8")
-    (root / "link").symlink_to("../outside")
-    (root / "linked.c").symlink_to("../outside/victim.c")
-    (root / "dangling").symlink_to("nowhere")
-    (root / "manifest.json").write_bytes(manifest)
+    (root / "include").symlink_to("../outside")
+    (root / "src" / "linked.c").symlink_to("../../outside/arm/victim.h")
+    (root / "test").symlink_to("nowhere")

@@ -21,10 +21,14 @@ KNOWN = json.loads(OWED.read_text(encoding="utf-8"))
 """Strict xfails: who mends one removes its line."""
 
 
+FATAL = ("SIG", "Exit", "Hang", "TooSlow")
+"""Ways to end that a test run does not wait for."""
+
+
 def entries() -> Iterator[object]:
     for path in sorted(CORPUS.glob("*/*")):
         name = str(path.relative_to(CORPUS))
-        fatal = KNOWN.get(name, "").startswith("SIG")
+        fatal = KNOWN.get(name, "").startswith(FATAL)
         marks = [pytest.mark.xfail(strict=True, run=not fatal, reason=KNOWN[name])] if name in KNOWN else []
         yield pytest.param(path, id=name, marks=marks)
 

@@ -21,6 +21,9 @@ WANDERING = 0.15
 MOST_KEPT = 400
 """Inputs that are kept for mutation because psdmc said something new about them."""
 
+LARGEST_KEPT = 1 << 16
+"""bytes; of libFuzzer's inputs too"""
+
 KEPT_SHARE = 0.3
 """Share of mutations that start from these: most of them are refused, and what is mutated further too."""
 
@@ -101,7 +104,7 @@ def _mutated(given: argparse.Namespace, one: Callable, mutate: Callable, seeds: 
         data = seeds[number] if number < len(seeds) else mutated(pool.draw(rng), rng, mutate)
         outcome = one(data)
         gist = None if outcome is None else outcome.kind + outcome.where + gist_of(outcome.said)
-        if gist not in heard and number >= len(seeds) and len(kept.data) < MOST_KEPT:
+        if gist not in heard and len(data) <= LARGEST_KEPT and len(kept.data) < MOST_KEPT:
             kept.add(data)
         heard.add(gist)
 
@@ -124,12 +127,12 @@ class Pool:
 
 
 def mutated(data: bytes, rng: Random, mutate: Callable) -> bytes:
-    """By the format's structure; by its bytes where that is nested too deeply for Python."""
+    """By the format's structure; by its bytes where that takes Python too deep or too far."""
     from mutate_bytes import mutate_bytes
 
     try:
         return mutate(data, rng)
-    except RecursionError:
+    except (RecursionError, MemoryError):
         return mutate_bytes(data, rng)
 
 
@@ -141,7 +144,6 @@ def gist_of(message: str) -> str:
 def _guided(given: argparse.Namespace, one: Callable, mutate: Callable, seeds: list[bytes]) -> None:
     """libFuzzer keeps what reaches new code; finds are recorded and do not stop it."""
     import atheris
-    from limits import LARGEST_INPUT
 
     corpus = given.state / "corpus"
     corpus.mkdir(exist_ok=True)
@@ -168,7 +170,7 @@ def _guided(given: argparse.Namespace, one: Callable, mutate: Callable, seeds: l
         f"-artifact_prefix={given.state}/",
     ]
     shape = [
-        f"-max_len={min(LARGEST_INPUT, 1 << 16)}",
+        f"-max_len={LARGEST_KEPT}",
         "-len_control=0",
         f"-seed={given.seed or 1}",
         "-print_final_stats=0",
