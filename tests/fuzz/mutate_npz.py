@@ -46,7 +46,7 @@ def mutate_npz(data: bytes, rng: Random) -> bytes:
     for _ in range(rng.choice((1, 1, 1, 2))):
         if "manifest.npy" in members and rng.random() < 0.6:
             _manifest(members, rng)
-        else:
+        elif members:
             _array(members, rng)
     if rehash:
         set_hash(members)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from limits import LARGEST_INPUT
 from outcome import SUCCESS, Outcome
 
 KINDS = (SUCCESS, "InputError", "DerivationError", "ToolchainError", "find")
-_INPUTS, _DEEP, _STARTED, _LENGTH = range(4)
+_INPUTS, _DEEP, _RUNNING, _LENGTH = range(4)
 _FIRST_KIND = 4
 
 
@@ -45,13 +44,13 @@ class Recorder:
         """This input is being run from now on."""
         self._current[: len(data)] = np.frombuffer(data, np.uint8)
         self._counts[_LENGTH] = len(data)
-        self._counts[_STARTED] = int(time.monotonic() * 1000)
+        self._counts[_RUNNING] = 1
         self._counts[_INPUTS] += 1
         self._counts[_DEEP] += deep
 
     def end(self, data: bytes, outcome: Outcome) -> None:
         self._counts[_FIRST_KIND + KINDS.index("find" if outcome.is_find else outcome.kind)] += 1
-        self._counts[_STARTED] = 0
+        self._counts[_RUNNING] = 0
         if outcome.is_find:
             self.keep(data, outcome)
 
@@ -78,10 +77,9 @@ class Recorder:
         return self._current[: self._counts[_LENGTH]].tobytes()
 
     @property
-    def seconds_at_current(self) -> float:
-        """Wall clock since the current input began; 0 between inputs."""
-        started = int(self._counts[_STARTED])
-        return time.monotonic() - started / 1000 if started else 0.0
+    def is_running(self) -> bool:
+        """Whether the worker is, or was when it died, inside an input."""
+        return bool(self._counts[_RUNNING])
 
     def figures(self) -> dict[str, int]:
         """Inputs, how many ran deep, and how many ended in which way."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -75,21 +76,29 @@ def _one_worker(format: Format, budget: Budget, course: Course, seed: int, recor
         process = subprocess.Popen(
             words, stdout=log, stderr=log, stdin=subprocess.DEVNULL, env=_environment(course.state)
         )
-        while (status := _status(process)) is None:
-            if recorder.seconds_at_current > STUCK_SECONDS:
-                process.kill()
-    if status != 0:
+        status = _watched(process, recorder)
+    if status != 0 and recorder.is_running:
         recorder.lost(died(-status, (folder / "fault").read_text(encoding="utf-8", errors="replace")))
+    elif status not in (0, -signal.SIGKILL):
+        raise SystemExit(
+            f"{format.name}: the worker ended with {status} outside of inputs: see {folder / 'log'}"
+        )
+
+
+def _watched(process: subprocess.Popen[bytes], recorder: Recorder) -> int:
+    """The status of the process, which is ended where its inputs do not go on."""
+    inputs, since = recorder.inputs, time.monotonic()
+    while True:
+        try:
+            return process.wait(LOOK)
+        except subprocess.TimeoutExpired:
+            if recorder.inputs != inputs:
+                inputs, since = recorder.inputs, time.monotonic()
+            elif time.monotonic() - since > STUCK_SECONDS:
+                process.kill()
 
 
 def _environment(state: Path) -> dict[str, str]:
     """One thread, and caches of its own."""
     own = {"PSDMC_CACHE_DIR": str(state / "cache"), "MPLCONFIGDIR": str(state / "matplotlib")}
     return os.environ | own | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-
-
-def _status(process: subprocess.Popen[bytes]) -> int | None:
-    try:
-        return process.wait(LOOK)
-    except subprocess.TimeoutExpired:
-        return None

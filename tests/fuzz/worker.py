@@ -127,12 +127,12 @@ class Pool:
 
 
 def mutated(data: bytes, rng: Random, mutate: Callable) -> bytes:
-    """By the format's structure; by its bytes where that takes Python too deep or too far."""
+    """By the format's structure; by its bytes where that fails, as it may on what was mutated before."""
     from mutate_bytes import mutate_bytes
 
     try:
         return mutate(data, rng)
-    except (RecursionError, MemoryError):
+    except Exception:
         return mutate_bytes(data, rng)
 
 
