@@ -9,32 +9,45 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable
+from importlib import resources
 
 LONGEST = 63
 """Characters of an identifier: what C99 lets a compiler limit internal names to."""
 
-_C = """auto break case char const continue default do double else enum extern float for goto if inline
-int long register restrict return short signed sizeof static struct switch typedef union unsigned void
-volatile while"""
-_CPP = """alignas alignof and and_eq asm bitand bitor bool catch char8_t char16_t char32_t class co_await
-co_return co_yield compl concept consteval constexpr constinit const_cast decltype delete dynamic_cast
-explicit export false friend mutable namespace new noexcept not not_eq nullptr operator or or_eq private
-protected public reinterpret_cast requires static_assert static_cast template this thread_local throw true
-try typeid typename using virtual wchar_t xor xor_eq"""
-_OTHER = "main linux unix errno NULL NAN INFINITY std posix"
-RESERVED = frozenset(f"{_C} {_CPP} {_OTHER}".split())
+LISTS = ("languages", "c_and_posix", "cmake", "libraries", "windows")
+"""Files of reserved/: keywords of C and C++ and what compilers predefine for their platforms; everything that the C and
+POSIX headers declare or define (tests/emit/platform_names.py makes and checks it); CMake's targets, variables and find
+modules; libraries that linkers look for by themselves; Windows' devices and windows.h's macros.
+
+A robot's name stands alone as a C++ namespace, a CMake target and package, a folder and lib<name>: there it must not meet
+another's. Everywhere else it is a prefix."""
+
+
+def _listed() -> frozenset[str]:
+    texts = (resources.files("psdmc.emit").joinpath(f"reserved/{name}.txt") for name in LISTS)
+    return frozenset(word for text in texts for word in text.read_text(encoding="ascii").split())
+
+
+RESERVED = _listed()
+DEVICE = re.compile(r"con|prn|aux|nul|conin|conout|com\d|lpt\d", re.IGNORECASE)
+"""Windows takes these for devices in any case of letters."""
+
+
+def is_reserved(word: str) -> bool:
+    """Whether a robot of this very name would meet somebody else's."""
+    return word in RESERVED or DEVICE.fullmatch(word) is not None
 
 
 def identifier(name: str) -> str:
-    """A C and C++ identifier for `name`: ASCII letters, digits and single underscores, never a keyword.
+    """A C and C++ identifier for `name`: ASCII letters, digits and single underscores, never a word of RESERVED.
 
-    Names that are identifiers already stay as they are; one that loses all its characters, or is too long,
-    ends with a digest of the original, so that different names stay apart.
+    Names that are free identifiers already stay as they are; a reserved one gets robot_ before it; one that loses all
+    its characters, or is too long, ends with a digest of the original, so that different names stay apart.
     """
     cleaned = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
     if not cleaned:
         return f"robot_{_digest(name)}"
-    if cleaned[0].isdigit() or cleaned in RESERVED:
+    if cleaned[0].isdigit() or is_reserved(cleaned):
         cleaned = f"robot_{cleaned}"
     if len(cleaned) > LONGEST:
         digest = _digest(name)
