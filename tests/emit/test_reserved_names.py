@@ -24,7 +24,7 @@ fmax fma pow exp log log2 sqrt cbrt hypot erf tgamma drem scalb significand ecvt
 optarg optind getopt daemon nice pause sleep usleep wait kill alarm clock ctime double_t float_t FILE stdin stdout
 stderr puts printf memcpy strlen strdup malloc free assert errno isnan isinf INFINITY NAN HUGE_VAL PATH_MAX BUFSIZ
 SIGINT int8_t size_t wchar_t bool true false complex imaginary linux unix i386 std abi posix main class namespace
-operator option entry FTW timeval sockaddr bind listen accept send socket htons truncate sync times ulimit y2""".split()
+operator option entry FTW timeval sockaddr bind listen accept send socket htons truncate sync times ulimit y2"""
 
 
 def _installed(*programs: str) -> bool:
@@ -81,7 +81,7 @@ def test_headers_compile_beside_all_system_headers(
 ) -> None:
     if not _installed(compiler):
         pytest.skip(f"{compiler} is not installed")
-    names = [*ISSUED, *sorted(RESERVED)[::40]]
+    names = [*ISSUED.split(), *sorted(RESERVED)[::40]]
     robots = _headers(dict.fromkeys(names), tmp_path)
     language = "c" if kind == "h" else "c++"
     own = "".join(f'#include "{robot}.{kind}"\n' for robot in robots)
@@ -96,14 +96,14 @@ def test_headers_compile_beside_all_system_headers(
 
 
 BELONGING_TO_THE_BUILD = """all clean help install test package edit_cache rebuild_cache preinstall ALL_BUILD INSTALL
-ZERO_CHECK Nightly Experimental NightlyTest m c rt pthread gcc CMAKE PROJECT Threads OpenMP con""".split()
+ZERO_CHECK Nightly Experimental NightlyTest m c rt pthread gcc CMAKE PROJECT Threads OpenMP con"""
 
 
 def test_cmake_configures_packages_of_its_own_names(tmp_path: Path) -> None:
     if not _installed("cmake", "gcc"):
         pytest.skip("needs cmake and gcc")
     robots = []
-    for name in BELONGING_TO_THE_BUILD:
+    for name in BELONGING_TO_THE_BUILD.split():
         package = pendulum(pendulum_info(name))
         robots.append(package.robot)
         for path, text in package_files(package).items():
