@@ -7,19 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from psdmc.derive.derive import derive_model
 from psdmc.derive.snap_effect import snap_effect
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions, Real, Trig
 from psdmc.emit.package import PackageView, package_files, package_view
-from psdmc.emit.references import References
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError
 from psdmc.lower.kernels import ALL_FUNCTIONS, Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.reference_states import reference_states
 from psdmc.program.functions import BY_NAME
 from psdmc.robot.load import LoadedRobot, load_robot
 from psdmc.robot.load_options import DEFAULT_SNAP
@@ -28,9 +26,6 @@ from psdmc.toolchain.compile import compile_library
 from psdmc.toolchain.kept_kernels import lowered_once
 
 Progress = Callable[[str], None]
-
-REFERENCE_STATES = 16
-"""States that an emitted package's self-test checks."""
 
 
 def silent(step: str) -> None:
@@ -142,7 +137,7 @@ def _package(
         (model.content_hash, lowering, *wanted), lambda: lower(model, lowering, functions, progress)
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
-    return package_view(package_info(model, name, shown), kernels, options, references(model))
+    return package_view(package_info(model, name, shown), kernels, options, reference_states(model))
 
 
 FORWARD = "forward_dynamics"
@@ -187,12 +182,3 @@ def left_out(model: DynamicsModel, functions: Sequence[str] | None = None) -> tu
 def _choose(option: str, value: str, allowed: Sequence[str]) -> None:
     if value not in allowed:
         raise InputError(f"{option} is {value!r}", f"choose one of {', '.join(allowed)}")
-
-
-def references(model: DynamicsModel) -> References | None:
-    """States and torques, from the MODEL, that a package's self-test checks; None while theta_b is unknown."""
-    if model.theta_b is None:
-        return None
-    rng = np.random.default_rng(2021)
-    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (REFERENCE_STATES, model.n)) for limit in (np.pi, 3.0, 5.0))
-    return References(q, qd, qdd, model.inverse_dynamics(q, qd, qdd))

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from psdmc.emit.cpp import CppClass, cpp_classes
 from psdmc.emit.describe import description
 from psdmc.emit.info import PackageInfo
-from psdmc.emit.kernel_view import FunctionView, function_views
+from psdmc.emit.kernel_view import FunctionView, KernelView, function_views
 from psdmc.emit.lanes import VectorWidth, vector_widths
 from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
-from psdmc.emit.references import References, ReferenceView, reference_view
+from psdmc.emit.references import ReferenceView, reference_view
 from psdmc.emit.render import render
-from psdmc.emit.self_test import SelfCheck, self_checks
+from psdmc.emit.self_test import SelfCheck, given_vectors, self_checks
 from psdmc.emit.tables import Table, tables
 from psdmc.emit.trig import (
     HAS_VECTORS,
@@ -28,6 +28,7 @@ from psdmc.emit.trig import (
     vector_trig,
 )
 from psdmc.errors import InputError
+from psdmc.model.reference_states import ReferenceStates
 from psdmc.program.kernel import Kernel
 
 
@@ -119,18 +120,35 @@ class PackageView:
 
     @property
     def kernel_names(self) -> tuple[str, ...]:
-        return tuple(kernel.name for function in self.functions for kernel in function.kernels)
+        return tuple(kernel.name for kernel in self.kernels)
 
     @property
     def has_forward(self) -> bool:
         return any(function.has_pivots for function in self.functions)
 
     @property
+    def kernels(self) -> tuple[KernelView, ...]:
+        return tuple(kernel for function in self.functions for kernel in function.kernels)
+
+    @property
     def self_checks(self) -> tuple[SelfCheck, ...]:
-        """The self-test's calls; kernels that need theta_b are left out while it is unknown."""
-        is_known = all(parameter.value is not None for parameter in self.info.parameters)
-        kernels = (kernel for function in self.functions for kernel in function.kernels)
-        return self_checks((k for k in kernels if is_known or not k.theta), self.robot, self.options)
+        """The self-test's calls: every kernel, those without a reference value marked as such."""
+        known = () if self.references is None else self.references.expected
+        return self_checks(self.kernels, self.n, self.options, known)
+
+    @property
+    def checked_kernels(self) -> int:
+        """How many of them are compared."""
+        return sum(bool(check.expected) for check in self.self_checks)
+
+    @property
+    def given_vectors(self) -> tuple[str, ...]:
+        """Inputs of all kernels, by the reference states' names."""
+        return given_vectors(self.kernels)
+
+    @property
+    def largest_output(self) -> int:
+        return max(kernel.output.size for kernel in self.kernels)
 
     @property
     def cdef(self) -> str:
@@ -149,7 +167,7 @@ def package_view(
     info: PackageInfo,
     kernels: Mapping[str, Kernel],
     options: EmitOptions,
-    references: References | None = None,
+    references: ReferenceStates | None = None,
 ) -> PackageView:
     """Everything decided; InputError where there is nothing to emit."""
     if not kernels:
@@ -158,8 +176,11 @@ def package_view(
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
     robot = identifier(info.name)
     functions = function_views(kernels, info.n, info.l, robot, options)
-    shown = reference_view(references, info.n, options.c_real) if references is not None else None
-    return PackageView(robot, info, options, functions, shown)
+    package = PackageView(robot, info, options, functions, None)
+    if references is None:
+        return package
+    vectors, names = package.given_vectors, package.kernel_names
+    return replace(package, references=reference_view(references, info.n, options.c_real, vectors, names))
 
 
 def package_files(package: PackageView) -> dict[str, str]:
@@ -168,7 +189,8 @@ def package_files(package: PackageView) -> dict[str, str]:
     files |= {path: render(template, package=package) for path, template in _build_files(package)}
     if package.references is not None:
         files["test/self_test.c"] = render("self_test.c.jinja", package=package)
-        files["test/reference.h"] = render("reference.h.jinja", package=package)
+        for name in ("reference", "layouts", "compare"):
+            files[f"test/{name}.h"] = render(f"{name}.h.jinja", package=package)
     files["manifest.json"] = manifest(package.robot, package.info, package.options, package.functions, files)
     return files
 

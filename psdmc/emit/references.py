@@ -1,48 +1,62 @@
-"""Reference states for the package's self-test, worked out elsewhere (from the MODEL, not from the generated
-code)."""
+"""Reference states as C text: what the package's own test compares with."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.emit.tables import number
+from psdmc.model.reference_states import ReferenceStates
 
-Array = NDArray[np.float64]
 
+@dataclass(frozen=True, slots=True)
+class ReferenceTable:
+    """One constant array: its name, entries per row, and its rows as C text."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class References:
-    """Positions, velocities, accelerations and the torques that belong to them, each (k, n), SI."""
-
-    q: Array
-    qd: Array
-    qdd: Array
-    tau: Array
-
-    def __post_init__(self) -> None:
-        shapes = {np.shape(array) for array in (self.q, self.qd, self.qdd, self.tau)}
-        if len(shapes) != 1 or len(next(iter(shapes))) != 2 or 0 in next(iter(shapes)):
-            raise ValueError(f"reference states have shapes {sorted(shapes)}, expected one (k, n)")
+    name: str
+    columns: int
+    rows: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceView:
-    """References as C text: rows of constants per vector."""
+    """References as C text.
+
+    tables    the states' vectors, then what each kernel must give
+    expected  the kernels that have such a table
+    theta_b   the run-time parameters, one constant each; empty where no kernel takes any
+    """
 
     count: int
-    vectors: tuple[tuple[str, tuple[str, ...]], ...]
+    tables: tuple[ReferenceTable, ...]
+    expected: tuple[str, ...]
+    theta_b: tuple[str, ...]
 
 
-def reference_view(references: References, n: int, real: str) -> ReferenceView:
-    """The states as C constants; ValueError where they are not of n joints."""
-    if references.q.shape[1] != n:
-        raise ValueError(f"reference states have {references.q.shape[1]} joints, expected {n}")
-    arrays = {name: np.asarray(getattr(references, name), float) for name in ("q", "qd", "qdd", "tau")}
-    rows = tuple(
-        (name, tuple(", ".join(number(value, real) for value in row) for row in array.tolist()))
-        for name, array in arrays.items()
-    )
-    return ReferenceView(len(references.q), rows)
+def reference_view(
+    references: ReferenceStates, n: int, real: str, vectors: Collection[str], kernels: Collection[str]
+) -> ReferenceView:
+    """The states as C constants: the vectors that the package's kernels take, and what these kernels must give.
+
+    ValueError where the states are not of n joints.
+    """
+    columns = next(iter(references.given.values())).shape[1]
+    if columns != n:
+        raise ValueError(f"reference states have {columns} joints, expected {n}")
+    given = [
+        _table(f"{name}_given", array, real) for name, array in references.given.items() if name in vectors
+    ]
+    known = tuple(name for name in kernels if name in references.expected)
+    expected = [_table(f"{name}_expected", references.expected[name], real) for name in known]
+    takes_theta = any(name.endswith("_theta") for name in kernels)
+    theta_b = tuple(number(value, real) for value in references.theta_b.tolist()) if takes_theta else ()
+    return ReferenceView(len(next(iter(references.given.values()))), (*given, *expected), known, theta_b)
+
+
+def _table(name: str, array: NDArray[np.float64], real: str) -> ReferenceTable:
+    rows: Sequence[Sequence[float]] = np.asarray(array, float).tolist()
+    texts = tuple(", ".join(number(value, real) for value in row) for row in rows)
+    return ReferenceTable(name, array.shape[1], texts)

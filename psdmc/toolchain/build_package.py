@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import shlex
 import shutil
 from collections.abc import Iterator
@@ -11,7 +12,11 @@ from pathlib import Path
 from psdmc.atomic import make_folder, system_errors_at
 from psdmc.emit.own_files import edited_files
 from psdmc.errors import InputError, ToolchainError
-from psdmc.toolchain.compiler_command import find_compiler, run
+from psdmc.toolchain.compiler_command import attempt, failure, find_compiler, run
+
+FAILED = ": FAILED"
+SHOWN = 3
+"""Failed checks that a message names."""
 
 UNFINISHED = ".psdmc-unfinished"
 """Stands in a build folder while psdmc builds there, and after it was killed or failed."""
@@ -69,11 +74,35 @@ def _with_cmake(root: Path) -> str:
     steps = [
         ["cmake", "-S", str(root), "-B", build, "-DCMAKE_BUILD_TYPE=Release"],
         ["cmake", "--build", build, "--parallel"],
-        ["ctest", "--test-dir", build, "--output-on-failure", "--verbose"],
     ]
-    return "".join(run(step, str(root)) for step in steps)
+    built = "".join(run(step, str(root)) for step in steps)
+    return built + _self_test(["ctest", "--test-dir", build, "--output-on-failure", "--verbose"], root)
 
 
 def _with_make(root: Path, compiler: tuple[str, ...]) -> str:
     command = shlex.join(compiler).replace("$", "$$")
-    return run(["make", "-C", str(root), f"CC={command}", "all", "check"], str(root))
+    make = ["make", "-C", str(root), f"CC={command}"]
+    return run([*make, "all"], str(root)) + _self_test([*make, "check"], root)
+
+
+def _self_test(words: list[str], root: Path) -> str:
+    """What the self-test printed; ToolchainError with the checks that failed, or with how it ended otherwise."""
+    done = attempt(words, str(root))
+    if done.returncode == 0:
+        return done.stdout
+    failed = failed_checks(done.stdout)
+    if not failed:
+        raise failure(words, str(root), done)
+    first = "; ".join(failed[:SHOWN]) + ("; ..." if len(failed) > SHOWN else "")
+    plural = "check" if len(failed) == 1 else "checks"
+    raise ToolchainError(
+        f"{root}: the self-test failed in {len(failed)} {plural}: {first}",
+        "the code does not compute this robot here: look for changed files (psdmc emit-c writes them again) and for "
+        f"compiler flags such as -ffast-math; run it to see everything: {shlex.join(words)}",
+    )
+
+
+def failed_checks(report: str) -> list[str]:
+    """The checks that a self-test's report calls failed, each once: ctest numbers its lines, and repeats them."""
+    lines = (re.sub(r"^\d+: ", "", line.strip()) for line in report.splitlines())
+    return list(dict.fromkeys(line.removesuffix(FAILED) for line in lines if line.endswith(FAILED)))

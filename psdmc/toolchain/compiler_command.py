@@ -99,24 +99,34 @@ def _macros(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
     """A program's standard output; ToolchainError with the first line of its complaint where it fails."""
+    done = attempt(words, what, cwd)
+    if done.returncode != 0:
+        raise failure(words, what, done)
+    return done.stdout
+
+
+def attempt(words: Sequence[str], what: str, cwd: str | None = None) -> subprocess.CompletedProcess[str]:
+    """A program run to its end, whatever its status; ToolchainError where it cannot be run or takes too long."""
     try:
-        done = subprocess.run(
+        return subprocess.run(
             words, cwd=cwd, capture_output=True, text=True, errors="replace", timeout=SECONDS, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise ToolchainError(f"{what}: {words[0]} could not be run: {error}") from error
+
+
+def failure(words: Sequence[str], what: str, done: subprocess.CompletedProcess[str]) -> ToolchainError:
+    """What to raise for a program that was killed or ended with a status other than 0."""
     if done.returncode < 0:
-        raise ToolchainError(
+        return ToolchainError(
             f"{what}: {words[0]} was killed by {_signal_name(-done.returncode)}",
             "is there memory enough? run it to see: " + shlex.join(words),
         )
-    if done.returncode != 0:
-        complaint = _complaint(done.stderr, done.stdout)
-        raise ToolchainError(
-            f"{what}: {words[0]} failed with status {done.returncode}: {complaint}",
-            f"run it to see everything: {shlex.join(words)}",
-        )
-    return done.stdout
+    complaint = _complaint(done.stderr, done.stdout)
+    return ToolchainError(
+        f"{what}: {words[0]} failed with status {done.returncode}: {complaint}",
+        f"run it to see everything: {shlex.join(words)}",
+    )
 
 
 def _signal_name(number: int) -> str:
@@ -126,22 +136,8 @@ def _signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-SELF_TEST_FAILED = ": FAILED"
-"""How an emitted package's self-test ends the line of a check that failed."""
-
-
 def _complaint(*texts: str) -> str:
-    """What a self-test says of its failed checks; else the first line that says 'error'; else the last line."""
+    """The first line that says 'error', else the last line there is."""
     lines = [line.strip() for text in texts for line in text.splitlines() if line.strip()]
-    failed = [_check_line(line) for line in lines if line.endswith(SELF_TEST_FAILED)]
-    if failed:
-        more = f"; and {len(failed) - 1} more" if len(failed) > 1 else ""
-        return f"self-test: {failed[0]}{more}"
     errors = [line for line in lines if "error" in line.lower()]
     return (errors or lines[-1:] or ["no message"])[0]
-
-
-def _check_line(line: str) -> str:
-    """A check's line without the number that ctest puts before it, and with single spaces."""
-    head, _, rest = line.partition(": ")
-    return " ".join((rest if head.isdigit() else line).split())

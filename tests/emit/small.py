@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
-from psdmc.emit.references import References
+from psdmc.model.reference_states import ReferenceStates
 from psdmc.program.functions import BY_NAME
 from psdmc.program.kernel import Kernel
 from psdmc.program.text import parse
@@ -61,6 +63,14 @@ def pendulum_kernels() -> dict[str, Kernel]:
     }
 
 
+def pendulum_references() -> ReferenceStates:
+    """At rest at 90 degrees: tau = 0.25 qdd + 4.905, and as much with theta_b = (0.25, 0.5)."""
+    given = {name: np.array([[np.pi / 2]]) for name in ("q", "qd", "qd_r", "qdd_r")}
+    given |= {"qdd": np.array([[2.0]]), "tau": np.array([[5.405]]), "tau_theta": np.array([[5.405]])}
+    expected = {"inverse_dynamics": given["tau"], "inverse_dynamics_theta": given["tau"]}
+    return ReferenceStates(given, expected | {"forward_dynamics": given["qdd"]}, np.array([0.25, 0.5]))
+
+
 def pendulum_info(name: str = "pendulum", joint: str = "hinge") -> PackageInfo:
     return PackageInfo(
         name=name,
@@ -81,6 +91,6 @@ def pendulum_info(name: str = "pendulum", joint: str = "hinge") -> PackageInfo:
 def pendulum(
     info: PackageInfo | None = None,
     options: EmitOptions | None = None,
-    references: References | None = None,
+    references: ReferenceStates | None = None,
 ) -> PackageView:
     return package_view(info or pendulum_info(), pendulum_kernels(), options or EmitOptions(), references)

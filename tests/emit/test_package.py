@@ -14,16 +14,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import FORWARD, INVERSE, kernel, pendulum, pendulum_info, pendulum_kernels
+from small import (
+    FORWARD,
+    INVERSE,
+    kernel,
+    pendulum,
+    pendulum_info,
+    pendulum_kernels,
+    pendulum_references,
+)
 
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_files, package_view
-from psdmc.emit.references import References
 from psdmc.errors import InputError, InternalError
+from psdmc.model.reference_states import ReferenceStates
 
 GOLDEN = Path(__file__).parent.parent / "golden" / "pendulum"
-ONE = np.array([[0.5]])
-REFERENCES = References(ONE, ONE, ONE, ONE)
+REFERENCES = pendulum_references()
 SHOWN = (
     "include/pendulum/pendulum.h",
     "include/pendulum/pendulum.hpp",
@@ -33,6 +40,8 @@ SHOWN = (
     "src/forward_dynamics.c",
     "src/forward_dynamics.inc",
     "src/tables.c",
+    "test/compare.h",
+    "test/layouts.h",
     "test/reference.h",
     "test/self_test.c",
 )
@@ -208,7 +217,6 @@ def test_unknown_parameters_are_nan_in_the_tables_and_null_in_the_manifest() -> 
     files = package_files(pendulum(unknown, references=REFERENCES))
     assert files["src/tables.c"].count("(double)NAN") == 2
     assert json.loads(files["manifest.json"])["base_parameters"][0]["value"] is None
-    assert "inverse_dynamics_theta" not in files["test/self_test.c"]
 
 
 def test_nothing_to_emit_is_said() -> None:
@@ -227,10 +235,13 @@ def test_a_kernel_may_only_name_its_functions_vectors() -> None:
 
 
 def test_references_of_another_robot_are_refused() -> None:
+    two = {name: np.zeros((3, 2)) for name in REFERENCES.given}
     with pytest.raises(ValueError, match="2 joints, expected 1"):
-        pendulum(references=References(*np.zeros((4, 3, 2))))
+        pendulum(references=ReferenceStates(two, {}, np.zeros(2)))
     with pytest.raises(ValueError, match=r"expected one \(k, n\)"):
-        References(ONE, ONE, ONE, np.zeros((2, 1)))
+        ReferenceStates({**two, "q": np.zeros((2, 1))}, {}, np.zeros(2))
+    with pytest.raises(ValueError, match="gravity are not 3 rows"):
+        ReferenceStates(two, {"gravity": np.zeros((2, 2))}, np.zeros(2))
 
 
 def _templates() -> list[str]:

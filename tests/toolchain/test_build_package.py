@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from traced import arm_package, arm_references
+from traced import arm_kernels, arm_package, arm_references
 
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_files
-from psdmc.emit.references import References
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError, ToolchainError
+from psdmc.model.reference_states import ReferenceStates
 from psdmc.toolchain.build_package import UNFINISHED, build_package
 
 NAMES = ["inverse_dynamics", "forward_dynamics"]
@@ -27,7 +28,7 @@ def _need(*programs: str) -> None:
             pytest.skip(f"{program} is not installed")
 
 
-def _emit(folder: Path, references: References | None = None, **options: str) -> Path:
+def _emit(folder: Path, references: ReferenceStates | None = None, **options: str) -> Path:
     made = EmitOptions(**options)  # type: ignore[arg-type]
     package = arm_package(options=made, names=NAMES, references=references or arm_references())
     write_package(folder, package_files(package))
@@ -58,12 +59,13 @@ def test_build_runs_the_self_test_with_cmake(emitted: Path) -> None:
     _need("cmake")
     report = build_package(emitted)
     for name in (
-        "inverse_dynamics",
-        "inverse_dynamics_theta, batch",
-        "forward_dynamics",
-        "forward_dynamics, batch",
+        "inverse_dynamics, one state",
+        "inverse_dynamics_theta, rows",
+        "forward_dynamics, rows",
+        "forward_dynamics, lane by lane",
     ):
         assert any(name in line and line.endswith(": ok") for line in report.splitlines()), name
+    assert "test_arm: 10 checks of 4 functions, 0 failed" in report
 
 
 def test_build_runs_the_self_test_with_make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,29 +73,108 @@ def test_build_runs_the_self_test_with_make(tmp_path: Path, monkeypatch: pytest.
     folder = _emit(tmp_path / "arm", real="float32")
     which = shutil.which
     monkeypatch.setattr("shutil.which", lambda name: None if name == "cmake" else which(name))
-    assert "inverse_dynamics, batch" in build_package(folder)
+    assert "inverse_dynamics, rows" in build_package(folder)
     assert (folder / "build" / "libtest_arm.so").is_file()
 
 
-def test_a_self_test_that_fails_fails_the_build(tmp_path: Path) -> None:
-    _need("cmake")
+def _spoilt(name: str, value: float) -> ReferenceStates:
+    """References with one entry of a kernel's expected values set to `value`."""
     good = arm_references()
-    tau = good.tau.copy()
-    tau[3, 1] *= 1 + 1e-6
-    with pytest.raises(ToolchainError, match="ctest failed") as caught:
-        build_package(_emit(tmp_path / "arm", References(good.q, good.qd, good.qdd, tau)))
-    said = caught.value.message
-    assert "self-test: inverse_dynamics error" in said
-    assert "tolerance" in said
-    assert "FAILED; and " in said
+    wrong = good.expected[name].copy()
+    wrong[3, 1] = value
+    return ReferenceStates(good.given, {**good.expected, name: wrong}, good.theta_b)
 
 
-def test_a_self_test_does_not_let_a_nan_pass(tmp_path: Path) -> None:
+@pytest.mark.parametrize("tool", ["cmake", "make"])
+def test_a_failed_self_test_says_which_checks_failed_and_by_how_much(
+    tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _need(tool)
+    which = shutil.which
+    other = {"cmake": "make", "make": "cmake"}[tool]
+    monkeypatch.setattr("shutil.which", lambda name: None if name == other else which(name))
+    tau = arm_references().expected["inverse_dynamics"]
+    largest = np.abs(tau[:, 1]).max()
+    folder = _emit(tmp_path / "arm", _spoilt("inverse_dynamics", tau[3, 1] + 1e-6 * largest))
+    with pytest.raises(ToolchainError) as caught:
+        build_package(folder)
+    assert str(caught.value) == (
+        f"{folder}: the self-test failed in 3 checks: "
+        "inverse_dynamics, one state: error 1.0e-06, tolerance 1e-10; "
+        "inverse_dynamics, rows: error 1.0e-06, tolerance 1e-10; "
+        "inverse_dynamics, lane by lane: error 1.0e-06, tolerance 1e-10"
+    )
+    assert "run it to see everything: " in str(caught.value.hint)
+
+
+def test_more_failures_than_a_line_holds_are_counted(tmp_path: Path) -> None:
     good = arm_references()
-    tau = good.tau.copy()
-    tau[0, 1] = np.nan
-    with pytest.raises(ToolchainError, match="failed"):
-        build_package(_emit(tmp_path / "arm", References(good.q, good.qd, good.qdd, tau)))
+    spoilt = {name: 2.0 * values for name, values in good.expected.items()}
+    with pytest.raises(ToolchainError, match=r"failed in 10 checks: .*; \.\.\.$"):
+        build_package(_emit(tmp_path / "arm", ReferenceStates(good.given, spoilt, good.theta_b)))
+
+
+def test_a_self_test_that_dies_is_not_called_failed_checks(tmp_path: Path) -> None:
+    folder = _emit(tmp_path / "arm")
+    source = folder / "test" / "self_test.c"
+    text = source.read_text().replace(
+        "int main(void)\n{", "#include <stdlib.h>\nint main(void)\n{\n    abort();"
+    )
+    source.write_text(text)
+    with pytest.raises(ToolchainError, match=r"(ctest|make) failed with status"):
+        build_package(folder, edited=True)
+
+
+@pytest.mark.parametrize("name", ["inverse_dynamics", "forward_dynamics_theta"])
+def test_a_self_test_does_not_let_a_nan_pass(name: str, tmp_path: Path) -> None:
+    with pytest.raises(ToolchainError, match=rf"{name}, rows: error inf"):
+        build_package(_emit(tmp_path / "arm", _spoilt(name, np.nan)))
+
+
+def test_the_self_test_checks_whatever_was_emitted(tmp_path: Path) -> None:
+    """The functions of a new user's first try, for which it was an empty main once."""
+    package = arm_package(names=["gravity", "jacobian"], references=arm_references())
+    write_package(tmp_path / "arm", package_files(package))
+    report = build_package(tmp_path / "arm")
+    for layout in ("one state", "rows", "lane by lane"):
+        assert f"gravity, {layout}: error" in report
+        assert f"jacobian, {layout}: error" in report
+    assert "gravity_theta, rows: error" in report
+    assert "test_arm: 8 checks of 3 functions, 0 failed" in report
+
+
+def _with_a_fault(body: str) -> str:
+    """A body whose last stored entry is off by a millionth, in the forms that store one by one and in groups."""
+    lines = body.splitlines()
+    stores = [i for i, line in enumerate(lines) if "STORE(" in line and "SPLAT(0.0)" not in line]
+    lines[stores[-1]] = re.sub(r"(\d+, )(.*)\);$", r"\1(\2) * 1.000001);", lines[stores[-1]], count=1)
+    groups = [i for i, line in enumerate(lines) if "STORE_GROUP(" in line]
+    for i in groups[-1:]:
+        lines[i] = re.sub(r"STORE_GROUP\((\w+, \d+), (.*)\);$", _spoilt_group, lines[i])
+    return "\n".join(lines) + "\n"
+
+
+def _spoilt_group(matched: re.Match[str]) -> str:
+    values = ", ".join(f"({value}) * 1.000001" for value in matched[2].split(", "))
+    return f"STORE_GROUP({matched[1]}, {values});"
+
+
+def test_a_fault_in_any_function_fails_its_checks_in_every_layout(tmp_path: Path) -> None:
+    _need("make")
+    package = arm_package(references=arm_references())
+    files = package_files(package)
+    for path in files:
+        if path.endswith(".inc"):
+            files[path] = _with_a_fault(files[path])
+    write_package(tmp_path, files)
+    words = ["make", "-C", str(tmp_path), "CC=gcc", "CFLAGS=-O1", "check"]
+    report = subprocess.run(words, capture_output=True, text=True, check=False).stdout
+    for name in arm_kernels():
+        for layout in (
+            ("one state", "rows") if name.endswith("_theta") else ("one state", "rows", "lane by lane")
+        ):
+            assert re.search(rf"^{name}, {layout}: error .*: FAILED$", report, re.MULTILINE), (name, layout)
+    assert "39 checks of 15 functions, 39 failed" in report
 
 
 def test_a_folder_without_a_package_is_said(tmp_path: Path) -> None:
@@ -179,7 +260,7 @@ def test_openmp_gives_the_same_results(tmp_path: Path) -> None:
     _need("make")
     folder = _emit(tmp_path / "arm")
     report = _run(["make", "-C", str(folder), "CFLAGS=-O2 -fopenmp -Dtest_arm_OPENMP", "check"])
-    assert report.count(": ok") == 8
+    assert report.count(": ok") == 10
 
 
 def test_an_edited_package_is_named_and_built_only_on_request(tmp_path: Path) -> None:
@@ -240,3 +321,37 @@ def test_spaces_and_letters_in_paths_and_compilers(
     if tool == "make":  # CMake takes no such path from CC
         monkeypatch.setenv("CC", f"'{own / 'gcc'}' -O1")
     assert ": ok" in build_package(_emit(tmp_path / "mein Röboter 'x'"))
+
+
+PARENT = """
+cmake_minimum_required(VERSION 3.13)
+project(parent LANGUAGES C)
+enable_testing()
+add_subdirectory({package} arm)
+add_executable(consumer main.c)
+target_link_libraries(consumer PRIVATE test_arm::test_arm)
+add_test(NAME consumer COMMAND consumer)
+if(DEFINED BUILD_TESTING)
+  message(FATAL_ERROR "BUILD_TESTING was set")
+endif()
+"""
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_subdirectory_leaves_the_parents_tests_and_installation_alone(
+    asked: bool, emitted: Path, tmp_path: Path
+) -> None:
+    _need("cmake")
+    (tmp_path / "main.c").write_text(CONSUMER)
+    (tmp_path / "CMakeLists.txt").write_text(PARENT.format(package=emitted))
+    build, prefix = str(tmp_path / "b"), tmp_path / "prefix"
+    options = ["-Dtest_arm_SELF_TEST=ON", "-Dtest_arm_INSTALL=ON"] if asked else []
+    _run(["cmake", "-S", str(tmp_path), "-B", build, *options])
+    _run(["cmake", "--build", build, "--parallel", "2"])
+    tests = _run(["ctest", "--test-dir", build])
+    _run(["cmake", "--install", build, "--prefix", str(prefix)])
+
+    assert ("test_arm_self_test" in tests) == asked
+    assert "consumer" in tests
+    assert (prefix / "include" / "test_arm").is_dir() == asked
+    assert "Nightly" not in _run(["cmake", "--build", build, "--target", "help"])

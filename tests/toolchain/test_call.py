@@ -58,13 +58,10 @@ def test_parameters_may_be_given(robot: CompiledRobot, name: str) -> None:
 
 
 def test_inverse_undoes_forward(robot: CompiledRobot) -> None:
-    states = arm_references(50)
-    assert np.allclose(
-        robot.forward_dynamics(states.q, states.qd, states.tau), states.qdd, rtol=1e-9, atol=1e-9
-    )
-    assert np.allclose(
-        robot.inverse_dynamics(states.q, states.qd, states.qdd), states.tau, rtol=1e-12, atol=1e-10
-    )
+    given = arm_references(50).given
+    q, qd, qdd, tau = (given[name] for name in ("q", "qd", "qdd", "tau"))
+    assert np.allclose(robot.forward_dynamics(q, qd, tau), qdd, rtol=1e-9, atol=1e-9)
+    assert np.allclose(robot.inverse_dynamics(q, qd, qdd), tau, rtol=1e-12, atol=1e-10)
 
 
 def test_lists_strides_and_integers_are_taken(robot: CompiledRobot) -> None:

@@ -15,8 +15,9 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
-from psdmc.emit.references import References
+from psdmc.model.reference_states import ReferenceStates
 from psdmc.program.functions import BY_NAME
+from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
@@ -157,15 +158,25 @@ def arm_package(
     seed: int = 0,
     options: EmitOptions | None = None,
     names: Sequence[str] | None = None,
-    references: References | None = None,
+    references: ReferenceStates | None = None,
 ) -> PackageView:
     return package_view(arm_info(name, seed), arm_kernels(seed, names), options or EmitOptions(), references)
 
 
-def arm_references(count: int = 11, seed: int = 0) -> References:
-    """Random states and their torques, by Newton-Euler on arrays."""
-    frames, parameters = arm(seed)
-    q, qd, qdd = np.random.default_rng(5).normal(size=(3, count, N))
-    body, drive = bodies(parameters.ravel().tolist())
-    tau = inverse_dynamics(frames, body, drive, list(q.T), list(qd.T), list(qdd.T), UP)
-    return References(q, qd, qdd, np.stack(tau, axis=-1))
+def arm_references(count: int = 4, seed: int = 0) -> ReferenceStates:
+    """Random states and every function's values there, by the interpreted PROGRAMs."""
+    kernels = arm_kernels(seed)
+    theta = 1.25 * arm(seed)[1].ravel()
+    q, qd, qdd, qd_r, qdd_r = np.random.default_rng(5).normal(size=(5, count, N))
+    given = {"q": q, "qd": qd, "qdd": qdd, "qd_r": qd_r, "qdd_r": qdd_r}
+    expected: dict[str, np.ndarray] = {}
+    for name, kernel in kernels.items():
+        function = kernel.function
+        if not function.pivots:
+            inputs = {v: given[v] for v in function.inputs} | ({"theta_b": theta} if kernel.theta else {})
+            sizes = {function.output: function.size(N, L)}
+            expected[name] = interpret(kernel.single, inputs, sizes)[function.output]
+    for suffix in ("", "_theta"):
+        given[f"tau{suffix}"] = expected[f"inverse_dynamics{suffix}"]
+        expected[f"forward_dynamics{suffix}"] = qdd
+    return ReferenceStates(given, expected, theta)

@@ -3,6 +3,7 @@
  *
  * Nothing allocates or throws. The raw-pointer forms take whatever has data(): std::array, std::span,
  * Eigen::Matrix and Eigen::Map alike; matrices are row-major. The std::array forms return their result.
+ * What pendulum.h says of overlapping arrays holds here, too; parameters() are the theta_b meant there.
  */
 #ifndef pendulum_HPP
 #define pendulum_HPP

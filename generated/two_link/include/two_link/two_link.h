@@ -17,8 +17,9 @@
  *   2  m2 + mx2/a2  [kg]
  *   3  Izz2 + a2 mx2  [kg m^2]
  *
- * Arrays: n reals per vector; matrices row-major. Inputs are all read before an output is written, so
- * that an output may be one of the inputs (in a batch: where their rows are equally long).
+ * Arrays: n reals per vector; matrices row-major. Inputs may overlap each other. An output may overlap any
+ * input of a call for one state. In a batch it may be the very array of an input whose rows are equally long,
+ * and must not overlap an input (theta_b is one) in any other way.
  *   _batch      one state per row
  *   _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too
  *   _theta      with the base parameters theta_b given at run time (_theta_batch: one theta_b for all rows)

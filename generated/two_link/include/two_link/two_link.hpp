@@ -3,6 +3,7 @@
  *
  * Nothing allocates or throws. The raw-pointer forms take whatever has data(): std::array, std::span,
  * Eigen::Matrix and Eigen::Map alike; matrices are row-major. The std::array forms return their result.
+ * What two_link.h says of overlapping arrays holds here, too; parameters() are the theta_b meant there.
  */
 #ifndef two_link_HPP
 #define two_link_HPP
