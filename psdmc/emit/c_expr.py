@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from psdmc.emit.reals import rounded_out
 from psdmc.program.program import Instr, Op, Program
 
 DEEPEST = 4
@@ -80,7 +81,8 @@ def _cut_deep_trees(program: Program, named: list[bool]) -> None:
 
 
 def literal(value: float, suffix: str) -> Expr:
-    """A constant that reads back as the same number."""
+    """A constant that reads back as the same number; with suffix 'f' as the nearest float."""
+    value = rounded_out(value, "float" if suffix else "double")
     return Expr(f"{value!r}{suffix}", _UNARY if str(value).startswith("-") else _ATOM)
 
 

@@ -14,6 +14,7 @@ from psdmc.emit.lanes import VectorWidth, vector_widths
 from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
+from psdmc.emit.reals import check_range
 from psdmc.emit.references import ReferenceView, reference_view
 from psdmc.emit.render import render
 from psdmc.emit.self_test import SelfCheck, given_vectors, self_checks
@@ -174,6 +175,7 @@ def package_view(
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
     if info.l == 0:
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
+    check_range(info, kernels, options.c_real)
     robot = identifier(info.name)
     functions = function_views(kernels, info.n, info.l, robot, options)
     package = PackageView(robot, info, options, functions, None)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from psdmc.emit.info import PackageInfo
 from psdmc.emit.names import c_string
+from psdmc.emit.reals import rounded_out
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,15 +65,17 @@ def _cpp_number(value: float | None, real: str) -> str:
     """A real constant in C++, where C's macros would be old-style casts."""
     if value is None or math.isnan(value):
         return "std::numeric_limits<Real>::quiet_NaN()"
+    value = rounded_out(value, real)
     if math.isinf(value):
         return f"{'-' if value < 0 else ''}std::numeric_limits<Real>::infinity()"
     return number(value, real)
 
 
 def number(value: float | None, real: str) -> str:
-    """A real constant; None (unknown) is NaN."""
+    """A real constant; None (unknown) is NaN, what `real` has no number for is the infinity or zero it rounds to."""
     if value is None or math.isnan(value):
         return f"({real})NAN"
+    value = rounded_out(value, real)
     if math.isinf(value):
         return f"({real})INFINITY" if value > 0 else f"-({real})INFINITY"
     return f"{float(value)!r}{'' if real == 'double' else 'f'}"
