@@ -49,6 +49,10 @@ class Case:
         """Number of joints."""
         return len(self.chain)
 
+    @property
+    def has_drive_inertia(self) -> bool:
+        return bool(np.any(self.chain.parameters[:, DRIVE] != 0.0))
+
 
 def generic_chain(chain: Chain, seed: int) -> Chain:
     """The chain's geometry standing on the floor with generic physical inertias and no drive inertia.

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from bundled import bundled_model, robot_path
 
 from psdmc.bench.case import Case, generic_chain, robot_as_numbers
 from psdmc.bench.cases import first_joints, oblique_chain, standard_cases
-from psdmc.bench.contestant import Unavailable
-from psdmc.bench.rivals import EVERYONE, Entrant, mujoco_c, psdmc_c
+from psdmc.bench.contestant import Contestant, Unavailable
+from psdmc.bench.rivals import EVERYONE, Entrant, casadi_c, mujoco_c, pinocchio_cpp, psdmc_c
 from psdmc.bench.rivals.mujoco_c import mjcf, quaternion
 from psdmc.bench.run import Settings, run
+from psdmc.compiler import derive
 from psdmc.derive.derive import derive_model
 from psdmc.errors import InputError, ToolchainError
 
 
-def refuses(case, flags):
+def refuses(*arguments):
     raise ToolchainError("the wheel 'rival' is not installed", "pip install rival")
 
 
@@ -81,6 +85,29 @@ def test_mujoco_is_not_asked_for_what_it_leaves_out(two_link):
     (answer,) = mujoco_c.contestants(two_link, ())
 
     assert isinstance(answer, Unavailable)
+
+
+@pytest.mark.parametrize("rival", ["Pinocchio", "CasADi"])
+def test_a_regressor_without_drive_inertia_is_not_called_wrong(rival, monkeypatch):
+    """It is left out with the reason where the robot has drive inertia, and only there."""
+    if rival == "CasADi":
+        counts = {way: (1, 1) for ways in casadi_c.WAYS.values() for way in ways}
+        monkeypatch.setattr(casadi_c, "written", lambda case: ("", counts))
+        monkeypatch.setattr(casadi_c, "_by_lane", refuses)
+        monkeypatch.setattr(casadi_c, "_scalar", lambda *arguments: Path("casadi.so"))
+    else:
+        monkeypatch.setattr(pinocchio_cpp, "compiled", lambda way, flags: Path("pinocchio.so"))
+    build = {"Pinocchio": pinocchio_cpp.library, "CasADi": casadi_c.contestants}[rival]
+    bare = Case("bare", bundled_model("scara"))
+    geared = Case("geared", derive(robot_path("scara"), drive_inertia=(0.0, 0.3, 0.0, 0.0)))
+
+    assert "regressor" in [one.function for one in build(bare, ()) if isinstance(one, Contestant)]
+    entries = build(geared, ())
+    functions = [one.function for one in entries if isinstance(one, Contestant)]
+    assert "regressor" not in functions
+    assert "inverse_dynamics" in functions
+    left_out = [one for one in entries if isinstance(one, Unavailable) and one.rival == f"{rival}, regressor"]
+    assert [one.reason for one in left_out] == ["it has no columns for drive inertia, which this robot has"]
 
 
 def test_generic_inertias_are_physical_and_the_same_for_the_same_seed():

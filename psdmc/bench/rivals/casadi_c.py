@@ -15,6 +15,8 @@ from psdmc.bench.rivals.pinocchio_cpp import (
     INSTANTIATED,
     SYMBOLS,
     includes,
+    incomparable,
+    is_comparable,
     pinocchio_prefix,
     standard_parameters,
 )
@@ -40,7 +42,7 @@ def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavail
             found += _entered(case, build(case, generated, flags), layout == "lanes", counts)
         except ToolchainError as error:
             found.append(Unavailable(f"{RIVAL} ({layout})", error.message))
-    return found
+    return [*found, *incomparable(case, RIVAL)]
 
 
 def _entered(
@@ -63,6 +65,7 @@ def _entered(
         )
         for function, ways in WAYS.items()
         for way in ways
+        if is_comparable(case, function)
     ]
 
 

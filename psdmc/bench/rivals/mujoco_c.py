@@ -23,7 +23,7 @@ FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
     """MuJoCo's functions for one robot; armature is no part of its Newton-Euler, so drive inertia is refused."""
-    if np.any(case.chain.parameters[:, DRIVE] != 0.0):
+    if case.has_drive_inertia:
         return [Unavailable(RIVAL, "its mj_rne leaves drive inertia out")]
     if np.any(case.chain.parameters[:, 0] <= 0.0):
         return [Unavailable(RIVAL, "it wants mass on every link")]

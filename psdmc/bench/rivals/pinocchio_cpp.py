@@ -11,7 +11,7 @@ import numpy as np
 
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import DRIVE, Case, robot_as_numbers
-from psdmc.bench.contestant import Contestant, source
+from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError
@@ -42,22 +42,22 @@ INSTANTIATED = "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION"
 """Take the library's own instantiations, as its users do: compiles in seconds, runs as shipped."""
 
 
-def library(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
+def library(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
     """Pinocchio as its users get it: the wheel's own library."""
     return contestants(case, "Pinocchio", compiled("library", flags))
 
 
-def header_only(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
+def header_only(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
     """Pinocchio compiled whole with this machine's instructions, as far as it goes."""
     return contestants(case, "Pinocchio header-only", compiled("header-only", flags))
 
 
-def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contestant]:
+def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contestant | Unavailable]:
     """Pinocchio's algorithms for one robot."""
     robot = robot_as_numbers(case.chain)
     n = case.n
     outputs = {"mass_matrix": n * n, "regressor": 10 * n * n}
-    return [
+    found: list[Contestant | Unavailable] = [
         Contestant(
             rival,
             function,
@@ -70,7 +70,21 @@ def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contesta
         )
         for function, symbols in SYMBOLS.items()
         for symbol in symbols
+        if is_comparable(case, function)
     ]
+    return [*found, *incomparable(case, rival)]
+
+
+def is_comparable(case: Case, function: str) -> bool:
+    """Whether a rival's function computes what psdmc's does for this robot."""
+    return function != "regressor" or not case.has_drive_inertia
+
+
+def incomparable(case: Case, rival: str) -> list[Unavailable]:
+    """The functions that are left out for this robot, with the reason."""
+    if not case.has_drive_inertia:
+        return []
+    return [Unavailable(f"{rival}, regressor", "it has no columns for drive inertia, which this robot has")]
 
 
 def compiled(way: Way, flags: tuple[str, ...]) -> Path:
