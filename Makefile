@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-lowest audit fuzz
+.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-lowest audit fuzz test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -66,6 +66,9 @@ audit: $(READY) ## ask the advisory databases about every installed dependency (
 	$(AUDIT)/bin/pip-audit --requirement $(AUDIT)/installed.txt --no-deps --disable-pip --strict
 
 AUDIT := .venv-audit
+
+test-sanitize: $(READY) ## emitted C under sanitizers, valgrind, guard pages and analyzers; make test runs a short form
+	$(RUN)/python tests/toolchain/sanitize_campaign.py
 
 FAST := tests/test_architecture.py tests/program tests/robot tests/dynamics tests/model
 

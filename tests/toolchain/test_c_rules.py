@@ -23,7 +23,7 @@ STRICT = [
     "-Wdouble-promotion",
     "-Werror",
 ]
-EXTRA = ["-Wstrict-prototypes", "-Wmissing-prototypes", "-Wundef", "-Wvla"]
+EXTRA = ["-Wcast-align", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wundef", "-Wvla"]
 COMPILERS = ["gcc", "clang"]
 NAMES = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian"]
 """One of each kind: torques with parameters, pivots, a matrix with and one without parameters."""

@@ -1,0 +1,78 @@
+"""`make test-sanitize`: every tool of sanitizers.py on every package of CASES; a table of what was built, called and found.
+
+Status 0 where nothing was found. Tools that are not installed are listed.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+
+from bundled import bundled_model  # noqa: E402
+from sanitizers import DYNAMIC, STATIC, Outcome, Tool, look  # noqa: E402
+
+from psdmc.emit.info import package_info  # noqa: E402
+from psdmc.emit.options import EmitOptions  # noqa: E402
+from psdmc.emit.package import PackageView, package_view  # noqa: E402
+from psdmc.lower.kernels import lower  # noqa: E402
+
+ROBOTS = ("two_link", "scara", "kr6")
+"""A small one, one with a sliding joint, six turning joints."""
+OPTIONS = [
+    EmitOptions(real, trig) for real in ("float64", "float32") for trig in ("inline", "freestanding", "libm")
+]  # type: ignore[arg-type]
+LARGE = {"kr6": OPTIONS[::3]}
+"""Of a six-joint arm the inline code only, in both precisions: the other sines are the same text in every robot."""
+
+
+def packages(robots: tuple[str, ...]) -> Iterator[tuple[str, PackageView]]:
+    for robot in robots:
+        model = bundled_model(robot)
+        kernels = lower(model)
+        for options in LARGE.get(robot, OPTIONS):
+            package = package_view(package_info(model), kernels, options)
+            yield f"{robot} {options.real} {options.trig}", package
+
+
+def main() -> int:
+    robots = tuple(sys.argv[1:]) or ROBOTS
+    found: list[tuple[str, Outcome]] = []
+
+    def one(job: tuple[str, PackageView, Tool]) -> None:
+        name, package, tool = job
+        with tempfile.TemporaryDirectory() as folder:
+            outcome = look(tool, package, Path(folder))
+        found.append((name, outcome))
+        state = (
+            (outcome.missing and f"{outcome.missing} is not installed") or outcome.findings[:500] or "clean"
+        )
+        print(f"{name}: {tool.name}: {outcome.calls} calls: {state}", flush=True)
+
+    jobs = [(name, package, tool) for name, package in packages(robots) for tool in (*DYNAMIC, *STATIC)]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(one, jobs))
+    return _report(found)
+
+
+def _report(found: list[tuple[str, Outcome]]) -> int:
+    findings = 0
+    print(f"\n{'tool':44} {'packages':>8} {'calls':>10} {'findings':>8}")
+    for tool in (*DYNAMIC, *STATIC):
+        own = [outcome for _, outcome in found if outcome.tool == tool.name and not outcome.missing]
+        bad = sum(bool(outcome.findings) for outcome in own)
+        findings += bad
+        calls = sum(outcome.calls for outcome in own)
+        print(f"{tool.name:44} {len(own) or 'not here':>8} {calls or '':>10} {bad:>8}")
+    total = sum(outcome.calls for _, outcome in found)
+    print(f"{sum(not o.missing for _, o in found)} runs, {total} calls, {findings} with findings")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+"""The short form of `make test-sanitize`: each kind of tool once, and that it would have seen a fault."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import sanitizers
+from sanitizers import DYNAMIC, STATIC, Outcome, Tool, look
+from traced import arm_package
+
+from psdmc.emit.options import EmitOptions
+
+NAMES = ["inverse_dynamics", "forward_dynamics", "jacobian"]
+"""Torques with parameters, pivots, a matrix written straight into rows."""
+SHORT = {
+    "ASan and UBSan, gcc -O0, widest vectors": ("float64", "inline"),
+    "ASan and UBSan, gcc -O0, no vectors": ("float32", "freestanding"),
+    "TSan, gcc -O1, widest vectors": ("float64", "libm"),
+    "memcheck, gcc -O2, AVX2": ("float32", "inline"),
+    "guard pages, gcc -O3, SSE2": ("float64", "inline"),
+    "guard pages, clang -O3, widest vectors": ("float32", "libm"),
+    "gcc -fanalyzer": ("float64", "inline"),
+    "gcc, all warnings": ("float64", "freestanding"),
+    "clang, all warnings": ("float32", "inline"),
+    "clang-tidy": ("float64", "inline"),
+}
+TOOLS = {tool.name: tool for tool in (*DYNAMIC, *STATIC)}
+
+
+def _looked(tool: Tool, real: str, trig: str, folder: Path) -> Outcome:
+    package = arm_package(options=EmitOptions(real, trig), names=NAMES)  # type: ignore[arg-type]
+    outcome = look(tool, package, folder)
+    if outcome.missing:
+        pytest.skip(f"{outcome.missing} is not installed")
+    return outcome
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_nothing_is_found(name: str, tmp_path: Path) -> None:
+    outcome = _looked(TOOLS[name], *SHORT[name], tmp_path)
+    assert outcome.findings == ""
+    assert outcome.calls > 500 or TOOLS[name].is_static
+
+
+FAULTS = {
+    "reads beyond the last row": (
+        "src/rows.h",
+        "(lane < count ? lane : count - 1) * n",
+        "(lane < count ? lane : count) * n",
+        ("guard pages, gcc -O3, SSE2", "ASan and UBSan, gcc -O0, widest vectors"),
+    ),
+    "writes beyond the last row": (
+        "src/rows.h",
+        "for (size_t lane = 0; lane < count; lane++)",
+        "for (size_t lane = 0; lane <= count; lane++)",
+        ("guard pages, gcc -O3, SSE2", "memcheck, gcc -O2, AVX2"),
+    ),
+    "keeps a state between calls": (
+        "src/pivots.h",
+        "    int bad = 0;",
+        "    static int bad; bad = 0;",
+        ("TSan, gcc -O1, widest vectors",),
+    ),
+}
+
+
+@pytest.mark.parametrize(("fault", "tool"), [(f, tool) for f, row in FAULTS.items() for tool in row[3]])
+def test_a_fault_is_seen(fault: str, tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, right, wrong, _ = FAULTS[fault]
+    write = sanitizers.write_sources
+
+    def spoilt(package: object, folder: Path) -> Path:
+        write(package, folder)  # type: ignore[arg-type]
+        text = (folder / path).read_text()
+        assert right in text
+        (folder / path).write_text(text.replace(right, wrong))
+        return folder
+
+    monkeypatch.setattr(sanitizers, "write_sources", spoilt)
+    assert _looked(TOOLS[tool], "float64", "inline", tmp_path).findings != ""
