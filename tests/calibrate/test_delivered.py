@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -122,7 +123,7 @@ def test_blocks_give_what_the_whole_log_gives(arm, log: Log, monkeypatch: pytest
     values = arm.regressor.regressor(states.q, states.qd, states.qdd)
     whole = states.low_pass(values)[at]
 
-    monkeypatch.setattr("psdmc.calibrate.filter.BLOCK_ROWS", 500)
+    monkeypatch.setattr(sys.modules["psdmc.calibrate.filter"], "BLOCK_ROWS", 500)
     blocks = smoothed_rows(states, at, lambda rows: values[rows])
 
     assert len(log) > 5 * 500
@@ -132,7 +133,9 @@ def test_blocks_give_what_the_whole_log_gives(arm, log: Log, monkeypatch: pytest
 def test_without_a_solver_the_remedy_is_said(arm, log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     found = importlib.util.find_spec
     monkeypatch.setattr(
-        "psdmc.calibrate.physical.find_spec", lambda name: None if name == "clarabel" else found(name)
+        sys.modules["psdmc.calibrate.physical"],
+        "find_spec",
+        lambda name: None if name == "clarabel" else found(name),
     )
     path = written_log(log, tmp_path / "log.npz")
 
