@@ -38,7 +38,8 @@ parameter of the link does there being one. Rounding leaves 1e-18; evaluating th
 
 EXACT = 1e-16
 """Smaller coefficients of the echelon form are zero, lengths in the robot's unit: they add less than the last digit. It
-also tells columns that assumed zeros make dependent from the others."""
+also tells columns that assumed zeros make dependent from the others, as a share of the longest: that of a long chain is a
+thousand long, and so is its rounding."""
 
 
 def reduction_link_by_link(robot: Scaled) -> Reduction:
@@ -101,7 +102,8 @@ def _reduced(rows: Long) -> Reduction:
     """A small column is no pivot before its time: its torque would be a large parameter times small numbers, which
     double precision knows to fewer digits. So residuals are compared as they are, not with their columns."""
     work = np.array(rows, order="C")
-    found, _, _ = graded_pivots(work, np.ones(work.shape[1]), halving_shares(EXACT))
+    last = EXACT * max(1.0, float(lengths(work).max(initial=0.0)))
+    found, _, _ = graded_pivots(work, np.ones(work.shape[1]), halving_shares(last))
     pivots = np.array(found, dtype=np.int64)
     others = np.setdiff1d(np.arange(work.shape[1]), pivots)
     shares = _solved(work[: len(pivots), pivots], work[: len(pivots), others])

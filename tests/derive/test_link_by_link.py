@@ -45,6 +45,14 @@ def test_long_chains(length: int) -> None:
     assert np.abs(model.B @ model.representative - np.eye(model.l)).max() == 0.0
 
 
+def test_a_long_chain_has_no_parameters_of_rounding() -> None:
+    """Sixty equal steps without drive inertias: the far links' columns are hundreds long, and so is their rounding."""
+    chain = random_chain(3, "R" * 60)
+    step = chain.joints[1].placement
+    joints = (chain.joints[0], *(replace(joint, placement=step) for joint in chain.joints[1:]))
+    assert len(reduction_link_by_link(scaled(replace(chain, joints=joints))).pivots) == 7 * 60 - 4
+
+
 def test_longer_chains_are_refused() -> None:
     with pytest.raises(
         DerivationError, match=f"'random0': {LARGEST_CHAIN + 1} joints, psdmc derives chains of up to 200"
