@@ -7,14 +7,15 @@ robot (or `psdmc simulate`) measured.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from psdmc.atomic import write_whole
+from psdmc.atomic import make_folder, write_whole
 from psdmc.calibrate.campaign_file import FILE, Step
 from psdmc.calibrate.excite import Excitation, ExciteOptions, excite, require_limits
 from psdmc.calibrate.excite_poses import motor_poses
@@ -147,9 +148,33 @@ SPOKEN_EVERY = 5.0
 """s between two words on the search."""
 
 
-def require_free(folder: str | Path) -> None:
-    """InputError where a folder holds a campaign, which writing another one would replace; it says what is there."""
+UNFINISHED = ".psdmc-unfinished"
+"""Stands in a campaign's folder while it is written, and where that was killed or failed."""
+
+
+@contextmanager
+def being_written(folder: str | Path) -> Iterator[None]:
+    """What is written inside is a campaign at the end, and until then psdmc's own to write again."""
     root = Path(folder)
+    make_folder(root)
+    write_whole(root / UNFINISHED, "")
+    try:
+        yield
+    except BaseException:
+        if not any(path.is_file() for path in root.rglob("*") if path.name != UNFINISHED):
+            (root / UNFINISHED).unlink()
+        raise
+    (root / UNFINISHED).unlink()
+
+
+def require_free(folder: str | Path) -> None:
+    """InputError where a folder holds a campaign, which writing another one would replace; it says what is there.
+
+    One that an earlier run left unfinished, and that nobody recorded logs for, is free.
+    """
+    root = Path(folder)
+    if (root / UNFINISHED).is_file() and not _count(root / "logs"):
+        return
     if is_folder(root):
         counts = {part: _count(root / part) for part in ("trajectories", "logs")}
         found = [FILE] if (root / FILE).exists() else []

@@ -8,7 +8,13 @@ from pathlib import Path
 from psdmc.atomic import write_together, write_whole
 from psdmc.calibrate.actuators import actuator_files, calibrated_actuators
 from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
-from psdmc.calibrate.campaign import CampaignOptions, plan_campaign, require_free, write_campaign
+from psdmc.calibrate.campaign import (
+    CampaignOptions,
+    being_written,
+    plan_campaign,
+    require_free,
+    write_campaign,
+)
 from psdmc.calibrate.excite import Excitation
 from psdmc.calibrate.predictor import Regressor
 from psdmc.calibrate.record import Calibration, verdict_of
@@ -44,11 +50,12 @@ def excite_command(
         require_free(folder)
     known = load(model)
     runs, found = plan_campaign(known.chain, regressor_of(known, progress), known.l, options, progress)
-    campaign = write_campaign(folder, runs, found, options.table, force=force)
     one_period = found.motion.sampled(known.joint_names, options.sweep.period)
-    write_trajectory(one_period, campaign.parent / "excitation.csv")
     picture = excitation_figure(found, known.joint_names)
-    write_whole(campaign.parent / "excitation.svg", picture)
+    with being_written(folder):
+        campaign = write_campaign(folder, runs, found, options.table, force=force)
+        write_trajectory(one_period, campaign.parent / "excitation.csv")
+        write_whole(campaign.parent / "excitation.svg", picture)
     return found
 
 
