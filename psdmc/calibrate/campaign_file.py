@@ -135,7 +135,10 @@ def _motor_pairs(runs: Sequence[ListedRun], path: str | Path) -> list[tuple[List
     loaded = [(run, run.load) for run in motors if run.load is not None]
     for joint in dict.fromkeys(run.joint for run in motors):
         if joint not in empty:
-            raise InputError(f"{path}: joint {joint}: a loaded motor run without an unloaded one")
+            raise InputError(
+                f"{path}: joint {joint}: a loaded motor run without an unloaded one",
+                "add the unloaded run: the same motion without the load",
+            )
         if not any(run.joint == joint for run, _ in loaded):
             raise InputError(
                 f"{path}: joint {joint}: an unloaded motor run without a loaded one",

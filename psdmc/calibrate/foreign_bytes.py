@@ -17,6 +17,8 @@ LARGEST_FILE = 2 * 1024**3
 LARGEST_TOML = 256 * 1024
 """Bytes of a campaign or plant: a thousand runs; beyond, the standard library's reader takes seconds."""
 
+WRITE_AGAIN = "record, export or copy it again; the format goes by the file's ending"
+
 
 @contextmanager
 def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
@@ -24,24 +26,24 @@ def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{path}: is not a file")
+            raise InputError(f"{path}: is not a file", "give the path of a file")
         if status.st_size == 0:
-            raise InputError(f"{path}: is empty")
+            raise InputError(f"{path}: is empty", "record or export it again")
         if status.st_size > largest:
             raise InputError(
                 f"{path}: has {status.st_size:,} bytes, expected at most {largest:,}", "cut it into several"
             )
         file = path.open("rb")
     except FileNotFoundError as error:
-        raise InputError(f"{path}: no such file") from error
+        raise InputError(f"{path}: no such file", "check the path") from error
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise InputError(f"{path}: cannot be read: {_reason(error)}") from error
+        raise InputError(f"{path}: cannot be read: {_reason(error)}", "check its path and rights") from error
     with file:
         yield file
 
 
 @contextmanager
-def decoding(name: str, what: str) -> Iterator[None]:
+def decoding(name: str, what: str, hint: str = WRITE_AGAIN) -> Iterator[None]:
     """Whatever a decoder of foreign bytes raises inside becomes "NAME: not WHAT, or damaged: why".
 
     Decoders of damaged bytes fail in many ways (struct.error, KeyError, AssertionError, MemoryError, ...): none of
@@ -55,7 +57,7 @@ def decoding(name: str, what: str) -> Iterator[None]:
     except PsdmcError:
         raise
     except Exception as error:
-        raise InputError(f"{name}: not {what}, or damaged: {_reason(error)}") from error
+        raise InputError(f"{name}: not {what}, or damaged: {_reason(error)}", hint) from error
 
 
 def _reason(error: Exception) -> str:

@@ -103,6 +103,8 @@ class Log:
 def _column(values: object, shape: tuple[int, ...], what: str) -> Array:
     array = np.array(values, dtype=np.float64)
     if array.shape != shape:
-        raise InputError(f"{what} has shape {array.shape}, expected {shape}")
+        raise InputError(
+            f"{what} has shape {array.shape}, expected {shape}", "one row per time, one column per joint"
+        )
     array.setflags(write=False)
     return array

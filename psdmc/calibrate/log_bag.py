@@ -89,7 +89,10 @@ def is_folder(path: Path) -> bool:
 def _require_alike(rows: Sequence[Any], names: tuple[str, ...], path: str) -> None:
     """InputError names the first message that does not fit the first one."""
     if not names or len(names) != len(dict.fromkeys(names)) or 4 * len(names) > LARGEST_COLUMNS:
-        raise InputError(f"{path}: message 1 names {len(names)} joints: {listed([quoted(x) for x in names])}")
+        raise InputError(
+            f"{path}: message 1 names {len(names)} joints: {listed([quoted(x) for x in names])}",
+            "record messages that name every joint once",
+        )
     for k, row in enumerate(rows, start=1):
         if tuple(row.name) != names:
             raise InputError(
@@ -153,10 +156,14 @@ def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
         connection.execute("PRAGMA trusted_schema = OFF")
         connection.set_progress_handler(lambda: 1, STEPS + STEPS_PER_BYTE * path.stat().st_size)
         if connection.execute(tables).fetchone()[0] != 2:
-            raise InputError(f"{path}: not a ROS 2 bag: no tables 'messages' and 'topics'")
+            raise InputError(
+                f"{path}: not a ROS 2 bag: no tables 'messages' and 'topics'",
+                "give a .db3 or .mcap file that ros2 bag recorded, or its folder",
+            )
         for (data,) in connection.execute(query, (topic, MESSAGE_TYPE)):
             if not isinstance(data, bytes):
                 raise InputError(
-                    f"{path}: not a ROS 2 bag: a message is {type(data).__name__}, expected bytes"
+                    f"{path}: not a ROS 2 bag: a message is {type(data).__name__}, expected bytes",
+                    "record the bag again",
                 )
             yield data

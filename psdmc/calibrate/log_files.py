@@ -90,7 +90,9 @@ def _joints(name: str, columns: Mapping[str, Array], prefixes: tuple[str, ...]) 
         if not joint:
             raise InputError(f"{name}: column {quoted(column)} names no joint", f"expected {prefix}.<joint>")
         if joint in found:
-            raise InputError(f"{name}: two columns for joint {joint}: {found[joint]} and {column}")
+            raise InputError(
+                f"{name}: two columns for joint {joint}: {found[joint]} and {column}", "leave one of them out"
+            )
         found[joint] = column
     return found
 
@@ -112,12 +114,17 @@ def _efforts(
     for joint in joints:
         own = [f"{prefix}.{joint}" for prefix in prefixes if f"{prefix}.{joint}" in columns]
         if len(own) > 1:
-            raise InputError(f"{name}: joint {joint} has {' and '.join(own)}: only one can be read")
+            raise InputError(
+                f"{name}: joint {joint} has {' and '.join(own)}: only one can be read", "leave the other out"
+            )
         if own:
             found[joint] = own[0]
     missing = [joint for joint in joints if joint not in found]
     if missing:
-        raise InputError(f"{name}: no column '{kinds[quantity]}.<joint>' for joint(s) {listed(missing)}")
+        raise InputError(
+            f"{name}: no column '{kinds[quantity]}.<joint>' for joint(s) {listed(missing)}",
+            "joints are matched by name: each needs a column",
+        )
     said = any(found[joint].startswith("effort_") for joint in joints)
     notes = (f"{name}: 'effort' is read as motor torque, friction included",) if said else ()
     return quantity, [found[joint] for joint in joints], notes

@@ -20,11 +20,14 @@ def require_mcap_size(path: Path) -> None:
     """InputError where a file's chunks, or its index of them, unpack to more than its size allows."""
     with opened(path) as file:
         if file.read(len(MAGIC)) != MAGIC:
-            raise InputError(f"{path}: not an MCAP file")
+            raise InputError(f"{path}: not an MCAP file", "give a file that ros2 bag recorded")
         sizes = _unpacked(file)
         allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file.seek(0, 2))
     if max(sizes.values()) > allowed:
-        raise InputError(f"{path}: unpacks to {max(sizes.values()):,} bytes, expected at most {allowed:,}")
+        raise InputError(
+            f"{path}: unpacks to {max(sizes.values()):,} bytes, expected at most {allowed:,}",
+            "record the bag again without compression, or cut it into several",
+        )
 
 
 def _unpacked(file: BinaryIO) -> dict[int, int]:

@@ -61,7 +61,7 @@ def simulate_campaign(
     """
     plant = Path(plant)
     if not 0 <= options.seed <= LARGEST_SEED:
-        raise InputError(f"seed is {options.seed}, expected 0 to {LARGEST_SEED}")
+        raise InputError(f"seed is {options.seed}, expected 0 to {LARGEST_SEED}", "give another --seed")
     robot = load_virtual_robot(plant, ideal_sensors=options.ideal_sensors, harness=options.harness)
     runs = listed_runs(campaign)
     root = Path(campaign) if is_folder(Path(campaign)) else Path(campaign).parent
@@ -87,7 +87,10 @@ def _require_runs(runs: Sequence[ListedRun], root: Path, campaign: str) -> None:
     """InputError where a run has no motion, or its log would be written outside the campaign or over another's."""
     missing = [run.name for run in runs if run.trajectory is None]
     if missing:
-        raise InputError(f"{campaign}: run(s) {listed(missing)} name no trajectory to simulate")
+        raise InputError(
+            f"{campaign}: run(s) {listed(missing)} name no trajectory to simulate",
+            'give each run its trajectory = "..."',
+        )
     outside = [str(run.log) for run in runs if not run.log.resolve().is_relative_to(root.resolve())]
     if outside:
         raise InputError(
@@ -112,7 +115,8 @@ def _require_robot(run: ListedRun, robot: VirtualRobot, plant: Path) -> None:
     if sliding != robot.sliding:
         raise InputError(
             f"{run.trajectory}: joint(s) {listed(sliding) or 'none'} slide, "
-            f"of {plant.name} {listed(robot.sliding) or 'none'}"
+            f"of {plant.name} {listed(robot.sliding) or 'none'}",
+            "the campaign is another robot's: plan one with `psdmc excite` from this robot's model",
         )
 
 

@@ -45,7 +45,10 @@ def _column(values: Any, column: str, name: str) -> Array:
             "a log in npz form has one array per column: time_s, position_rad.<joint>, ...",
         )
     if values.dtype.kind not in NUMBERS:
-        raise InputError(f"{name}: column {quoted(column)} holds {values.dtype}, expected numbers")
+        raise InputError(
+            f"{name}: column {quoted(column)} holds {values.dtype}, expected numbers",
+            "write the column as numbers",
+        )
     return np.asarray(values, dtype=np.float64)
 
 

@@ -37,7 +37,7 @@ def columns_from_csv(data: bytes, name: str) -> dict[str, Array]:
     _require_header(names, name)
     require_names(names, name)
     if not body.strip():
-        raise InputError(f"{name}: no rows under its header")
+        raise InputError(f"{name}: no rows under its header", "record or export it again")
     require_size(body.count("\n") + 1, len(names), len(data), name)
     body = _with_points(body, separator, name)
     values = _numbers(body, separator)
@@ -77,7 +77,9 @@ def _header_and_body(text: str, name: str) -> tuple[int, str, str]:
     stripped = text.lstrip("\n")
     header, _, body = stripped.partition("\n")
     if not header.strip():
-        raise InputError(f"{name}: holds no table")
+        raise InputError(
+            f"{name}: holds no table", "the first line names the columns: time_s,position_rad.<joint>,..."
+        )
     return len(text) - len(stripped) + 1, header, body
 
 
@@ -136,13 +138,18 @@ def _first_fault(body: str, names: Sequence[str], separator: str, first: int, na
         try:
             cells = _cells(line, separator)
         except csv.Error as error:
-            return InputError(f"{name}: line {number}: {error}")
+            return InputError(
+                f"{name}: line {number}: {error}", "export it as plain numbers separated by commas"
+            )
         if len(cells) != len(names):
-            return InputError(f"{name}: line {number} has {len(cells)} cells under {len(names)} names")
+            return InputError(
+                f"{name}: line {number} has {len(cells)} cells under {len(names)} names",
+                "each line has one cell per column",
+            )
         for column, cell in zip(names, cells, strict=True):
             if not _is_number(cell):
                 return _no_number(name, number, column, cell)
-    return InputError(f"{name}: not a table of numbers")
+    return InputError(f"{name}: not a table of numbers", "export it as plain numbers separated by commas")
 
 
 def _no_number(name: str, line: int, column: str, cell: str) -> InputError:

@@ -62,12 +62,15 @@ def _kind(path: Path) -> str:
 
 def _require_equal(columns: Mapping[str, Array], name: str) -> None:
     if not columns:
-        raise InputError(f"{name}: holds no columns")
+        raise InputError(f"{name}: holds no columns", "record or export it again")
     lengths = {column: len(values) for column, values in columns.items()}
     first = next(iter(lengths))
     odd = [f"{quoted(column)} has {count}" for column, count in lengths.items() if count != lengths[first]]
     if odd:
-        raise InputError(f"{name}: column {quoted(first)} has {lengths[first]} rows, but {listed(odd)}")
+        raise InputError(
+            f"{name}: column {quoted(first)} has {lengths[first]} rows, but {listed(odd)}",
+            "all columns have one value per row",
+        )
     require_size(lengths[first], len(columns), 8 * lengths[first] * len(columns), name)
 
 

@@ -25,7 +25,10 @@ def require_size(rows: int, columns: int, file_bytes: int, name: str) -> None:
     found, most = (rows, columns), (LARGEST_ROWS, LARGEST_COLUMNS)
     for what, count, largest in zip(("rows", "columns"), found, most, strict=True):
         if count > largest:
-            raise InputError(f"{name}: {count:,} {what}, expected at most {largest:,}")
+            raise InputError(
+                f"{name}: {count:,} {what}, expected at most {largest:,}",
+                "cut it into several, or leave columns out",
+            )
     if rows * columns > LARGEST_VALUES:
         raise InputError(
             f"{name}: {rows:,} rows of {columns} columns, expected at most {LARGEST_VALUES:,} numbers",
@@ -39,7 +42,8 @@ def require_unpacked(size: int, file_bytes: int, name: str) -> None:
     allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file_bytes)
     if size > allowed:
         raise InputError(
-            f"{name}: {file_bytes:,} bytes that unpack to {size:,}, expected at most {allowed:,}"
+            f"{name}: {file_bytes:,} bytes that unpack to {size:,}, expected at most {allowed:,}",
+            "write it again without packing",
         )
 
 
@@ -48,7 +52,9 @@ def require_names(names: Sequence[str], name: str) -> None:
     require_size(0, len(names), 0, name)
     twice = [quoted(column) for column, count in Counter(names).items() if count > 1]
     if twice:
-        raise InputError(f"{name}: column(s) named twice: {listed(twice)}")
+        raise InputError(f"{name}: column(s) named twice: {listed(twice)}", "leave one of each out")
     odd = [quoted(column) for column in names if not column.isprintable()]
     if odd:
-        raise InputError(f"{name}: control characters in the name of column(s) {listed(odd)}")
+        raise InputError(
+            f"{name}: control characters in the name of column(s) {listed(odd)}", "rename the column"
+        )

@@ -31,15 +31,19 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 def toml_content(data: bytes, name: str, what: str) -> dict[str, Any]:
     """The content of a TOML file's bytes."""
     if data.startswith(_ZIP):
-        raise InputError(f"{name}: is a zip or npz file, such as a model: expected {what}")
+        raise InputError(
+            f"{name}: is a zip or npz file, such as a model: expected {what}", "give the text file"
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{name}: is no text in UTF-8: expected {what}") from error
+        raise InputError(f"{name}: is no text in UTF-8: expected {what}", "save it as UTF-8") from error
     longest = max((len(line) for line in text.split("\n")), default=0)
     if longest > LONGEST_LINE:
-        raise InputError(f"{name}: a line of {longest:,} characters, expected at most {LONGEST_LINE:,}")
-    with decoding(name, "TOML"):
+        raise InputError(
+            f"{name}: a line of {longest:,} characters, expected at most {LONGEST_LINE:,}", "break the line"
+        )
+    with decoding(name, "TOML", "correct it where it says"):
         return tomllib.loads(text.replace("\r\n", "\n"))
 
 

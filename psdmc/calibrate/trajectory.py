@@ -71,16 +71,23 @@ def read_trajectory(path: str | Path) -> Trajectory:
     listed_columns = ["time_s", *(column for part in wanted for column in part)]
     missing = [column for column in listed_columns if column not in columns]
     if missing or not names:
-        raise InputError(f"{path}: no column(s) {listed(missing) or 'position_rad.<joint>'}")
+        raise InputError(
+            f"{path}: no column(s) {listed(missing) or 'position_rad.<joint>'}",
+            "a trajectory has time_s and position, velocity and acceleration of each joint, as `psdmc excite` writes them",
+        )
     for column in listed_columns:
         odd = np.flatnonzero(~(np.abs(columns[column]) < LARGEST_NUMBER))
         if len(odd):
             raise InputError(
-                f"{path}: column '{column}', row {odd[0] + 1}: {columns[column][odd[0]]:g} is no motion"
+                f"{path}: column '{column}', row {odd[0] + 1}: {columns[column][odd[0]]:g} is no motion",
+                "correct the row",
             )
     steps = np.diff(columns["time_s"])
     if len(steps) < 2 or not steps[0] > 0 or np.abs(steps - steps[0]).max() > 1e-6 * steps[0] + 1e-9:
-        raise InputError(f"{path}: a trajectory needs evenly spaced, growing times")
+        raise InputError(
+            f"{path}: a trajectory needs evenly spaced, growing times",
+            "sample the motion at one rate, from the start on",
+        )
     q, qd, qdd = (np.column_stack([columns[column] for column in part]) for part in wanted)
     return Trajectory(names, columns["time_s"] - columns["time_s"][0], q, qd, qdd, sliding)
 

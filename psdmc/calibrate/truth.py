@@ -60,7 +60,8 @@ def compare(record: Calibration, true_model: DynamicsModel, robot: VirtualRobot)
     unknown = [row.joint for row in (*record.motors, *record.friction) if row.joint not in joints]
     if unknown:
         raise InputError(
-            f"{robot.name}: not the robot that was calibrated: it has no joint {listed(unknown)}"
+            f"{robot.name}: not the robot that was calibrated: it has no joint {listed(unknown)}",
+            "compare with the plant that the logs are of",
         )
     error = np.array([row.value for row in record.parameters]) - truth
     constants = [_relative(row.value, joints[row.joint].torque_constant) for row in record.motors]

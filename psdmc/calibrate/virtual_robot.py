@@ -75,8 +75,10 @@ def load_virtual_robot(
     """
     plant = read_plant(Path(path))
     if harness and plant.harness is None:
-        raise InputError(f"{path}: no [harness] in this file")
-    with decoding(str(path), "a robot that Pinocchio takes"):
+        raise InputError(
+            f"{path}: no [harness] in this file", "leave --harness out, or add a [harness] to the plant"
+        )
+    with decoding(str(path), "a robot that Pinocchio takes", "correct the robot's file"):
         model, tip = _pinocchio_model(plant.robot)
     sensors = Sensors() if ideal_sensors else plant.sensors
     held = plant.harness if harness else None
@@ -206,7 +208,10 @@ def _friction(joint: JointTruth, trajectory: Trajectory, k: int, delay: float) -
             full_output=True,
         )
     if told["message"] != "Integration successful.":
-        raise InputError(f"joint {joint.name}: its friction cannot be integrated: {told['message']}")
+        raise InputError(
+            f"joint {joint.name}: its friction cannot be integrated: {told['message']}",
+            "give the joint a friction that changes more slowly: a larger stribeck_velocity or a smaller stiffness",
+        )
     torque = [
         _friction_torque(joint, speed(t), float(z)) for t, z in zip(grid.tolist(), bend[:, 0], strict=True)
     ]

@@ -79,7 +79,9 @@ def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
             if not OWN_NAME.fullmatch(name) or digest_of(root, name) != value
         ]
     except OSError as error:
-        raise InputError(f"{error.filename or root}: cannot be read: {error.strerror}") from error
+        raise InputError(
+            f"{error.filename or root}: cannot be read: {error.strerror}", "check its rights"
+        ) from error
     return edited if entries else None
 
 

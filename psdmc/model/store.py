@@ -153,7 +153,10 @@ def _read(source: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
 def _bytes_of(source: Path) -> bytes:
     try:
         if source.stat().st_size > LARGEST:
-            raise InputError(f"{source}: larger than any model file ({LARGEST >> 30} GiB)")
+            raise InputError(
+                f"{source}: larger than any model file ({LARGEST >> 30} GiB)",
+                "give a file that psdmc derive wrote",
+            )
         return source.read_bytes()
     except FileNotFoundError as error:
         raise InputError(f"{source}: no such file", "psdmc derive ROBOT -o MODEL.npz makes one") from error

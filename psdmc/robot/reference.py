@@ -159,7 +159,10 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     others = [k for k in range(1, whole.njoints) if whole.names[k] not in wanted]
     model = pinocchio.buildReducedModel(whole, others, pinocchio.neutral(whole)) if others else whole
     if list(model.names)[1:] != wanted:
-        raise InputError(f"{loaded.source_name}: Pinocchio finds joints {list(model.names)[1:]}")
+        raise InputError(
+            f"{loaded.source_name}: Pinocchio finds joints {list(model.names)[1:]}",
+            "give the joints names that differ from those of the links",
+        )
     for k, name in enumerate(chain.joint_names, start=1):
         model.names[k] = name
     root_gravity = loaded.options.gravity

@@ -118,12 +118,18 @@ class CompiledRobot:
             return np.broadcast_shapes(*(array.shape for array in arrays))
         except ValueError:
             shapes = ", ".join(f"{v} {array.shape}" for v, array in zip(kernel.inputs, arrays, strict=True))
-            raise InputError(f"{kernel.name}: shapes do not broadcast: {shapes}") from None
+            raise InputError(
+                f"{kernel.name}: shapes do not broadcast: {shapes}",
+                "give arrays of one shape, or shapes that NumPy broadcasts",
+            ) from None
 
     def _parameters(self, name: str, theta_b: ArrayLike) -> Array:
         array = np.ascontiguousarray(theta_b, self._dtype)
         if array.shape != (self._l,):
-            raise InputError(f"{name}: theta_b has shape {array.shape}, expected ({self._l},)")
+            raise InputError(
+                f"{name}: theta_b has shape {array.shape}, expected ({self._l},)",
+                "give one value per base parameter",
+            )
         return array
 
     def _address(self, array: Array) -> Any:

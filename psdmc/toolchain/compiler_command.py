@@ -112,7 +112,10 @@ def attempt(words: Sequence[str], what: str, cwd: str | None = None) -> subproce
             words, cwd=cwd, capture_output=True, text=True, errors="replace", timeout=SECONDS, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise ToolchainError(f"{what}: {words[0]} could not be run: {error}") from error
+        raise ToolchainError(
+            f"{what}: {words[0]} could not be run: {error}",
+            "check that the program works when it is started by hand",
+        ) from error
 
 
 def failure(words: Sequence[str], what: str, done: subprocess.CompletedProcess[str]) -> ToolchainError:

@@ -68,8 +68,8 @@ def write_files(folder: Path) -> None:
     write_log(log(*FIT_TO_USE), folder / "log.csv")
     write_log(log(*SHORT), folder / "log.npz")
     (folder / "campaign" / "campaign.toml").write_text(text("campaign.toml"), encoding="utf-8")
-    for suffix in (".csv", ".npz"):
-        write_log(log(*SHORT, "current"), folder / "campaign" / "logs" / f"short{suffix}")
+    for name in ("motor.csv", "motor_loaded.npz", "gravity.csv", "friction.csv", "inertial.parquet"):
+        write_log(log(*SHORT, "current"), folder / "campaign" / "logs" / name)
     write_trajectory(trajectory(), folder / "campaign" / "trajectories" / "short.csv")
 
 

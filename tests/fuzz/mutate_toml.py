@@ -25,9 +25,21 @@ def mutate_toml(data: bytes, rng: Random) -> bytes:
 
 
 def toml_text(table: Any) -> str:
-    """The values as TOML, one line per key of the root; what TOML cannot hold is written as a text."""
+    """The values as TOML, one line per key of the root and of its tables; what TOML cannot hold is written as a text."""
     if not isinstance(table, dict):
         return f"value = {_value(table)}\n"
+    plain, below = [], []
+    for key, value in table.items():
+        if isinstance(value, dict):
+            below.append(f"[{_quoted(str(key))}]\n{_lines(value)}")
+        elif isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
+            below += [f"[[{_quoted(str(key))}]]\n{_lines(row)}" for row in value]
+        else:
+            plain.append(_lines({key: value}))
+    return "".join([*plain, *below])
+
+
+def _lines(table: dict[Any, Any]) -> str:
     return "".join(f"{_quoted(str(key))} = {_value(value)}\n" for key, value in table.items())
 
 
@@ -41,7 +53,7 @@ def _value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_quoted(str(k))} = {_value(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(_lines(value).splitlines()) + "}"
     return _quoted("null" if value is None else str(value))
 
 

@@ -87,7 +87,7 @@ def _seeds(own: Path) -> dict[str, list[bytes]]:
         "bag": [(own / "bag" / "metadata.yaml").read_bytes()],
         "trajectory": [_trajectory(own)],
         "campaign": [text("campaign.toml").encode()],
-        "simulated": [json.dumps({"short.csv": "0" * 64, "short.npz": "1" * 64}).encode(), b"{}"],
+        "simulated": [json.dumps({"motor.csv": "0" * 64, "gravity.csv": "1" * 64}).encode(), b"{}"],
         "plant": [
             text("plant.toml").encode(),
             *(path.read_bytes().replace(b"../robots/", b"") for path in plants),

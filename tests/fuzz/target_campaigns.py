@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fixtures import text, trajectory
 
-from psdmc.calibrate.campaign import listed_runs, read_campaign
+from psdmc.calibrate.campaign_file import listed_runs, read_campaign
 from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibrate.virtual_robot import load_virtual_robot, simulate
 

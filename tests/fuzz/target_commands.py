@@ -12,7 +12,7 @@ from mutate_argv import words_of
 from outcome import BrokenRule, innermost, refusal
 
 from psdmc.cli import main
-from psdmc.errors import PsdmcError
+from psdmc.errors import InputError, PsdmcError
 
 USAGE = 2
 STATUSES = (0, 2, 3, 4, 5)
@@ -72,3 +72,6 @@ def _ended(left: SystemExit, told: str) -> None:
             raise BrokenRule(found.kind, found.where, found.said)
         if len(told.splitlines()) != 2:
             raise BrokenRule("NotTwoLines", innermost(cause), told)
+        raise cause
+    if status == USAGE:
+        raise InputError("usage: " + " ".join(told.split()), "typer says it in lines of its own")
