@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -28,8 +29,20 @@ def columns_from_npz(file: BinaryIO, name: str) -> dict[str, Array]:
         require_unpacked(sum(member.file_size for member in members), _size(file), name)
         names = [member.filename.removesuffix(".npy") for member in members]
         require_names(names, name)
-        stored = [np.lib.format.read_array(io.BytesIO(archive.read(member))) for member in members]
+        stored = [_array(archive.read(member)) for member in members]
         return {column: _column(values, column, name) for column, values in zip(names, stored, strict=True)}
+
+
+def _array(content: bytes) -> Any:
+    """A member's array; ValueError where its head names more numbers than follow, for which NumPy would make room."""
+    stream = io.BytesIO(content)
+    is_first = np.lib.format.read_magic(stream) == (1, 0)
+    read_header = np.lib.format.read_array_header_1_0 if is_first else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read_header(stream)
+    claimed, found = math.prod(shape) * dtype.itemsize, len(content) - stream.tell()
+    if claimed > found:
+        raise ValueError(f"an array of {claimed:,} bytes, of which {found:,} are there")
+    return np.lib.format.read_array(io.BytesIO(content))
 
 
 def npz_names(file: BinaryIO, name: str) -> tuple[str, ...]:

@@ -129,6 +129,16 @@ def test_a_small_npz_file_that_unpacks_to_gigabytes_is_refused(tmp_path: Path):
     assert "unpack to" in refused(path)
 
 
+def test_an_npz_head_that_names_more_numbers_than_follow_is_refused_before_they_get_room(tmp_path: Path):
+    path = tmp_path / "run.npz"
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)})
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("time_s.npy", header.getvalue() + b"\0" * 64)
+
+    assert "an array of 8,000,000,000,000 bytes, of which 64 are there" in refused(path)
+
+
 def test_parquet_with_text_dates_or_nulls(tmp_path: Path):
     pyarrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")
@@ -146,6 +156,20 @@ def test_an_mcap_file_that_claims_to_unpack_to_gigabytes_is_refused_unread(tmp_p
     (tmp_path / "run.mcap").write_bytes(MAGIC + b"\x06" + struct.pack("<Q", len(chunk)) + chunk)
 
     assert "unpacks to 1,099,511,627,776 bytes" in refused(tmp_path / "run.mcap")
+
+
+def test_an_mcap_record_longer_than_its_file_is_refused_unread(tmp_path: Path):
+    (tmp_path / "run.mcap").write_bytes(MAGIC + b"\x01" + struct.pack("<Q", 2**40) + b"ros2")
+
+    assert "a record of 1,099,511,627,776 bytes at byte 8 of 21" in refused(tmp_path / "run.mcap")
+
+
+def test_an_mcap_footer_that_leads_astray_is_refused_unread(tmp_path: Path):
+    head, footer = b"\x01" + struct.pack("<Q", 4) + b"ros2", struct.pack("<QQI", 11, 0, 0)
+    content = MAGIC + head + b"\x02" + struct.pack("<Q", len(footer)) + footer + MAGIC
+    (tmp_path / "run.mcap").write_bytes(content)
+
+    assert "its summary is not where its footer says" in refused(tmp_path / "run.mcap")
 
 
 def bag(path: Path, *statements: str) -> Path:
