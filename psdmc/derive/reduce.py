@@ -28,6 +28,10 @@ CLEAR = 0.5**10
 NOISE = 1e-13
 """Share that rounding alone can leave, in double. What lies between this and CLEAR is a nearly dependent column."""
 
+FAIR_ENTRY = 1e4
+"""Entries of the echelon form, lengths in the robot's unit, of a well-conditioned robot are smaller. A column that is small
+as a whole can be independent by all of itself, and others are then large multiples of it."""
+
 ECHELON_TOLERANCE = 1e-12
 """Smaller entries of the echelon form are zero, lengths in the robot's unit. Rounding leaves less than
 1e-13."""
@@ -104,4 +108,5 @@ def _back_substituted(rows: Array, pivots: NDArray[np.int64], is_clear: bool) ->
     echelon[np.abs(echelon) < ECHELON_TOLERANCE * largest] = 0.0
     echelon[:, pivots] = np.eye(len(pivots))
     order = np.argsort(pivots)
-    return Reduction(pivots[order], echelon[order], is_clear)
+    is_fair = bool(np.abs(echelon).max(initial=0.0) <= FAIR_ENTRY)
+    return Reduction(pivots[order], echelon[order], is_clear and is_fair)

@@ -61,6 +61,10 @@ FAIR_GROWTH = 1e3
 """Carriers' values may be this many times theta_b, lengths in the chain's unit, before they are chosen more carefully:
 nearly parallel axes make columns that are small or nearly equal, whose differences would be lost in double."""
 
+MISS = 1e-13
+"""Share of the longest of the model's columns by which carriers may miss any: rounding leaves 1e-15. Their rank was not
+decided well where they miss more."""
+
 EFFECT = 1e-15
 """Share of the longest column, lengths in the chain's unit, that a carrier adds at least where chosen so."""
 
@@ -201,7 +205,7 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     both = np.hstack([samples, target])
     space = CarrierSpace(compact, Tableau.of(both, basis), whole)
     units = _units(reframed, representative)
-    if rank >= len(whole) and _growth(space, units) <= FAIR_GROWTH:
+    if rank >= len(whole) and _is_fair(space, samples, target, units):
         return space
     return _careful_space(samples, target, units[0])
 
@@ -222,12 +226,15 @@ def _careful_space(samples: Long, target: Long, units: Array) -> CarrierSpace:
     return CarrierSpace(rows[:, :count].astype(np.float64), tableau, whole, careful)
 
 
-def _growth(space: CarrierSpace, units: tuple[Array, Array]) -> float:
-    """Largest multiple of theta_b among the values of the first carriers that come to mind, in the chain's unit."""
-    start = space.lightest([WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)])
+def _is_fair(space: CarrierSpace, samples: Long, target: Long, units: tuple[Array, Array]) -> bool:
+    """Whether the first carriers that come to mind give the model's columns, and are no large multiples of theta_b in the
+    chain's unit."""
+    start = list(space.lightest([WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]))
+    transfer = space.transfer(start)
+    missed = np.abs(times(samples[:, start], transfer) - target).max(initial=0.0)
     carriers, parameters = units
-    multiples = space.transfer(start) * parameters / carriers[list(start), None]
-    return float(np.abs(multiples).max(initial=0.0))
+    growth = np.abs(transfer * parameters / carriers[start, None]).max(initial=0.0)
+    return bool(growth <= FAIR_GROWTH and missed <= MISS * space.whole.max(initial=0.0))
 
 
 def _units(reframed: Reframed, representative: Array) -> tuple[Array, Array]:

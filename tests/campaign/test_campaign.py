@@ -18,6 +18,19 @@ def test_a_random_robot(seed: int) -> None:
     assert failures(measured(seed, STATES, lowered=False)) == {}
 
 
+@pytest.mark.parametrize("seed", [453, 989])
+def test_robots_that_the_campaign_found(seed: int) -> None:
+    """989: a column of size 1e-9 as a pivot, E and P off by 5e-11."""
+    assert failures(measured(seed, STATES, lowered=False)) == {}
+
+
+def test_a_robot_whose_carriers_the_campaign_found_wrong(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """2035: 25 carriers by singular values where there are 24, and a PROGRAM off by 2.5e-10."""
+    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("campaign_measure.WHAT_IS_COMPILED", ())
+    assert failures(measured(2035, STATES, lowered=True)) == {}
+
+
 def test_a_random_robot_lowered_and_compiled(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
     seed = next(seed for seed in SEEDS if len(random_robot(seed).joints) == 2)

@@ -12,6 +12,7 @@ from psdmc.derive.derive import derive_model
 from psdmc.derive.expand import EXTENDED, IN_DOUBLE, precision_for
 from psdmc.derive.extended import extended, has_small_entries, orthonormal
 from psdmc.derive.interpolate import DOUBLE, interpolation, nodes, quadratic_basis
+from psdmc.derive.reduce import reduced
 from psdmc.derive.sampled import reduction_of, sampled_reduction
 from psdmc.derive.units import scaled
 from psdmc.robot.chain import JointKind
@@ -38,6 +39,13 @@ def test_coefficients_stay_small_where_axes_are_nearly_parallel() -> None:
     for tilt in (1e-7, 1e-5, 1e-3):
         for seed in range(8):
             assert np.abs(derive_model(tilted_chain(seed, "RRR", tilt), expand=False).B).max() < 10.0
+
+
+def test_a_small_column_is_not_clear() -> None:
+    """Column 0 is independent by all of itself, and column 1 would be 1e9 times as much of it."""
+    rows = np.array([[1e-9, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    assert not reduced(rows).is_clear
+    assert reduced(rows * [1e9, 1.0, 1.0]).is_clear
 
 
 def test_bundled_robots_are_decided_in_double() -> None:
