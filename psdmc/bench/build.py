@@ -42,7 +42,9 @@ def built(
             (folder / path).write_text(text)
         run(command, product, str(folder))
         if not (folder / product).is_file():
-            raise ToolchainError(f"{product}: {Path(command[0]).name} made no such file")
+            raise ToolchainError(
+                f"{product}: {Path(command[0]).name} made no such file", "run the build by hand to see why"
+            )
 
     return produced(build, sources, ("bench", product, *command, *depends)) / product
 

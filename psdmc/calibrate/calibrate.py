@@ -71,7 +71,7 @@ def calibrate(
     regressor = regressor or ChainRegressor(model)
     paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
     if not paths:
-        raise InputError("no log to calibrate from")
+        raise InputError("no log to calibrate from", "give a campaign's folder, or logs")
     campaigns = [path for path in paths if is_campaign(path)]
     if campaigns and len(paths) > 1:
         raise InputError(

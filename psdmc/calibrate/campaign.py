@@ -65,10 +65,11 @@ class CampaignOptions:
     def __post_init__(self) -> None:
         if self.acceleration is not None and not 0 < self.acceleration <= LARGEST_ACCELERATION:
             raise InputError(
-                f"acceleration is {self.acceleration:g}, expected more than 0, at most {LARGEST_ACCELERATION:g}"
+                f"acceleration is {self.acceleration:g}, expected more than 0, at most {LARGEST_ACCELERATION:g}",
+                "in rad/s^2, or m/s^2 where a joint slides",
             )
         if f".{self.table}" not in TABLES:
-            raise InputError(f"table is {self.table!r}, expected csv, npz or parquet")
+            raise InputError(f"table is {self.table!r}, expected csv, npz or parquet", "choose one of these")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

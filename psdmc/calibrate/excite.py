@@ -80,7 +80,10 @@ class ExciteOptions:
         )
         for what, value, low, high in bounds:
             if not low <= value <= high:
-                raise InputError(f"exciting motion: {what} is {value:g}, expected {low:g} to {high:g}")
+                raise InputError(
+                    f"exciting motion: {what} is {value:g}, expected {low:g} to {high:g}",
+                    "choose a value in that range",
+                )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

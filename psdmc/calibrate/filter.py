@@ -34,7 +34,8 @@ class FilterOptions:
     def __post_init__(self) -> None:
         if not SMALLEST_CUTOFF <= self.cutoff <= LARGEST_CUTOFF:
             raise InputError(
-                f"cut-off is {self.cutoff:g} Hz, expected {SMALLEST_CUTOFF:g} to {LARGEST_CUTOFF:g} Hz"
+                f"cut-off is {self.cutoff:g} Hz, expected {SMALLEST_CUTOFF:g} to {LARGEST_CUTOFF:g} Hz",
+                "choose a value in that range",
             )
 
 
@@ -95,7 +96,8 @@ class LowPass:
         nyquist = 0.5 / period
         if options.cutoff >= nyquist:
             raise InputError(
-                f"cut-off {options.cutoff:g} Hz is not below half the sampling rate, {nyquist:g} Hz"
+                f"cut-off {options.cutoff:g} Hz is not below half the sampling rate, {nyquist:g} Hz",
+                "filter lower, or sample faster",
             )
         return LowPass(signal.butter(options.order, options.cutoff, fs=1.0 / period, output="sos"))
 
@@ -123,7 +125,8 @@ def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None
     use[margin : len(time) - margin] = True
     if not use.any():
         raise InputError(
-            f"{log.name}: too short: {log.duration:.3g} s leave nothing after the {options.cutoff:g} Hz filter settled"
+            f"{log.name}: too short: {log.duration:.3g} s leave nothing after the {options.cutoff:g} Hz filter settled",
+            "record a longer run",
         )
     noise = np.where(still, 0.0, noise)
     return States(time, period, q, qd, qdd, low_pass(effort), use, low_pass, options.cutoff, noise, still)

@@ -88,7 +88,10 @@ def prepared(
 def _require_alone(run: FrictionRun, chain: Chain, k: int, states: States) -> None:
     rms = np.sqrt(np.mean(states.qd**2, axis=0))
     if rms[k] == 0:
-        raise InputError(f"{run.log.name}: joint {run.joint} stands still: its friction cannot be seen")
+        raise InputError(
+            f"{run.log.name}: joint {run.joint} stands still: its friction cannot be seen",
+            "move that joint in its friction runs",
+        )
     others = [name for j, name in enumerate(chain.joint_names) if j != k and rms[j] > 0.05 * rms[k]]
     if others:
         raise InputError(

@@ -43,9 +43,15 @@ class Lugre:
     def __post_init__(self) -> None:
         positive = (self.coulomb, self.stribeck_velocity, self.viscous_exponent, self.stiffness)
         if not all(value > 0 for value in positive):
-            raise InputError(f"LuGre parameters {self}: F_c, v_s, d_v and sigma_0 must be positive")
+            raise InputError(
+                f"LuGre parameters {self}: F_c, v_s, d_v and sigma_0 must be positive",
+                "correct the parameters",
+            )
         if self.static < self.coulomb or self.viscous < 0 or self.damping < 0:
-            raise InputError(f"LuGre parameters {self}: expected F_s >= F_c, F_v >= 0 and sigma_1 >= 0")
+            raise InputError(
+                f"LuGre parameters {self}: expected F_s >= F_c, F_v >= 0 and sigma_1 >= 0",
+                "correct the parameters",
+            )
 
     def as_array(self) -> Array:
         """(7,) in the order of the fields."""

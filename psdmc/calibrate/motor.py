@@ -117,7 +117,10 @@ def _added(chain: Chain, k: int, run: MotorRun, options: StepOptions) -> tuple[A
     low = max(unloaded[0][0], loaded[0][0])
     high = min(unloaded[0][-1], loaded[0][-1])
     if not high > low:
-        raise InputError(f"{run.loaded.name}: joint {run.joint}: loaded and unloaded sweeps do not overlap")
+        raise InputError(
+            f"{run.loaded.name}: joint {run.joint}: loaded and unloaded sweeps do not overlap",
+            "sweep the joint through the same range with and without the load",
+        )
     count = min(len(unloaded[0]), len(loaded[0]))
     angle = np.linspace(low, high, count)
     current = np.interp(angle, *loaded[:2]) - np.interp(angle, *unloaded[:2])
@@ -130,7 +133,10 @@ def _both_ways(chain: Chain, k: int, log: Log, options: FilterOptions) -> tuple[
     """Angle, current averaged over both directions there, and the pose of the other joints."""
     log = checked(log, chain, options.cutoff)
     if log.quantity != "current":
-        raise InputError(f"{log.name}: torque constants need currents, the log has {log.quantity}")
+        raise InputError(
+            f"{log.name}: torque constants need currents, the log has {log.quantity}",
+            "record motor currents, or leave the motor runs out",
+        )
     states = filtered(log, options)
     speed = states.qd[:, k]
     typical = float(np.median(np.abs(speed[states.use])))

@@ -94,7 +94,10 @@ def single_joint_sweep(chain: Chain, joint: int, pose: Array, options: SweepOpti
     _require_short(chain.joints[joint], "sweep", 2.0 * (high - low) / speed)
     cruise = (high - low) / speed - options.blend
     if cruise <= 0:
-        raise InputError(f"joint {chain.joints[joint].name}: too little range to sweep at {speed:.3g} per s")
+        raise InputError(
+            f"joint {chain.joints[joint].name}: too little range to sweep at {speed:.3g} per s",
+            "widen the joint's limits in the robot's file, or sweep more slowly",
+        )
     blend = options.blend
     pieces = [(blend, 0.0, speed), (cruise, speed, speed), (blend, speed, 0.0)]
     pieces += [(blend, 0.0, -speed), (cruise, -speed, -speed), (blend, -speed, 0.0)]

@@ -107,12 +107,16 @@ def pinocchio_prefix() -> Path:
     """Where the pin wheel keeps headers and libraries; ToolchainError where they, or Eigen's, are not installed."""
     found = find_spec("pinocchio")
     if found is None or found.origin is None:
-        raise ToolchainError("the wheel 'pin' is not installed")
+        raise ToolchainError("the wheel 'pin' is not installed", "pip install pin")
     prefix = next((p for p in Path(found.origin).parents if p.name == "cmeel.prefix"), None)
     if prefix is None or not (prefix / "include/pinocchio").is_dir():
-        raise ToolchainError("this Pinocchio came without C++ headers; the wheel 'pin' has them")
+        raise ToolchainError(
+            "this Pinocchio came without C++ headers; the wheel 'pin' has them", "pip install pin"
+        )
     if not (prefix / "include/eigen3/Eigen/Core").is_file():
-        raise ToolchainError("Eigen's headers are missing; the wheel 'cmeel-eigen' has them")
+        raise ToolchainError(
+            "Eigen's headers are missing; the wheel 'cmeel-eigen' has them", "pip install cmeel-eigen"
+        )
     return prefix
 
 
