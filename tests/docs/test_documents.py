@@ -9,6 +9,9 @@ import pytest
 from blocks import ROOT, blocks, documents, run
 
 from psdmc.cli.commands import app
+from psdmc.cli.measuring import add_commands
+
+add_commands(app)
 
 LINK = re.compile(r"\[[^\]]*\]\(([^)#\s]+)(?:#[^)]*)?\)")
 RUNNABLE = [path for path in documents() if any(b.language in ("pycon", "console") for b in blocks(path))]
@@ -21,7 +24,6 @@ def name(path: Path) -> str:
 @pytest.mark.parametrize("document", RUNNABLE, ids=name)
 def test_blocks_run(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
 
     assert run(document, tmp_path) > 0
 
