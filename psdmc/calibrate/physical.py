@@ -153,8 +153,9 @@ def _require_physical(model: DynamicsModel, x: Array) -> None:
 
 SOLVER_SLACK = 1e-5
 """Of the largest friction or offset: by this much the solver may leave a bound, and it then counts as kept."""
-ROUNDING = 1e-9
-"""Negative eigenvalue of a pseudo-inertia, relative to its largest entry, that counts as zero."""
+ROUNDING = 1e-7
+"""Negative eigenvalue of a pseudo-inertia, relative to its largest entry, that counts as zero: the solver keeps
+constraints to 1e-8. The mass matrix is tested by itself."""
 
 
 def _link_terms(
@@ -169,8 +170,10 @@ def _link_terms(
         constraints.append(x[start + 10] >= options.smallest_drive)
     if not np.any(span[start]):
         return constraints, 0.0
-    held = [k for k in range(4) if not _vanishes(span, start, k)]
+    flat = _flat_rows(span, start)
+    held = [k for k in range(4) if k not in flat and not _vanishes(span, start, k)]
     body = cp.bmat(_pseudo_inertia([x[start + k] for k in range(10)]))
+    constraints += [body[k, :] == 0 for k in flat if not _vanishes(span, start, k)]
     block = body[held, :][:, held] if len(held) < 4 else body
     near, weight = _reference_body(model.chain.parameters[link], held, options)
     divergence = cp.trace(np.linalg.inv(near) @ block) - cp.log_det(block)
@@ -197,6 +200,16 @@ def _reference_body(link: Array, held: list[int], options: PhysicalOptions) -> t
     body = np.array(_pseudo_inertia(link[:10].tolist()))[np.ix_(held, held)]
     values, axes = np.linalg.eigh(body)
     return np.asarray((axes * np.maximum(values, THIN_BODY * values[-1])) @ axes.T), options.known_body
+
+
+def _flat_rows(span: Array, start: int) -> list[int]:
+    """Rows of a pseudo-inertia that are zero in any body that the assumptions allow: a link without moment of inertia
+    about an axis has no extent across it, whatever its other moments are (a rod along x where Ixx is assumed zero)."""
+    rows: set[int] = set()
+    for axis, inertia in enumerate((4, 6, 9)):
+        if not np.any(np.abs(span[start + inertia]) > 1e-12):
+            rows |= {k for k in range(3) if k != axis}
+    return sorted(rows)
 
 
 def _vanishes(span: Array, start: int, k: int) -> bool:
