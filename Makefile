@@ -37,7 +37,7 @@ demo: $(READY) ## derive, emit, build, check and benchmark the bundled Denso VS-
 	$(RUN)/python -m psdmc.bench.demo $(GENERATED)/denso_wall.npz
 
 test: $(READY) ## run all tests
-	$(RUN)/python -m pytest -n $(JOBS) tests
+	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal tests
 
 CAMPAIGN ?= --robots 10000
 campaign: $(READY) ## 10,000 random robots against Pinocchio and MuJoCo, an hour or more of two cores; CAMPAIGN='--robots 500' for less
