@@ -16,8 +16,10 @@ HEAD = struct.Struct("<BQ")
 """Kind and length of a record."""
 FROM_FOOTER = len(MAGIC) + 20
 """Bytes from the footer's content to the end: two places, a checksum, and the magic again."""
-_SIZE_AT = {CHUNK: 16, CHUNK_INDEX: None}
-"""Bytes into a record at which a chunk's unpacked size stands; an index ends with it."""
+CHUNK_HEAD = struct.Struct("<QQQII")
+"""Of a chunk: first and last time, unpacked size, checksum, length of the compression's name; packed size follows it."""
+SIZES = struct.Struct("<QQ")
+"""The end of a chunk's index: packed and unpacked size."""
 
 
 def require_mcap_size(path: Path) -> None:
@@ -26,16 +28,24 @@ def require_mcap_size(path: Path) -> None:
         if file.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{path}: not an MCAP file", "give a file that ros2 bag recorded")
         records = _records(file, path)
-        _require_size(_unpacked(file, records), file.seek(0, 2), path)
+        for kind in (CHUNK, CHUNK_INDEX):
+            _require_size([_claims(file, *record) for record in records if record[0] == kind], file, path)
         _require_summary(file, records, path)
 
 
-def _require_size(sizes: dict[int, int], file_bytes: int, path: Path) -> None:
+def _require_size(claims: list[tuple[int, int]], file: BinaryIO, path: Path) -> None:
+    """`claims`: packed and unpacked sizes of chunks, or those that their index says."""
+    file_bytes = file.seek(0, 2)
+    packed, unpacked = (sum(sizes) for sizes in zip(*claims, strict=True)) if claims else (0, 0)
     allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file_bytes)
-    if max(sizes.values()) > allowed:
+    if unpacked > allowed:
         raise InputError(
-            f"{path}: unpacks to {max(sizes.values()):,} bytes, expected at most {allowed:,}",
+            f"{path}: unpacks to {unpacked:,} bytes, expected at most {allowed:,}",
             "record the bag again without compression, or cut it into several",
+        )
+    if packed > file_bytes:
+        raise InputError(
+            f"{path}: damaged: chunks of {packed:,} bytes in a file of {file_bytes:,}", WRITE_AGAIN
         )
 
 
@@ -57,16 +67,21 @@ def _records(file: BinaryIO, path: Path) -> list[tuple[int, int, int]]:
     return found
 
 
-def _unpacked(file: BinaryIO, records: list[tuple[int, int, int]]) -> dict[int, int]:
-    """Bytes that chunks and their index claim."""
-    total = {CHUNK: 0, CHUNK_INDEX: 0}
-    for kind, place, length in records:
-        if kind in total:
-            at = _SIZE_AT[kind]
-            file.seek(place + HEAD.size + (length - 8 if at is None else at))
-            size = file.read(8)
-            total[kind] += struct.unpack("<Q", size)[0] if len(size) == 8 else 0
-    return total
+def _claims(file: BinaryIO, kind: int, place: int, length: int) -> tuple[int, int]:
+    """Packed and unpacked size that a chunk, or its index, says; none where the record is too short to say it."""
+    start = place + HEAD.size
+    if kind == CHUNK_INDEX:
+        file.seek(start + max(length - SIZES.size, 0))
+        packed, unpacked = SIZES.unpack(file.read(SIZES.size)) if length >= SIZES.size else (0, 0)
+        return packed, unpacked
+    file.seek(start)
+    head = file.read(CHUNK_HEAD.size) if length >= CHUNK_HEAD.size else b""
+    if not head:
+        return 0, 0
+    _, _, unpacked, _, name = CHUNK_HEAD.unpack(head)
+    file.seek(start + CHUNK_HEAD.size + name)
+    size = file.read(8)
+    return struct.unpack("<Q", size)[0] if len(size) == 8 else 0, unpacked
 
 
 def _require_summary(file: BinaryIO, records: list[tuple[int, int, int]], path: Path) -> None:

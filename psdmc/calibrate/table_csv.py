@@ -155,7 +155,8 @@ def _first_fault(body: str, names: Sequence[str], separator: str, first: int, na
 def _no_number(name: str, line: int, column: str, cell: str) -> InputError:
     what = f"{quoted(cell)} is no number" if cell else "the cell is empty"
     decimal = _is_number(cell.replace(",", ".", 1))
-    hint = "decimal commas are read where ';' or tab separates the columns" if decimal else None
+    comma = "decimal commas are read where ';' or tab separates the columns"
+    hint = comma if decimal else "below the header each cell is a number"
     return InputError(f"{name}: line {line}, column {quoted(column)}: {what}", hint)
 
 

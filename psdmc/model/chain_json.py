@@ -106,7 +106,8 @@ def _placement_to_json(placement: Placement) -> dict[str, Any]:
 
 def _placement_from_json(data: object, what: str) -> Placement:
     rotation = numbers(part(data, "rotation", what), f"{what}'s rotation", 3, 3)
-    if not np.allclose(rotation @ rotation.T, np.eye(3), rtol=0.0, atol=ORTHONORMAL):
+    is_small = np.abs(rotation).max() <= 1.0 + ORTHONORMAL  # no entry whose square overflows
+    if not is_small or not np.allclose(rotation @ rotation.T, np.eye(3), rtol=0.0, atol=ORTHONORMAL):
         raise ValueError(f"{what}'s rotation is none")
     return Placement(rotation, numbers(part(data, "translation", what), f"{what}'s translation", 3))
 

@@ -164,6 +164,22 @@ def test_an_mcap_record_longer_than_its_file_is_refused_unread(tmp_path: Path):
     assert "a record of 1,099,511,627,776 bytes at byte 8 of 21" in refused(tmp_path / "run.mcap")
 
 
+@pytest.mark.parametrize(
+    "record",
+    [
+        b"\x06" + struct.pack("<QQQQII", 44, 0, 1, 64, 0, 4) + b"zstd" + struct.pack("<Q", 2**40),
+        b"\x08" + struct.pack("<QQQ", 16, 2**40, 64),
+    ],
+    ids=["chunk", "index"],
+)
+def test_an_mcap_chunk_that_claims_more_bytes_than_its_file_has_is_refused_unread(
+    tmp_path: Path, record: bytes
+):
+    (tmp_path / "run.mcap").write_bytes(MAGIC + record + b"\0" * 40)
+
+    assert "chunks of 1,099,511,627,776 bytes in a file of" in refused(tmp_path / "run.mcap")
+
+
 def test_an_mcap_footer_that_leads_astray_is_refused_unread(tmp_path: Path):
     head, footer = b"\x01" + struct.pack("<Q", 4) + b"ros2", struct.pack("<QQI", 11, 0, 0)
     content = MAGIC + head + b"\x02" + struct.pack("<Q", len(footer)) + footer + MAGIC

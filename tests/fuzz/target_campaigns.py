@@ -58,7 +58,7 @@ def plant_robot(data: bytes, folder: Path, deep: bool) -> None:
 def _simulated(file: Path, deep: bool) -> None:
     robot = load_virtual_robot(file)
     load_virtual_robot(file, harness=True)
-    if deep:
+    if deep and robot.joint_names == trajectory().joint_names:
         simulate(robot, trajectory())
 
 
