@@ -190,7 +190,8 @@ def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[Che
         ),
         ("gravity", "computeGeneralizedGravity", gravity, robot.gravity(q)),
     )
-    checked = [CheckRow(name, against, _error(a, b), TORQUE_LIMIT) for name, against, a, b in pairs]
+    least = NO_TORQUE * float(np.abs(pairs[0][-1]).max(initial=0.0))
+    checked = [CheckRow(name, against, _error(a, b, least), TORQUE_LIMIT) for name, against, a, b in pairs]
     return (*checked, _forward(robot, q, qd, qdd, tau))
 
 
@@ -259,20 +260,25 @@ def _worst(values: Array, expected: Array, bound: Array, share: float = TORQUE_L
     return float(error[joint] / scale[joint]), float(bound[joint] / scale[joint]) + share
 
 
-def _error(values: Array, expected: Array) -> float:
+def _error(values: Array, expected: Array, least: float = 0.0) -> float:
     """Largest difference relative to the largest magnitude, joint by joint; a matrix as one.
 
     A joint that does less than NO_TORQUE of the largest torque, such as one with a vertical axis under
-    gravity, is measured against that largest one.
+    gravity, is measured against that largest one; where all do less than `least`, against `least` / NO_TORQUE.
     """
-    overall = max(float(np.abs(expected).max(initial=0.0)), np.finfo(float).tiny)
     if expected.ndim == 3:
-        return float(np.abs(values - expected).max()) / overall
-    return float((np.abs(values - expected).max(axis=0) / _scales(expected)).max())
+        return float(np.abs(values - expected).max()) / _largest(expected)
+    return float((np.abs(values - expected).max(axis=0) / _scales(expected, least)).max())
 
 
-def _scales(expected: Array) -> Array:
+def _largest(expected: Array) -> float:
+    return max(float(np.abs(expected).max(initial=0.0)), float(np.finfo(float).tiny))
+
+
+def _scales(expected: Array, least: float = 0.0) -> Array:
     """(n,) what each joint's error is measured against."""
-    overall = max(float(np.abs(expected).max(initial=0.0)), np.finfo(float).tiny)
+    overall = _largest(expected)
+    if overall < least:
+        return np.full(expected.shape[-1], least / NO_TORQUE)
     largest = np.abs(expected).max(axis=0)
     return np.where(largest > NO_TORQUE * overall, largest, overall)

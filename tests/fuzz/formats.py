@@ -70,11 +70,11 @@ FORMATS = {
         Format("bag", ".yaml", target_logs.bag, mutate_lines, _TEXT, 0.01, 40, target_logs.set_up_bag),
         Format("trajectory", ".csv", target_logs.trajectory, mutate_csv, _TEXT, 0.04, 1),
         Format("campaign", ".toml", target_campaigns.campaign, mutate_toml, _TEXT, 0.04, 50, target_campaigns.set_up),
-        Format("simulated", ".json", target_campaigns.simulated, mutate_package, _TEXT, 0.005, 1, target_campaigns.set_up),
+        Format("simulated", ".json", target_campaigns.simulated, mutate_package, _TEXT, 0.003, 1, target_campaigns.set_up),
         Format("plant", ".toml", target_campaigns.plant, mutate_toml, _TEXT, 0.05, 20, target_campaigns.set_up),
         Format("plant-robot", ".toml", target_campaigns.plant_robot, mutate_toml, _TEXT, 0.03, 20, target_campaigns.set_up),
         Format("package", ".json", target_packages.package, mutate_package, _TEXT, 0.04, 3),
-        Format("argv", ".json", target_commands.command, mutate_argv, _TEXT, 0.02, 1),
+        Format("argv", ".json", target_commands.command, mutate_argv, _TEXT, 0.012, 1),
     )
 }  # fmt: skip
 

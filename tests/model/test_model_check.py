@@ -9,11 +9,13 @@ import pytest
 from bundled import bundled_model, bundled_robot
 from random_chains import random_chain
 
+from psdmc.compiler import provenance
 from psdmc.derive.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.model.check import check_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import summary, term_texts
+from psdmc.robot.load import load_robot_text
 
 
 @pytest.mark.parametrize("name", ["two_link", "scara", "denso_floor", "kr6", "rounded_arm"])
@@ -21,6 +23,42 @@ def test_bundled_models_pass(name: str) -> None:
     rows = check_model(bundled_model(name))
     assert {row.against for row in rows} >= {"rnea", "crba", "nonLinearEffects", "aba"}
     assert all(row.passed for row in rows), rows
+
+
+UPRIGHT = """
+[[joint]]
+a = 0.4
+alpha = "180 deg"
+[joint.link]
+mass = 2.0
+com = [-0.15, 0.02, 0.1]
+inertia_com = { xx = 0.02, yy = 0.05, zz = 0.05, xy = 0.0, xz = 0.0, yz = 0.0 }
+[[joint]]
+a = 0.3
+[joint.link]
+mass = 1.5
+com = [-0.1, -0.01, 0.0]
+inertia_com = { xx = 0.02, yy = 0.03, zz = 0.03, xy = 0.0, xz = 0.0, yz = 0.0 }
+"""
+"""Two turning joints whose axes gravity follows, one of them upside down by an angle that has no exact sine."""
+
+
+def derived(text: str) -> DynamicsModel:
+    loaded = load_robot_text(text, "dh")
+    return derive_model(loaded.chain, provenance=provenance(loaded))
+
+
+def test_a_gravity_that_is_rounding_alone_is_not_measured_against_itself() -> None:
+    model = derived(UPRIGHT)
+    (row,) = (row for row in check_model(model) if row.name == "gravity")
+    assert not model.gravity(np.full((1, 2), 0.3)).any()
+    assert row.passed
+
+    tilted = derived("gravity = [1e-6, 0.0, -9.81]" + UPRIGHT)
+    (row,) = (
+        row for row in check_model(replace(model, provenance=tilted.provenance)) if row.name == "gravity"
+    )
+    assert not row.passed
 
 
 def test_snapping_is_told_and_bounded() -> None:
