@@ -26,6 +26,10 @@ START = 1.0
 """s below which no worker is begun."""
 
 
+UNGUIDED = 1000
+"""Inputs within which libFuzzer keeps some beside the seeds, unless coverage does not reach it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Budget:
     """What may be spent: inputs, and seconds of wall clock."""
@@ -63,7 +67,14 @@ def run_format(format: Format, budget: Budget, course: Course) -> dict[str, floa
         if recorder.inputs == before:
             raise SystemExit(f"{format.name}: the worker ran nothing: see {folder / 'log'}")
     figures = recorder.figures()
+    if course.engine == "atheris" and figures["inputs"] > UNGUIDED and not _is_guided(folder):
+        raise SystemExit(f"{format.name}: no input reached new code: is psdmc imported uninstrumented?")
     return {**figures, "seconds": round(used, 1), "per_second": round(figures["inputs"] / max(used, 1e-9), 1)}
+
+
+def _is_guided(folder: Path) -> bool:
+    """Whether libFuzzer kept an input beside the seeds."""
+    return any(not path.name.startswith("seed-") for path in (folder / "corpus").iterdir())
 
 
 def _one_worker(format: Format, budget: Budget, course: Course, seed: int, recorder: Recorder) -> None:

@@ -252,3 +252,7 @@ def test_a_run_from_end_to_end(engine: str, tmp_path: Path):
     assert row["success"] > 0
     assert row["InputError"] > 0
     assert row["seconds"] < time.monotonic() - began
+    if engine == "atheris":
+        assert [path for path in (tmp_path / "dh" / "corpus").iterdir() if len(path.name) == 40], (
+            "nothing was guided"
+        )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import contextlib
 import faulthandler
+import importlib
+import pkgutil
 import re
 import shutil
 import sys
@@ -41,11 +43,20 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=60.0)
     given = parser.parse_args()
     if given.engine == "atheris":
-        import atheris
-
-        with atheris.instrument_imports(include=["psdmc"]):
-            import psdmc.cli  # noqa: F401
+        _import_instrumented()
     _work(given)
+
+
+def _import_instrumented() -> None:
+    """All of psdmc, before anything else imports a part of it: what is imported later guides nothing."""
+    import atheris
+
+    with atheris.instrument_imports(include=["psdmc"]):
+        import psdmc
+
+        for module in pkgutil.walk_packages(psdmc.__path__, "psdmc."):
+            if not module.name.endswith("__main__"):
+                importlib.import_module(module.name)
 
 
 def _work(given: argparse.Namespace) -> None:
