@@ -17,8 +17,11 @@ from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
+FRESH = 0.5
+"""Share of libFuzzer's inputs that start from a good seed: what it keeps is small and mostly refused early."""
+
 WANDERING = 0.15
-"""Share of inputs that libFuzzer mutates in its own way instead of by the format's structure."""
+"""Share of the others that libFuzzer mutates in its own way instead of by the format's structure."""
 
 MOST_KEPT = 400
 """Inputs that are kept for mutation because psdmc said something new about them."""
@@ -156,13 +159,15 @@ def _guided(given: argparse.Namespace, one: Callable, mutate: Callable, seeds: l
     """libFuzzer keeps what reaches new code; finds are recorded and do not stop it."""
     import atheris
 
-    corpus = given.state / "corpus"
+    good, corpus = Pool(seeds), given.state / "corpus"
     corpus.mkdir(exist_ok=True)
     for number, data in enumerate(seeds):
         (corpus / f"seed-{number:02d}").write_bytes(data)
 
     def mutator(data: bytes, most: int, seed: int) -> bytes:
         rng = Random(seed)
+        if rng.random() < FRESH:
+            return mutated(good.draw(rng), rng, mutate)[:most]
         if rng.random() < WANDERING:
             return atheris.Mutate(data, most)
         return mutated(data, rng, mutate)[:most]
