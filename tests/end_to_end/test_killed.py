@@ -31,6 +31,9 @@ MANY = os.environ.get("PSDMC_KILLS")
 KILLS = {name: int(MANY or few) for name, few in FEW.items()}
 LATEST = 0.9
 """Of a whole run's time: some are faster than the one that was timed."""
+SOONER = 0.8
+"""The latest moment comes by this much nearer whenever a run ended before its moment: so all kills are reached,
+however uneven the machine is."""
 TRACES = (".psdmc-",)
 """How everything begins that psdmc leaves where it is killed."""
 
@@ -158,10 +161,14 @@ def test_a_killed_command_leaves_nothing_half_done(name: str, root: Path):
     seconds = time.monotonic() - start
     expected_packages["new"] = files_in(reference / "c") if (reference / "c").exists() else {}
 
-    moments, killed = random.Random(name), 0
-    for number in range(KILLS[name]):
+    moments, killed, number, latest = random.Random(name), 0, 0, LATEST * seconds
+    while killed < KILLS[name]:
+        number += 1
         folder = prepared(command, root, str(number))
-        killed += run(command.words, folder, moments.uniform(0.0, LATEST * seconds)) == -9
+        if run(command.words, folder, moments.uniform(0.0, latest)) == -9:
+            killed += 1
+        else:
+            latest *= SOONER
         command.whole(folder)
 
         status = run(command.words, folder)
@@ -173,8 +180,7 @@ def test_a_killed_command_leaves_nothing_half_done(name: str, root: Path):
         assert list(files_in(folder)) == list(files_in(reference)) or name == "build" or is_there
         assert not [path for path in folder.rglob("*") if path.name.startswith(TRACES) and not is_there]
         shutil.rmtree(folder)
-    print(f"{name}: {killed} of {KILLS[name]} runs were killed within {seconds:.2f} s")
-    assert killed >= KILLS[name] / 2
+    print(f"{name}: {killed} of {number} runs were killed within {seconds:.2f} s")
 
 
 def test_the_check_sees_a_half_file(root: Path):
