@@ -155,7 +155,7 @@ def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
     with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
         connection.execute("PRAGMA trusted_schema = OFF")
         connection.set_progress_handler(lambda: 1, STEPS + STEPS_PER_BYTE * path.stat().st_size)
-        if connection.execute(tables).fetchone()[0] != 2:
+        if _count(connection, tables) != 2:
             raise InputError(
                 f"{path}: not a ROS 2 bag: no tables 'messages' and 'topics'",
                 "give a .db3 or .mcap file that ros2 bag recorded, or its folder",
@@ -167,3 +167,11 @@ def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
                     "record the bag again",
                 )
             yield data
+
+
+def _count(connection: sqlite3.Connection, query: str) -> int:
+    """A count; -1 where SQLite says that memory ran out, which it says of some damaged heads at once."""
+    try:
+        return int(connection.execute(query).fetchone()[0])
+    except MemoryError:
+        return -1

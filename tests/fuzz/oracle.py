@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import tomllib
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 from xml.etree.ElementTree import fromstring, tostring
 
@@ -66,7 +69,21 @@ def _urdf_model(text: str) -> Any:
     for link in root.findall("link"):
         for picture in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(picture)
-    return pin.buildModelFromXML(tostring(root, encoding="unicode"))
+    with _quiet():
+        return pin.buildModelFromXML(tostring(root, encoding="unicode"))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """What urdfdom says of a file that it refuses is not psdmc's noise."""
+    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nothing)
 
 
 def _dh_model(text: str) -> Any:

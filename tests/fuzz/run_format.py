@@ -26,6 +26,9 @@ START = 1.0
 """s below which no worker is begun."""
 
 
+ENDED_BY_OTHERS = (-signal.SIGTERM, -signal.SIGINT, -signal.SIGHUP)
+"""Statuses of a worker that no input caused."""
+
 UNGUIDED = 1000
 """Inputs within which libFuzzer keeps some beside the seeds, unless coverage does not reach it."""
 
@@ -88,6 +91,8 @@ def _one_worker(format: Format, budget: Budget, course: Course, seed: int, recor
             words, stdout=log, stderr=log, stdin=subprocess.DEVNULL, env=_environment(course.state)
         )
         status = _watched(process, recorder)
+    if status in ENDED_BY_OTHERS:
+        raise SystemExit(f"{format.name}: the worker was ended from outside")
     if status != 0 and recorder.is_running:
         recorder.lost(died(-status, (folder / "fault").read_text(encoding="utf-8", errors="replace")))
     elif status not in (0, -signal.SIGKILL):
