@@ -14,11 +14,10 @@ from psdmc.emit.options import EmitOptions, Real, Trig
 from psdmc.emit.package import PackageView, package_files, package_view
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError
-from psdmc.lower.kernels import ALL_FUNCTIONS, Lowering, lower
+from psdmc.lower.admitted import require_forward_dynamics
+from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.mass_check import check_mass_matrix
 from psdmc.model.reference_states import reference_states
-from psdmc.program.functions import BY_NAME
 from psdmc.robot.load import LoadedRobot, load_robot
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.call import CompiledRobot
@@ -138,45 +137,6 @@ def _package(
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     return package_view(package_info(model, name, shown), kernels, options, reference_states(model))
-
-
-FORWARD = "forward_dynamics"
-
-
-def require_forward_dynamics(model: DynamicsModel, functions: Sequence[str] | None) -> None:
-    """InputError where forward dynamics is wanted and the mass matrix is not positive definite in every pose."""
-    if functions is not None and FORWARD not in functions:
-        return
-    mass = check_mass_matrix(model)
-    if mass is None or mass.passed:
-        return
-    others = ",".join(name for name in functions or ALL_FUNCTIONS if name != FORWARD)
-    raise InputError(
-        f"{model.chain.name}: no {FORWARD}: {mass.reason}",
-        f"correct the inertias, or calibrate with physical consistency; or leave it out: --functions {others}",
-    )
-
-
-def admitted(model: DynamicsModel) -> tuple[str, ...]:
-    """All functions that the model can give: without forward dynamics where its mass matrix does not admit it."""
-    mass = check_mass_matrix(model)
-    is_sound = mass is None or mass.passed
-    return tuple(name for name in ALL_FUNCTIONS if is_sound or name != FORWARD)
-
-
-def left_out(model: DynamicsModel, functions: Sequence[str] | None = None) -> tuple[str, ...]:
-    """What a model cannot give of the functions that are wanted (None: all), a sentence each."""
-    wanted = ALL_FUNCTIONS if functions is None else functions
-    notes = []
-    if functions is None and FORWARD not in admitted(model):
-        mass = check_mass_matrix(model)
-        notes.append(f"{FORWARD} is left out: {mass.reason if mass else ''}")
-    by_theta = [name for name in wanted if name in BY_NAME and BY_NAME[name].theta]
-    if model.theta_b is None and by_theta:
-        notes.append(
-            f"the base parameters are unknown: {', '.join(by_theta)} take them at run time only, as NAME_theta"
-        )
-    return tuple(notes)
 
 
 def _choose(option: str, value: str, allowed: Sequence[str]) -> None:

@@ -12,6 +12,7 @@ from psdmc.cli.output import check_output
 from psdmc.cli.progress import steps
 from psdmc.cli.show import megabytes, print_check, print_cost, print_mass_check, print_model, print_terms
 from psdmc.errors import InputError
+from psdmc.lower.admitted import run_time_only
 from psdmc.lower.kernels import Lowering
 from psdmc.model.check import check_model
 from psdmc.model.mass_check import check_mass_matrix
@@ -188,7 +189,7 @@ def emit_c(
             progress,
         )
     print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
-    for note in compiler.left_out(found, wanted):
+    for note in run_time_only(found, wanted):
         print(f"note: {note}")
 
 

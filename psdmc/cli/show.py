@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from psdmc.cli.one_line import one_line
-from psdmc.compiler import admitted, left_out
+from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.check import CheckRow, readers
 from psdmc.model.dynamics_model import DynamicsModel
@@ -119,10 +119,11 @@ def print_terms(model: DynamicsModel) -> None:
 def print_cost(model: DynamicsModel, lowerings: Sequence[Lowering]) -> None:
     """Operations of each function per lowering; for one state, and where they differ for one state per lane."""
     table = Table("function", "lowering", "mul", "add", "mul + add", "div", "sincos", "fused", "in lanes")
-    for note in left_out(model):
+    functions, notes = admitted(model)
+    for note in notes:
         print(f"note: {note}")
     for lowering in lowerings:
-        for name, kernel in lower(model, lowering, admitted(model)).items():
+        for name, kernel in lower(model, lowering, functions).items():
             if kernel.lowering == lowering:
                 one, lanes = cost(kernel.single), cost(kernel.batch)
                 figures = (one.mul, one.add, one.total, one.div, one.sincos, one.fused)
