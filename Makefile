@@ -49,7 +49,7 @@ test-processes: $(READY) ## kill every command 50 times at random moments, and w
 
 LOWEST := .venv-lowest
 LOWEST_TESTS = $(FAST) tests/test_atomic.py tests/emit/test_package.py tests/emit/test_write.py tests/toolchain/test_call.py \
-  tests/toolchain/test_cache.py tests/bench/test_results.py tests/calibrate/test_log_files.py tests/calibrate/test_linear_fit.py
+  tests/toolchain/test_cache.py tests/bench/test_results.py tests/calibration/logs/test_log_files.py tests/calibration/identify/test_linear_fit.py
 
 $(LOWEST)/ready: pyproject.toml constraints/lowest.txt
 	$(PYTHON) -m venv --clear $(LOWEST)

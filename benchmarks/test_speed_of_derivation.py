@@ -8,7 +8,7 @@ from psdmc.bench.case import generic_chain
 from psdmc.bench.cases import bundled_chain
 from psdmc.bench.fresh import derive_fresh
 from psdmc.bench.scaling import SEED, eight_joints
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.robot.chain import Chain
 
 MIB = 2**20

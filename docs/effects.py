@@ -16,7 +16,7 @@ from dataclasses import replace
 from unittest.mock import patch
 
 from psdmc.bench.cases import standard_chains
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.motion import Choices

@@ -16,16 +16,16 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.calibrate.calibrate import CalibrateOptions, calibrate_campaign, calibrate_logs
-from psdmc.calibrate.campaign import CampaignOptions, plan_campaign, read_campaign, write_campaign
-from psdmc.calibrate.log import Log
-from psdmc.calibrate.log_files import read_log
-from psdmc.calibrate.predictor import ChainRegressor
-from psdmc.calibrate.record import Calibration
-from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
-from psdmc.calibrate.spoiled import ALL, MOVED, decimated, noise_only, scaled, swapped, turned
-from psdmc.calibrate.trajectory import Trajectory
-from psdmc.calibrate.virtual_robot import load_virtual_robot, simulate
+from psdmc.calibration.calibrate import CalibrateOptions, calibrate_campaign, calibrate_logs
+from psdmc.calibration.campaign import CampaignOptions, plan_campaign, read_campaign, write_campaign
+from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.motions.trajectory import Trajectory
+from psdmc.calibration.plant.spoiled import ALL, MOVED, decimated, noise_only, scaled, swapped, turned
+from psdmc.calibration.plant.virtual_robot import load_virtual_robot, simulate
+from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibration.verdict.record import Calibration
 from psdmc.compiler import compile as compile_model
 from psdmc.compiler import derive
 from psdmc.model.dynamics_model import DynamicsModel

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from psdmc.derive.derive import derive_model
-from psdmc.derive.snap_effect import snap_effect
+from psdmc.derivation.derive import derive_model
+from psdmc.derivation.snap_effect import snap_effect
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions, Real, Trig
 from psdmc.emit.package import PackageView, package_files, package_view

@@ -15,7 +15,7 @@ MAY_IMPORT = {
     "robot": set(),
     "dynamics": {"robot"},
     "model": {"robot", "dynamics"},
-    "derive": {"robot", "dynamics", "model"},
+    "derivation": {"robot", "dynamics", "model"},
     "program": set(),
     "lower": {"robot", "dynamics", "model", "program"},
     "emit": {"program", "model"},
@@ -24,17 +24,17 @@ MAY_IMPORT = {
 LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {
     "bench": LEFT_OF_TOOLS | {"lower"},
-    "calibrate": LEFT_OF_TOOLS,
-    "report": LEFT_OF_TOOLS | {"bench", "calibrate"},
+    "calibration": LEFT_OF_TOOLS,
+    "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
-    "cli": LEFT_OF_TOOLS | {"bench", "calibrate", "report"},
+    "cli": LEFT_OF_TOOLS | {"bench", "calibration", "report"},
 }
 
 OUTSIDE = {
     "robot": {"numpy", "pinocchio", "defusedxml", "mujoco"},
     "dynamics": {"numpy"},
     "model": {"numpy", "scipy"},
-    "derive": {"numpy", "scipy"},
+    "derivation": {"numpy", "scipy"},
     "program": {"numpy"},
     "lower": {"numpy", "scipy"},
     "emit": {"jinja2", "numpy"},
@@ -50,11 +50,22 @@ OUTSIDE = {
         "cmeel",
         "example_robot_data",
     },
-    "calibrate": {"numpy", "scipy", "pinocchio", "cvxpy", "cma", "rosbags", "pyarrow", "cffi", "jinja2"},
+    "calibration": {"numpy", "scipy", "pinocchio", "cvxpy", "cma", "rosbags", "pyarrow", "cffi", "jinja2"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
     "cli": {"typer", "rich", "numpy"},
 }
+
+ROOMS = {
+    "calibration": {
+        "logs": set(),
+        "identify": {"logs"},
+        "motions": {"logs", "identify"},
+        "plant": {"logs", "identify", "motions"},
+        "verdict": {"logs", "identify"},
+    },
+}
+"""Rooms within a stage; files of the stage's own folder may import every room."""
 
 SHARED = {"errors", "version", "atomic"}
 ENTRY_POINTS = {"__init__", "__main__"}
@@ -94,6 +105,33 @@ def test_imports_run_one_way(stage: str, path: Path):
             assert head in OUTSIDE.get(stage, set()), (
                 f"{path.relative_to(PACKAGE)} imports {head}, which {stage} does not own"
             )
+
+
+def rooms() -> Iterator[tuple[str, str, Path]]:
+    for stage, table in ROOMS.items():
+        for room in table:
+            for path in sorted((PACKAGE / stage / room).glob("*.py")):
+                yield stage, room, path
+
+
+@pytest.mark.parametrize(
+    ("stage", "room", "path"), list(rooms()), ids=lambda value: getattr(value, "name", value)
+)
+def test_rooms_import_one_way(stage: str, room: str, path: Path):
+    for name in imported(path):
+        if name.startswith(f"psdmc.{stage}."):
+            other = name.split(".")[2]
+            assert other in ROOMS[stage][room] | {room}, (
+                f"{path.relative_to(PACKAGE)} imports {name}: {room} may not import {other}"
+            )
+
+
+@pytest.mark.parametrize("stage", sorted(ROOMS))
+def test_every_room_is_in_the_table(stage: str):
+    folders = {
+        path.name for path in (PACKAGE / stage).iterdir() if path.is_dir() and path.name != "__pycache__"
+    }
+    assert folders == set(ROOMS[stage])
 
 
 def test_every_folder_is_a_stage_of_the_table():

@@ -9,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import Chain

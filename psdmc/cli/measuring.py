@@ -11,14 +11,14 @@ from psdmc.atomic import write_whole
 from psdmc.bench.case import Case
 from psdmc.bench.run import Settings, run
 from psdmc.bench.table import as_text
-from psdmc.calibrate.calibrate import CalibrateOptions
-from psdmc.calibrate.campaign import CampaignOptions
-from psdmc.calibrate.campaign_file import is_campaign
-from psdmc.calibrate.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
-from psdmc.calibrate.filter import FilterOptions
-from psdmc.calibrate.linear_fit import LinearOptions
-from psdmc.calibrate.record import verdict_of
-from psdmc.calibrate.simulate_campaign import SimulateOptions
+from psdmc.calibration.calibrate import CalibrateOptions
+from psdmc.calibration.campaign import CampaignOptions
+from psdmc.calibration.campaign_file import is_campaign
+from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.logs.filter import FilterOptions
+from psdmc.calibration.motions.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
+from psdmc.calibration.simulate_campaign import SimulateOptions
+from psdmc.calibration.verdict.record import verdict_of
 from psdmc.cli.one_line import one_line
 from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps

@@ -21,8 +21,8 @@ from psdmc.program.cost import cost
 from psdmc.robot.chain import Joint
 
 if TYPE_CHECKING:
-    from psdmc.calibrate.record import Calibration
-    from psdmc.calibrate.verdict import Verdict
+    from psdmc.calibration.verdict.record import Calibration
+    from psdmc.calibration.verdict.verdict import Verdict
 
 WIDTH = 160
 """Columns of a table where the output is no terminal, so that nothing is cut."""

@@ -6,20 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from psdmc.atomic import write_together, write_whole
-from psdmc.calibrate.actuators import actuator_files, calibrated_actuators
-from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
-from psdmc.calibrate.campaign import (
+from psdmc.calibration.actuators import actuator_files, calibrated_actuators
+from psdmc.calibration.calibrate import CalibrateOptions, calibrate
+from psdmc.calibration.campaign import (
     CampaignOptions,
     being_written,
     plan_campaign,
     require_free,
     write_campaign,
 )
-from psdmc.calibrate.excite import Excitation
-from psdmc.calibrate.predictor import Regressor
-from psdmc.calibrate.record import Calibration, verdict_of
-from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
-from psdmc.calibrate.trajectory import write_trajectory
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.motions.excite import Excitation
+from psdmc.calibration.motions.trajectory import write_trajectory
+from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel

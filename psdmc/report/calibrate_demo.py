@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.atomic import write_whole
-from psdmc.calibrate.calibrate import CalibrateOptions, calibrate
-from psdmc.calibrate.campaign import CampaignOptions, excitation_json, plan_campaign, write_campaign
-from psdmc.calibrate.record import Calibration, verdict_of
-from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
-from psdmc.calibrate.truth import Comparison, compare
-from psdmc.calibrate.virtual_robot import load_virtual_robot
+from psdmc.calibration.calibrate import CalibrateOptions, calibrate
+from psdmc.calibration.campaign import CampaignOptions, excitation_json, plan_campaign, write_campaign
+from psdmc.calibration.plant.virtual_robot import load_virtual_robot
+from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibration.truth import Comparison, compare
+from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
 from psdmc.compiler import derive
 from psdmc.model.store import save

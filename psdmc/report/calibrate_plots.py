@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.calibrate.excite import Excitation
-from psdmc.calibrate.log import Array
-from psdmc.calibrate.steps import Sample, StepQuality
+from psdmc.calibration.identify.steps import Sample, StepQuality
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.motions.excite import Excitation
 from psdmc.report.drawing import Axes, Figure, new_figure, style
 
 POINTS = 600

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from psdmc.atomic import write_together
-from psdmc.calibrate.excite import Excitation
-from psdmc.calibrate.quality import Quality
-from psdmc.calibrate.record import Calibration, NumberRow
-from psdmc.calibrate.verdict import Verdict
-from psdmc.calibrate.visibility import WEAK
+from psdmc.calibration.identify.quality import Quality
+from psdmc.calibration.identify.visibility import WEAK
+from psdmc.calibration.motions.excite import Excitation
+from psdmc.calibration.verdict.record import Calibration, NumberRow
+from psdmc.calibration.verdict.verdict import Verdict
 from psdmc.emit.render import environment
 from psdmc.report.calibrate_plots import excitation_figure, step_figure
 

@@ -12,7 +12,7 @@ from psdmc.bench.cases import EXAMPLES, standard_chains
 from psdmc.bench.counts import Baseline, count
 from psdmc.bench.gate import BASELINE, compare
 from psdmc.bench.rivals import psdmc_c
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.program.program import Instr, Op, Program
 

@@ -15,7 +15,7 @@ from psdmc.bench.rivals import EVERYONE, Entrant, casadi_c, mujoco_c, pinocchio_
 from psdmc.bench.rivals.mujoco_c import mjcf, quaternion
 from psdmc.bench.run import Settings, run
 from psdmc.compiler import derive
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError, ToolchainError
 
 

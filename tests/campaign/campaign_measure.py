@@ -11,7 +11,7 @@ from campaign_oracles import MuJoCo, Pinocchio
 from campaign_robots import RandomRobot, random_robot
 
 from psdmc.compiler import compile
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.lower import kernels, search
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from psdmc.calibrate.log import Log
-from psdmc.calibrate.log_files import write_log
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import write_log
 from psdmc.cli import main
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.model.store import save
 from psdmc.robot.load import load_robot
 

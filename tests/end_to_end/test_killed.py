@@ -22,8 +22,8 @@ from command_line import files_in
 from killable import run
 
 from psdmc.atomic import whole_file
-from psdmc.calibrate.log import Log
-from psdmc.calibrate.log_files import read_columns, write_log
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import read_columns, write_log
 from psdmc.model.store import load
 
 FEW = {"derive": 4, "emit-c": 3, "build": 1, "calibrate": 3, "excite": 1}

@@ -249,7 +249,7 @@ def test_names_of_the_package_are_loaded_when_used():
         "import sys, psdmc\n"
         "assert 'numpy' not in sys.modules\n"
         "assert set(psdmc.__all__) <= set(dir(psdmc))\n"
-        "import psdmc.derive.derive\n"
+        "import psdmc.derivation.derive\n"
         "assert callable(psdmc.derive) and callable(psdmc.compile) and psdmc.InputError.exit_status == 2\n"
         "from psdmc import *\n"
         "assert derive is psdmc.derive and load is psdmc.load\n"

@@ -11,8 +11,8 @@ import pytest
 from bundled import bundled_model, bundled_robot
 from command_line import status, typed
 
-from psdmc.calibrate.log import Log
-from psdmc.calibrate.log_files import write_log
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import write_log
 from psdmc.model.store import load, save
 from psdmc.robot.reference import reference
 

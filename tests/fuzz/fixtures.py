@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.calibrate.log import Log
-from psdmc.calibrate.log_files import write_log
-from psdmc.calibrate.trajectory import Trajectory, write_trajectory
-from psdmc.derive.derive import derive_model
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import write_log
+from psdmc.calibration.motions.trajectory import Trajectory, write_trajectory
+from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot, load_robot_text
 

@@ -18,8 +18,8 @@ import numpy as np
 from fixtures import FIT_TO_READ, FIT_TO_USE, SHORT, log, text, trajectory, write_bag, write_files
 from target_packages import manifest_seed
 
-from psdmc.calibrate.log_files import columns_of, write_log
-from psdmc.calibrate.trajectory import write_trajectory
+from psdmc.calibration.logs.log_files import columns_of, write_log
+from psdmc.calibration.motions.trajectory import write_trajectory
 from psdmc.compiler import derive
 from psdmc.model.store import file_bytes
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from fixtures import text, trajectory
 
-from psdmc.calibrate.campaign_file import listed_runs, read_campaign
-from psdmc.calibrate.simulate_campaign import SimulateOptions, simulate_campaign
-from psdmc.calibrate.virtual_robot import load_virtual_robot, simulate
+from psdmc.calibration.campaign_file import listed_runs, read_campaign
+from psdmc.calibration.plant.virtual_robot import load_virtual_robot, simulate
+from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 
 
 def set_up(folder: Path) -> None:

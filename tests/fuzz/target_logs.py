@@ -7,12 +7,12 @@ from pathlib import Path
 
 from fixtures import two_link_model
 
-from psdmc.calibrate.calibrate import CalibrateOptions, calibrate_logs
-from psdmc.calibrate.log import Log
-from psdmc.calibrate.log_checks import checked
-from psdmc.calibrate.log_files import read_log
-from psdmc.calibrate.predictor import ChainRegressor
-from psdmc.calibrate.trajectory import read_trajectory
+from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
+from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.motions.trajectory import read_trajectory
 
 CUTOFF = 5.0
 """Hz"""

@@ -8,7 +8,7 @@ from oracle import torque_error
 from outcome import BrokenRule
 
 from psdmc.compiler import provenance
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
 from psdmc.model.check import check_model
 from psdmc.model.dynamics_model import DynamicsModel
@@ -48,7 +48,7 @@ def _derived(loaded: LoadedRobot, source_format: SourceFormat) -> None:
     error = torque_error(loaded.source_text, source_format, model)
     if error is not None and not error < TORQUE_LIMIT:
         raise BrokenRule(
-            "WrongTorque", "psdmc/derive/derive.py", f"off Pinocchio by {error:.2g} of the largest"
+            "WrongTorque", "psdmc/derivation/derive.py", f"off Pinocchio by {error:.2g} of the largest"
         )
 
 

@@ -26,7 +26,7 @@ from recorder import Recorder
 from seeds import read_seeds, write_seeds
 from worker import gist_of, scratch
 
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError, InputError, InternalError
 from psdmc.model.store import load
 from psdmc.robot.load import load_robot_text
@@ -89,7 +89,7 @@ def raising(error: BaseException):
         (InternalError("a bug"), "InternalError"),
         (ZeroDivisionError("division"), "ZeroDivisionError"),
         (RecursionError("deep"), "RecursionError"),
-        (BrokenRule("WrongTorque", "psdmc/derive", "off"), "WrongTorque"),
+        (BrokenRule("WrongTorque", "psdmc/derivation", "off"), "WrongTorque"),
     ],
 )
 def test_how_an_input_ended(error: BaseException, kind: str):

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_chains import Oracle, random_chain, relative_error, states
 
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.lower.expanded import SUPPORTED, lower_expanded
 from psdmc.model import evaluate

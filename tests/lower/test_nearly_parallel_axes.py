@@ -10,7 +10,7 @@ import pytest
 from nearly_parallel import tilted_chain
 from random_chains import Oracle, relative_error, states
 
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.lower import kernels, search
 from psdmc.lower.carriers import carrier_space
 from psdmc.lower.kernels import lower

@@ -10,7 +10,7 @@ import pytest
 from bundled import ROBOTS
 
 from psdmc.compiler import provenance
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.model.check import MUJOCO, CheckRow, check_model, readers
 from psdmc.robot import dh_chain, urdf_chain
 from psdmc.robot.chain import Placement

@@ -7,7 +7,7 @@ import pytest
 from bundled import bundled_model
 from random_chains import random_chain
 
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.model.equations import dh_lengths, standard_name
 
 

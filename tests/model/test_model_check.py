@@ -10,7 +10,7 @@ from bundled import bundled_model, bundled_robot
 from random_chains import random_chain
 
 from psdmc.compiler import provenance
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.model.check import check_model
 from psdmc.model.dynamics_model import DynamicsModel

@@ -10,7 +10,7 @@ import pytest
 from bundled import bundled_model, bundled_robot
 from random_chains import Oracle, random_chain, relative_error, states
 
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.robot.chain import Placement
 from psdmc.robot.reference import reference_model

@@ -12,7 +12,7 @@ import pytest
 from bundled import bundled_model
 from random_chains import random_chain
 
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import file_bytes, load, save

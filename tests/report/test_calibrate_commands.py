@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from psdmc.calibrate.campaign import CampaignOptions
-from psdmc.calibrate.excite import ExciteOptions
-from psdmc.calibrate.simulate_campaign import SimulateOptions
-from psdmc.calibrate.steps import Load
-from psdmc.calibrate.sweeps import SineOptions, SweepOptions
-from psdmc.derive.derive import derive_model
+from psdmc.calibration.campaign import CampaignOptions
+from psdmc.calibration.identify.steps import Load
+from psdmc.calibration.motions.excite import ExciteOptions
+from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
+from psdmc.calibration.simulate_campaign import SimulateOptions
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.model.store import load, save
 from psdmc.report.calibrate_commands import (

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from psdmc.calibrate.quality import Quality
-from psdmc.calibrate.record import Calibration, NumberRow, ParameterRow
-from psdmc.calibrate.steps import JointQuality, Sample, StepQuality
-from psdmc.calibrate.verdict import JointFigures, Verdict
+from psdmc.calibration.identify.quality import Quality
+from psdmc.calibration.identify.steps import JointQuality, Sample, StepQuality
+from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
+from psdmc.calibration.verdict.verdict import JointFigures, Verdict
 from psdmc.report.calibrate_report import report_html, write_report
 
 X = np.linspace(0.0, 1.0, 50)

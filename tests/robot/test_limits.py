@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_robots import INERTIAL, dh, joint, link, load_dh, load_urdf, urdf
 
-from psdmc.derive.derive import derive_model
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.load import load_robot, load_robot_text

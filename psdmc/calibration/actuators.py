@@ -1,0 +1,79 @@
+"""C for what a calibrated robot has beside its rigid bodies: LuGre friction and motors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from psdmc.calibration.identify.lugre import PARAMETERS, Lugre, LugreView
+from psdmc.emit.names import identifier
+from psdmc.emit.render import render
+from psdmc.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorView(LugreView):
+    """What the templates see. Every joint has friction; torque constants (N m/A) may be missing, all or none."""
+
+    robot: str = "robot"
+    joint_names: tuple[str, ...] = ()
+    friction: tuple[Lugre, ...] = ()
+    torque_constants: tuple[float, ...] = field(default=())
+
+    @property
+    def name(self) -> str:
+        return identifier(self.robot)
+
+    @property
+    def header(self) -> str:
+        return f"{self.name}_actuators.h"
+
+    @property
+    def guard(self) -> str:
+        return f"{self.name.upper()}_ACTUATORS_H"
+
+    @property
+    def n(self) -> int:
+        return len(self.joint_names)
+
+    @property
+    def friction_rows(self) -> list[list[str]]:
+        return [[self.number(value) for value in joint.as_array().tolist()] for joint in self.friction]
+
+    @property
+    def constant_row(self) -> list[str]:
+        return [self.number(value) for value in self.torque_constants]
+
+
+def actuator_files(view: ActuatorView) -> dict[str, str]:
+    """include/R_actuators.h and src/R_actuators.c, R the robot's identifier; C99, no dependency but libm."""
+    if len(view.friction) != view.n or (view.torque_constants and len(view.torque_constants) != view.n):
+        raise ValueError(
+            f"{view.n} joints, {len(view.friction)} frictions, {len(view.torque_constants)} constants"
+        )
+    return {
+        f"include/{view.header}": render("calibration/actuators.h.jinja", view=view),
+        f"src/{view.name}_actuators.c": render("calibration/actuators.c.jinja", view=view),
+    }
+
+
+def calibrated_actuators(
+    robot: str, joint_names: Sequence[str], calibration: Mapping[str, Any], real: str = "double"
+) -> ActuatorView:
+    """From the `calibration` that a calibrated model's provenance holds; InputError where it has no LuGre friction."""
+    values = {(row["joint"], row["name"]): row["value"] for row in calibration["friction"]}
+    missing = [joint for joint in joint_names if any((joint, name) not in values for name in PARAMETERS)]
+    if missing:
+        raise InputError(
+            f"{robot}: no LuGre friction was identified for joint(s) {', '.join(missing)}",
+            "calibrate with friction runs of every joint",
+        )
+    constants = {row["joint"]: row["value"] for row in calibration["motors"]}
+    return ActuatorView(
+        real=real,
+        robot=robot,
+        joint_names=tuple(joint_names),
+        friction=tuple(Lugre(*(values[joint, name] for name in PARAMETERS)) for joint in joint_names),
+        torque_constants=tuple(constants[joint] for joint in joint_names) if constants else (),
+    )

@@ -1,0 +1,32 @@
+"""`psdmc.calibrate`: what `import psdmc` offers of this stage, which is loaded when it is called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from psdmc.model.dynamics_model import DynamicsModel
+
+if TYPE_CHECKING:
+    from psdmc.calibration.calibrate import CalibrateOptions
+    from psdmc.calibration.verdict.record import Calibration
+
+
+def calibrate(
+    model: DynamicsModel,
+    logs: str | Path | Sequence[str | Path],
+    options: CalibrateOptions | None = None,
+    torque_constants: Mapping[str, float] | None = None,
+) -> Calibration:
+    """The calibrated model, what was found, and the verdict on it, from a campaign's folder or from logs.
+
+    The result's `verdict.word` is "usable", "usable, with doubts" or "not usable"; `verdict.reasons`, `.suspects` and
+    `.doubts` say why, `.model` is the calibrated model whatever the verdict.
+
+    torque_constants   N m/A by joint name, for plain logs that hold currents and joints that no load reaches
+    InputError where a file is missing or a log cannot be read.
+    """
+    from psdmc.calibration.calibrate import calibrate as run
+
+    return run(model, logs, options, torque_constants=torque_constants)

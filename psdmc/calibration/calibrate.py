@@ -1,0 +1,160 @@
+"""Calibration from files: a campaign's four steps, or one linear fit of plain logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from psdmc.calibration.campaign_file import is_campaign, read_campaign
+from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
+from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
+from psdmc.calibration.identify.motor_constants import motors_of_logs
+from psdmc.calibration.identify.physical import (
+    NotPhysical,
+    PhysicalOptions,
+    nearest_physical,
+    require_cvxpy,
+    whitening_of,
+)
+from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
+from psdmc.calibration.identify.residuals import noise_factor
+from psdmc.calibration.identify.steps import CalibrationOptions
+from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.verdict.judged_record import judged_record
+from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
+from psdmc.calibration.verdict.record import Calibration, four_step_record, linear_record
+from psdmc.calibration.verdict.verdict_limits import VerdictOptions
+from psdmc.calibration.verdict.verdict_on import with_verdict_on_campaign, with_verdict_on_logs
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrateOptions:
+    """Everything `psdmc calibrate` can be told.
+
+    physical   whether the result must be what a robot can have: links of positive mass distribution, drive inertias
+               and friction not negative; False shows the unconstrained fit
+    campaign   options of the four steps;  linear  of the linear fit;  consistency  of the physical estimate
+    verdict    limits of the verdict
+    """
+
+    physical: bool = True
+    campaign: CalibrationOptions = field(default_factory=CalibrationOptions)
+    linear: LinearOptions = field(default_factory=LinearOptions)
+    consistency: PhysicalOptions = field(default_factory=PhysicalOptions)
+    verdict: VerdictOptions = field(default_factory=VerdictOptions)
+
+
+def calibrate(
+    model: DynamicsModel,
+    sources: str | Path | Sequence[str | Path],
+    options: CalibrateOptions | None = None,
+    *,
+    regressor: Regressor | None = None,
+    torque_constants: Mapping[str, float] | None = None,
+    progress: Progress = lambda step: None,
+) -> Calibration:
+    """Calibrate a model from a campaign (its folder or campaign.toml) or from plain logs.
+
+    regressor         the compiled model where there is one; else Newton-Euler on arrays
+    torque_constants  N m/A by joint name, for plain logs that hold currents and joints that no load reaches
+    InputError where a file is missing or a log cannot be used.
+    """
+    options = options or CalibrateOptions()
+    if options.physical:
+        require_cvxpy()
+    regressor = regressor or ChainRegressor(model)
+    paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
+    if not paths:
+        raise InputError("no log to calibrate from", "give a campaign's folder, or logs")
+    campaigns = [path for path in paths if is_campaign(path)]
+    if campaigns and len(paths) > 1:
+        raise InputError(
+            f"{campaigns[0]}: a campaign, given with {len(paths) - 1} other log(s) or campaign(s)",
+            "calibrate from one campaign, or from plain logs",
+        )
+    if campaigns:
+        return calibrate_campaign(
+            model, read_campaign(paths[0], model.joint_names), options, regressor, torque_constants, progress
+        )
+    progress("reading logs")
+    logs = [read_log(path) for path in paths]
+    return calibrate_logs(model, logs, options, regressor, torque_constants, progress)
+
+
+def calibrate_campaign(
+    model: DynamicsModel,
+    runs: Runs,
+    options: CalibrateOptions,
+    regressor: Regressor,
+    torque_constants: Mapping[str, float] | None,
+    progress: Progress,
+) -> Calibration:
+    """The four steps; their theta_b, or the nearest physical one, as their uncertainties and the prior measure."""
+    found = calibrate_four_steps(
+        model.chain, regressor, model.l, runs, options.campaign, progress, torque_constants, model.theta_b
+    )
+    inertial = found.inertial
+
+    def record(theta_b: Array) -> Calibration:
+        return four_step_record(model, found, theta_b, options.campaign)
+
+    progress("reading the result back")
+    plain = judged_record(record(inertial.theta_b), runs)
+
+    def consistent() -> Calibration:
+        factor = max(noise_factor(found.gravity.estimate), noise_factor(inertial.estimate))
+        whitening = whitening_of(factor**2 * inertial.covariance + inertial.prior_covariance)
+        near = nearest_physical(model, inertial.theta_b, whitening, None, options.consistency)
+        return judged_record(record(near.values), runs, plain, near.distance)
+
+    result = _physical(plain, consistent, options, progress)
+    progress("verdict")
+    step = options.campaign.inertial.filter
+    return with_verdict_on_campaign(result, model, regressor, runs, found.motors, step, options.verdict)
+
+
+def _physical(
+    plain: Calibration, consistent: Callable[[], Calibration], options: CalibrateOptions, progress: Progress
+) -> Calibration:
+    """The physically consistent record where it is wanted and there is one; else the bare fit's, which says so."""
+    if not options.physical:
+        return plain
+    progress("physical consistency")
+    try:
+        return consistent()
+    except NotPhysical as error:
+        return replace(plain, facts={**plain.facts, NOT_PHYSICAL: error.message})
+
+
+def calibrate_logs(
+    model: DynamicsModel,
+    logs: Sequence[Log],
+    options: CalibrateOptions,
+    regressor: Regressor,
+    torque_constants: Mapping[str, float] | None,
+    progress: Progress,
+) -> Calibration:
+    """Everything linear at once: one vector of theta_b, friction and offsets."""
+    motors = motors_of_logs(model.joint_names, logs, torque_constants)
+    progress("linear fit")
+    linear = options.linear
+    found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b)
+    solved = found.estimate
+    progress("reading the result back")
+    plain = judged_record(linear_record(model, found, solved.values, linear), logs, check=linear.check)
+
+    def consistent() -> Calibration:
+        bounded = found.problem.never_negative
+        near = nearest_physical(model, solved.values, solved.whitening, bounded, options.consistency)
+        record = linear_record(model, found, near.values, linear)
+        return judged_record(record, logs, plain, near.distance, linear.check)
+
+    result = _physical(plain, consistent, options, progress)
+    progress("verdict")
+    return with_verdict_on_logs(result, model, regressor, logs, motors, linear.filter, options.verdict)

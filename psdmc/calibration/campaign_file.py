@@ -1,0 +1,147 @@
+"""campaign.toml: which runs a campaign has, and its logs step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from psdmc.calibration.identify.four_steps import Runs
+from psdmc.calibration.identify.steps import FrictionRun, GravityRun, InertialRun, Load, MotorRun
+from psdmc.calibration.logs.log_bag import is_folder
+from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_none
+from psdmc.calibration.logs.wording import listed
+from psdmc.errors import InputError
+
+Step = Literal["motor", "gravity", "friction", "inertial"]
+STEPS: tuple[Step, ...] = ("motor", "gravity", "friction", "inertial")
+FILE = "campaign.toml"
+WHAT = "a campaign (campaign.toml), as `psdmc excite` writes it"
+HINT = "`psdmc excite` writes campaigns; docs/calibration.md describes them"
+
+LARGEST_RUNS = 1000
+"""A campaign of a nine-joint arm has 30; a thousand take days."""
+LARGEST_MASS = 1e4
+"""kg, of a load at the tip."""
+SMALLEST_MASS = 1e-3
+"""kg; no sensor feels less."""
+LARGEST_ARM = 100.0
+"""m, of a load's centre of mass from the tip."""
+
+_RUN_KEYS = ("step", "name", "joint", "load", "trajectory", "log")
+_LOAD_KEYS = ("mass", "com")
+
+
+@dataclass(frozen=True, slots=True)
+class ListedRun:
+    """One [[run]] of a campaign.toml, paths as seen from here."""
+
+    step: Step
+    name: str
+    log: Path
+    trajectory: Path | None
+    joint: str
+    load: Load | None
+
+
+def is_campaign(path: Path) -> bool:
+    """Whether a path is meant as a campaign: a .toml file, or a folder with a campaign.toml."""
+    return path.suffix.lower() == ".toml" or (is_folder(path) and (path / FILE).exists())
+
+
+def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
+    """The runs of a campaign.toml (or its folder); InputError says which run lacks what."""
+    path = Path(path)
+    path = path / FILE if is_folder(path) else path
+    return runs_of(read_toml(path, WHAT), path)
+
+
+def runs_of(content: dict[str, Any], path: Path) -> tuple[ListedRun, ...]:
+    """The runs of a campaign's content; `path` is the file that it came from."""
+    faults: list[str] = []
+    tables = TomlTable(content, "campaign", ("run",), faults).items("run")
+    if not tables and not faults:
+        faults.append("no [[run]]")
+    if len(tables) > LARGEST_RUNS:
+        faults.append(f"{len(tables)} runs, expected at most {LARGEST_RUNS}")
+        tables = []
+    runs = tuple(_listed(path.parent, f"run {k}", table, faults) for k, table in enumerate(tables, start=1))
+    require_none(faults, str(path), HINT)
+    return runs
+
+
+def _listed(folder: Path, where: str, value: object, faults: list[str]) -> ListedRun:
+    table = TomlTable(value, where, _RUN_KEYS, faults)
+    step = cast(Step, table.word("step", STEPS))
+    needs_joint = step in ("motor", "friction")
+    log = table.text("log")
+    return ListedRun(
+        step=step,
+        name=table.text("name", Path(log).stem),
+        log=folder / log,
+        trajectory=folder / table.text("trajectory") if table.has("trajectory") else None,
+        joint=table.text("joint", None if needs_joint else ""),
+        load=_load(table.content["load"], f"{where}: load", faults) if table.has("load") else None,
+    )
+
+
+def _load(value: object, where: str, faults: list[str]) -> Load:
+    table = TomlTable(value, where, _LOAD_KEYS, faults)
+    return Load(table.number("mass", SMALLEST_MASS, LARGEST_MASS), table.triple("com", LARGEST_ARM))
+
+
+def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:
+    """All logs of a campaign, step by step.
+
+    joint_names  of the robot that it is for
+    InputError where a log is missing, a motor run lacks its partner, or a run is for a joint that is not there.
+    """
+    runs = listed_runs(path)
+    if joint_names is not None:
+        _require_joints(runs, joint_names, path)
+    pairs = _motor_pairs(runs, path)
+    return Runs(
+        motor=[
+            MotorRun(run.joint, read_log(empty.log), read_log(run.log), load) for empty, run, load in pairs
+        ],
+        gravity=[GravityRun(read_log(run.log), run.load) for run in runs if run.step == "gravity"],
+        friction=[
+            FrictionRun(run.joint, read_log(run.log), run.load) for run in runs if run.step == "friction"
+        ],
+        inertial=[InertialRun(read_log(run.log), run.load) for run in runs if run.step == "inertial"],
+    )
+
+
+def _require_joints(runs: Sequence[ListedRun], joint_names: Sequence[str], path: str | Path) -> None:
+    unknown = list(dict.fromkeys(run.joint for run in runs if run.joint and run.joint not in joint_names))
+    if unknown:
+        raise InputError(
+            f"{path}: runs of joint(s) {listed(unknown)}, which the model does not have",
+            f"it has {listed(joint_names)}: is the campaign another robot's?",
+        )
+
+
+def _motor_pairs(runs: Sequence[ListedRun], path: str | Path) -> list[tuple[ListedRun, ListedRun, Load]]:
+    """Each loaded motor run with the unloaded one of its joint."""
+    motors = [run for run in runs if run.step == "motor"]
+    empty: dict[str, ListedRun] = {}
+    for run in motors:
+        if run.load is None and run.joint in empty:
+            raise InputError(f"{path}: joint {run.joint}: two unloaded motor runs", "leave one of them out")
+        if run.load is None:
+            empty[run.joint] = run
+    loaded = [(run, run.load) for run in motors if run.load is not None]
+    for joint in dict.fromkeys(run.joint for run in motors):
+        if joint not in empty:
+            raise InputError(
+                f"{path}: joint {joint}: a loaded motor run without an unloaded one",
+                "add the unloaded run: the same motion without the load",
+            )
+        if not any(run.joint == joint for run, _ in loaded):
+            raise InputError(
+                f"{path}: joint {joint}: an unloaded motor run without a loaded one",
+                "a run with a load names it: load = { mass = 3.5, com = [0.08, 0.0, 0.06] }",
+            )
+    return [(empty[run.joint], run, load) for run, load in loaded]

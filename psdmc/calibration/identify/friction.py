@@ -1,0 +1,122 @@
+"""Step three: LuGre friction of every joint, from runs of one joint at a time, (12) to (14), (19), (20)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psdmc.calibration.identify.friction_fit import JointFriction, fit_joint, unknowns_of
+from psdmc.calibration.identify.friction_run import JointRun, prepared
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.quality import quality
+from psdmc.calibration.identify.steps import (
+    FrictionOptions,
+    FrictionRun,
+    JointQuality,
+    Sample,
+    StepOptions,
+    StepQuality,
+)
+from psdmc.calibration.identify.workers import in_processes
+from psdmc.calibration.logs.log import Array
+from psdmc.robot.chain import Chain
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrictionResult:
+    """Friction per joint name, in the chain's order; joints without a run have none."""
+
+    joints: dict[str, JointFriction]
+    warnings: tuple[str, ...]
+
+    @property
+    def delay(self) -> float:
+        """s, between position and current: the joints' median."""
+        return float(np.median([joint.delay for joint in self.joints.values()])) if self.joints else 0.0
+
+
+def calibrate_friction(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    theta_gravity: Array,
+    runs: Sequence[FrictionRun],
+    options: StepOptions,
+    lugre: FrictionOptions,
+    start: FrictionResult | None = None,
+) -> FrictionResult:
+    """LuGre friction of every joint that has a run.
+
+    theta_gravity  (l,)  a theta_b with the identified gravity parameters
+    start          an earlier pass, to start from instead of searching
+    """
+    data = _prepared(chain, model, motors, theta_gravity, runs, options)
+    earlier = start.joints if start is not None else {}
+    tasks = [(name, data[name], lugre, earlier.get(name)) for name in data]
+    found = {joint.joint: joint for joint in _fitted(tasks, lugre.workers)}
+    warnings = tuple(
+        f"joint {name}: friction parameter(s) not seen in the data: {', '.join(joint.unseen)}"
+        for name, joint in found.items()
+        if joint.unseen
+    )
+    return FrictionResult(found, warnings)
+
+
+def judge_friction(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    theta_b: Array,
+    runs: Sequence[FrictionRun],
+    options: StepOptions,
+    joints: Mapping[str, JointFriction],
+) -> StepQuality:
+    """Friction of each joint alone against its run, relieved of these base parameters' gravity."""
+    qualities, samples = {}, []
+    for name, data in _prepared(chain, model, motors, theta_b, runs, options).items():
+        if name in joints:
+            qualities[name], sample = _judged(name, data, joints[name])
+            samples.append(sample)
+    return StepQuality("Friction", qualities, tuple(samples))
+
+
+def _prepared(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    theta_b: Array,
+    runs: Sequence[FrictionRun],
+    options: StepOptions,
+) -> dict[str, JointRun]:
+    """The runs by joint, in the chain's order."""
+    places = {name: k for k, name in enumerate(chain.joint_names)}
+    own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
+    return {
+        run.joint: prepared(chain, model, motors, theta_b, run, places[run.joint], options) for run in own
+    }
+
+
+_Task = tuple[str, JointRun, FrictionOptions, JointFriction | None]
+
+
+def _fitted(tasks: list[_Task], workers: int) -> list[JointFriction]:
+    """Joints are independent: one process each, where more than one is allowed."""
+    return list(in_processes(_fit, tasks, workers))
+
+
+def _fit(task: _Task) -> JointFriction:
+    return fit_joint(*task)
+
+
+def _judged(name: str, data: JointRun, joint: JointFriction) -> tuple[JointQuality, Sample]:
+    """Friction alone: what gravity, inertia and offset explain is taken from both sides."""
+    rigid = data.low_pass(data.rigid(joint.inertia, joint.offset, joint.delay))
+    measured = data.measured - rigid
+    modelled = data.low_pass(data.torque(unknowns_of(joint))) - rigid
+    fit, out, every = data.fit, data.out, data.every
+    both = JointQuality(quality(measured[fit], modelled[fit]), quality(measured[out], modelled[out]))
+    is_out = np.isin(every, out)
+    return both, Sample(name, "time [s]", data.time[every], measured[every], modelled[every], is_out)

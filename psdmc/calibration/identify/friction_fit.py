@@ -1,0 +1,208 @@
+"""The seven LuGre parameters of one joint, in the paper's two steps and a last polish.
+
+First the fast samples, where bristles do not matter: F_c, F_v, d_v by trust-region least squares. Then the rest by
+Nelder-Mead over a simulation of (12). Last, all of them together by trust region, from which the standard deviations
+come. Beside the seven, a run has unknowns of its own: the joint's inertia in that pose (the paper neglects it), a
+constant torque, and the time between position and current.
+
+Unknowns p, in order: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1, inertia, offset, delay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import optimize
+
+from psdmc.calibration.identify.friction_run import JointRun, lugre_from
+from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
+from psdmc.calibration.identify.steps import FrictionOptions
+from psdmc.calibration.logs.log import Array
+
+DELAY = 9
+FREE = {"lugre": tuple(range(10)), "coulomb_viscous": (0, 3, 7, 8, DELAY)}
+"""Unknowns that each friction law leaves to the data."""
+STIFF_BEND = 1e-5
+"""rad: bristle deflection at Coulomb friction that stands for none at all."""
+UNSEEN_CURVATURE = 1e-13
+"""Of the sum of squares, relative to the largest, below which a direction is not seen."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointFriction:
+    """One joint's friction as identified.
+
+    covariance  (7, 7)  in the order of lugre.PARAMETERS, of the fit alone
+    unseen      names of parameters that the data do not determine
+    inertia     kg m^2, of the joint in the run's pose;  offset N m;  delay s
+    """
+
+    joint: str
+    friction: Lugre
+    covariance: Array
+    unseen: tuple[str, ...]
+    inertia: float
+    offset: float
+    delay: float
+
+    @property
+    def std(self) -> Array:
+        """(7,)"""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+
+def unknowns_of(found: JointFriction) -> Array:
+    f = found.friction
+    peak, log_speed, log_stiffness = f.static - f.coulomb, np.log(f.stribeck_velocity), np.log(f.stiffness)
+    seven = (f.coulomb, peak, log_speed, f.viscous, f.viscous_exponent, log_stiffness, f.damping)
+    return np.array([*seven, found.inertia, found.offset, found.delay])
+
+
+def fit_joint(
+    name: str, data: JointRun, options: FrictionOptions, start: JointFriction | None
+) -> JointFriction:
+    """The seven of one joint: by the paper's two steps, or from an earlier pass, and polished."""
+    if options.law == "coulomb_viscous":
+        sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
+        return _polished(name, replace(data, fit=sliding), _plain(_fast(data, options)), options)
+    first = _presliding(data, _fast(data, options), options) if start is None else unknowns_of(start)
+    return _polished(name, data, first, options)
+
+
+def _plain(fast: Array) -> Array:
+    """Coulomb and viscous friction as LuGre sees them: no Stribeck peak, linear, bristles that hardly bend."""
+    coulomb, viscous, _, inertia, offset = fast
+    return np.array(
+        [coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, inertia, offset, 0.0]
+    )
+
+
+def _fast(data: JointRun, options: FrictionOptions) -> Array:
+    """(20): F_c, F_v, d_v with the run's inertia and offset, from samples well beyond the Stribeck velocity."""
+    speed = np.abs(data.qd)
+    rows = data.fit[speed[data.fit] > options.fast * speed.max()]
+    qd, qdd = data.qd[rows], data.qdd[rows]
+    target = (data.measured - data.gravity)[rows]
+
+    def residual(p: Array) -> Array:
+        friction = (p[0] + p[1] * np.abs(qd) ** p[2]) * np.sign(qd)
+        return np.asarray(friction + p[3] * qdd + p[4] - target)
+
+    size = float(np.sqrt(np.mean(target**2)))
+    low = [1e-6 * size, 0.0, 0.1, -np.inf, -np.inf]
+    high = [np.inf, np.inf, 2.5, np.inf, np.inf]
+    fitted = optimize.least_squares(
+        residual, [0.5 * size, 0.3 * size, 0.8, 0.0, 0.0], bounds=(low, high), x_scale="jac"
+    )
+    return np.asarray(fitted.x)
+
+
+def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
+    """F_s, v_s, sigma_0, sigma_1 by Nelder-Mead, from the best of a coarse grid of stiffness and Stribeck velocity."""
+    coulomb, viscous, exponent, inertia, offset = fast
+    top = float(np.abs(data.qd).max())
+
+    def unknowns(x: Array) -> Array:
+        peak, log_speed, log_stiffness, log_time = x
+        damping = np.exp(log_stiffness + log_time)
+        return np.array(
+            [
+                coulomb,
+                abs(peak) * coulomb,
+                log_speed,
+                viscous,
+                exponent,
+                log_stiffness,
+                damping,
+                inertia,
+                offset,
+                0.0,
+            ]
+        )
+
+    def cost(x: Array) -> float:
+        if abs(x[1]) > 20 or abs(x[2]) > 40 or not -20 < x[3] < 0:
+            return 1e300
+        return float(np.sum(data.residual(unknowns(x), data.fit) ** 2))
+
+    grid = [
+        np.array([0.15, np.log(speed), np.log(coulomb / bend), np.log(1e-3)])
+        for bend in np.geomspace(1e-5, 1e-2, 7)
+        for speed in (0.005 * top, 0.03 * top)
+    ]
+    best = min(grid, key=cost)
+    simplex = np.vstack([best, best + np.diag([0.15, 1.0, 0.7, 1.0])])
+    limits = {"maxfev": options.simplex_steps, "initial_simplex": simplex, "xatol": 3e-2, "fatol": 0.0}
+    found = optimize.minimize(cost, best, method="Nelder-Mead", options=limits)
+    return unknowns(found.x)
+
+
+def _polished(name: str, data: JointRun, p: Array, options: FrictionOptions) -> JointFriction:
+    """All free unknowns together by trust region, bounds kept; standard deviations from its Jacobian."""
+    free = list(FREE[options.law]) if options.estimate_delay else [j for j in FREE[options.law] if j != DELAY]
+    low, high = (bounds[free] for bounds in _bounds(options))
+    scale = _scale(p)[free]
+    inner = np.clip(p[free], low + 1e-6 * scale, np.where(np.isfinite(high), high - 1e-6 * scale, np.inf))
+
+    def residual(x: Array) -> Array:
+        return data.residual(_put(p, free, x), data.fit)
+
+    def jacobian(x: Array) -> Array:
+        base = residual(x)
+        columns = []
+        for j, step in enumerate(1e-4 * scale):
+            moved = x.copy()
+            moved[j] += step if x[j] + step <= high[j] else -step
+            columns.append((residual(moved) - base) / (moved[j] - x[j]))
+        return np.stack(columns, axis=1)
+
+    bounds = {"bounds": (low, high), "x_scale": scale}
+    limits = {"xtol": 1e-7, "ftol": 1e-9, "gtol": 1e-12, "max_nfev": 25}
+    fitted = optimize.least_squares(residual, inner, jac=jacobian, **bounds, **limits)
+    spread = np.zeros((len(p), len(p)))
+    spread[np.ix_(free, free)] = _covariance(fitted.jac * scale, fitted.fun) * np.outer(scale, scale)
+    return _with_uncertainty(name, _put(p, free, fitted.x), spread, options)
+
+
+def _put(p: Array, free: list[int], x: Array) -> Array:
+    whole = p.copy()
+    whole[free] = x
+    return whole
+
+
+def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
+    """sigma_0, sigma_1, F_v >= 0, F_s >= F_c > 0, v_s > 0; the rest keeps the search where numbers make sense."""
+    reach = options.largest_delay
+    low = [1e-9, 0.0, np.log(1e-5), 0.0, 0.05, np.log(1.0), 0.0, -np.inf, -np.inf, -reach]
+    high = [np.inf, np.inf, np.log(1e2), np.inf, 3.0, np.log(1e9), np.inf, np.inf, np.inf, reach]
+    return np.array(low), np.array(high)
+
+
+def _scale(p: Array) -> Array:
+    """What counts as one step of each unknown."""
+    viscous, damping = max(p[3], 0.1 * p[0]), max(p[6], 1e-4 * np.exp(p[5]))
+    return np.array([p[0], 0.2 * p[0], 1.0, viscous, 0.5, 1.0, damping, 1.0, p[0], 1e-3])
+
+
+def _covariance(jac: Array, residual: Array) -> Array:
+    """Of the scaled unknowns; a direction that the data do not see gets a huge variance, never none."""
+    variance = float(residual @ residual) / max(len(residual) - jac.shape[1], 1)
+    curvature, directions = np.linalg.eigh(jac.T @ jac)
+    seen = np.maximum(curvature, UNSEEN_CURVATURE * curvature[-1])
+    return np.asarray((directions * (variance / seen)) @ directions.T)
+
+
+def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptions) -> JointFriction:
+    friction = lugre_from(p)
+    to_seven = np.eye(7, 10)
+    to_seven[1, 0] = 1.0
+    to_seven[2, 2] = friction.stribeck_velocity
+    to_seven[5, 5] = friction.stiffness
+    covariance = to_seven @ spread @ to_seven.T
+    relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction.as_array()), 1e-12)
+    unseen = [PARAMETERS[j] for j in range(7) if not relative[j] < options.unseen]
+    no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: nothing hangs on v_s
+    if no_peak and "stribeck_velocity" not in unseen and options.law == "lugre":
+        unseen.append("stribeck_velocity")
+    return JointFriction(name, friction, covariance, tuple(unseen), float(p[7]), float(p[8]), float(p[9]))

@@ -1,0 +1,100 @@
+"""One joint's friction run, ready to be compared with predictions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.lugre import Lugre, friction_torque
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
+from psdmc.calibration.identify.steps import FrictionRun, StepOptions
+from psdmc.calibration.logs.filter import LowPass, States, filtered, held_out, thinned
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.errors import InputError
+from psdmc.robot.chain import Chain
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointRun:
+    """One joint's run, ready to be compared with predictions."""
+
+    time: Array
+    period: float
+    qd: Array
+    qdd: Array
+    gravity: Array
+    measured: Array
+    low_pass: LowPass
+    every: NDArray[np.intp]
+    fit: NDArray[np.intp]
+    out: NDArray[np.intp]
+
+    def rigid(self, inertia: float, offset: float, delay: float) -> Array:
+        return self.delayed(self.gravity + inertia * self.qdd + offset, delay)
+
+    def torque(self, p: Array) -> Array:
+        """Motor torque for the unknowns (friction_fit.UNKNOWNS), before the low-pass."""
+        friction = friction_torque(lugre_from(p), self.qd, self.period)
+        return self.delayed(friction + self.gravity + p[7] * self.qdd + p[8], p[9])
+
+    def delayed(self, torque: Array, delay: float) -> Array:
+        """What is written at t is what happened at t + delay."""
+        return torque if delay == 0 else np.interp(self.time + delay, self.time, torque)
+
+    def residual(self, p: Array, rows: NDArray[np.intp]) -> Array:
+        return np.asarray((self.low_pass(self.torque(p)) - self.measured)[rows])
+
+
+def lugre_from(p: Array) -> Lugre:
+    """Seven parameters from unknowns: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1."""
+    return Lugre(p[0], p[0] + p[1], float(np.exp(p[2])), p[3], p[4], float(np.exp(p[5])), p[6])
+
+
+def prepared(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    theta_gravity: Array,
+    run: FrictionRun,
+    k: int,
+    options: StepOptions,
+) -> JointRun:
+    """One joint's run against what gravity and tool take of its torque; InputError where other joints move too."""
+    states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
+    _require_alone(run, chain, k, states)
+    gravity = (gravity_regressor(model, states.q) @ theta_gravity)[:, k]
+    if run.tool is not None:
+        gravity = gravity + payload_torque(chain, states.q, run.tool.mass, run.tool.com)[:, k]
+    rows = thinned(states, options.filter)
+    out = held_out(len(rows), options.split)
+    return JointRun(
+        time=states.time,
+        period=states.period,
+        qd=states.qd[:, k],
+        qdd=states.qdd[:, k],
+        gravity=gravity,
+        measured=motors.torque(states.effort)[:, k],
+        low_pass=states.low_pass,
+        every=rows,
+        fit=rows[~out],
+        out=rows[out],
+    )
+
+
+def _require_alone(run: FrictionRun, chain: Chain, k: int, states: States) -> None:
+    rms = np.sqrt(np.mean(states.qd**2, axis=0))
+    if rms[k] == 0:
+        raise InputError(
+            f"{run.log.name}: joint {run.joint} stands still: its friction cannot be seen",
+            "move that joint in its friction runs",
+        )
+    others = [name for j, name in enumerate(chain.joint_names) if j != k and rms[j] > 0.05 * rms[k]]
+    if others:
+        raise InputError(
+            f"{run.log.name}: joint(s) {', '.join(others)} move in the friction run of joint {run.joint}",
+            "friction needs one joint at a time: `psdmc excite` plans such runs",
+        )

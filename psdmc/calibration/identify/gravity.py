@@ -1,0 +1,197 @@
+"""Step two: the gravity parameters from slow motion forwards and backwards, (18)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.least_squares import Consider, Estimate, Prior, estimate
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
+from psdmc.calibration.identify.prior import base_scale, torque_sizes
+from psdmc.calibration.identify.residuals import noise_warnings
+from psdmc.calibration.identify.steps import GravityRun, StepOptions, StepQuality, judged
+from psdmc.calibration.logs.filter import States, away_from, filtered, held_out
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.errors import InputError
+from psdmc.robot.chain import Chain
+
+SAME_PLACE = 5e-3
+"""rad or m: how near the way back must pass to the way there."""
+STEADY_ACCELERATION = 0.1
+"""rad/s^2: below it a joint counts as moving at constant speed."""
+MOVING = 0.02
+"""rad/s: below it a joint counts as standing, where static friction hides gravity."""
+DEPENDENT = 1e-8
+"""A gravity column counts as new where this share of it is left beside the columns before it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GravitySplit:
+    """Which combinations of theta_b gravity can see, in the model's own order.
+
+    l base parameters, r gravity parameters phi.
+
+    pivots      (r,)    theta_b entries that phi stands for, beside others
+    rest        (l-r,)  the other entries, psi
+    dependence  (r, l-r) phi = theta_b[pivots] + dependence @ theta_b[rest]
+    """
+
+    pivots: NDArray[np.intp]
+    rest: NDArray[np.intp]
+    dependence: Array
+
+    def from_phi(self) -> Array:
+        """(l, r) d theta_b / d phi with psi held."""
+        matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.pivots)))
+        matrix[self.pivots] = np.eye(len(self.pivots))
+        return matrix
+
+    def from_psi(self) -> Array:
+        """(l, l-r) d theta_b / d psi with phi held."""
+        matrix = np.zeros((len(self.pivots) + len(self.rest), len(self.rest)))
+        matrix[self.rest] = np.eye(len(self.rest))
+        matrix[self.pivots] = -self.dependence
+        return matrix
+
+    def phi(self, theta_b: Array) -> Array:
+        return np.asarray(theta_b[self.pivots] + self.dependence @ theta_b[self.rest])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GravityResult:
+    """phi with its uncertainty; `considered` is d phi per relative change of each torque constant, (r, n)."""
+
+    split: GravitySplit
+    estimate: Estimate
+    warnings: tuple[str, ...]
+
+
+def gravity_split(chain: Chain, model: Regressor, l: int, seed: int = 0) -> GravitySplit:
+    """The observable subset: gravity columns in order, each a pivot where it is new."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-np.pi, np.pi, (max(4 * l, 40), len(chain)))
+    columns = gravity_regressor(model, q).reshape(-1, l)
+    pivots: list[int] = []
+    basis = np.zeros((len(columns), 0))
+    for j in range(l):
+        column = columns[:, j]
+        left = column - basis @ (basis.T @ column)
+        left = left - basis @ (basis.T @ left)
+        size = float(np.linalg.norm(column))
+        if size > 1e-12 and np.linalg.norm(left) > DEPENDENT * size:
+            basis = np.column_stack([basis, left / np.linalg.norm(left)])
+            pivots.append(j)
+    rest = [j for j in range(l) if j not in pivots]
+    dependence = np.asarray(
+        np.linalg.lstsq(columns[:, pivots], columns[:, rest], rcond=None)[0], dtype=np.float64
+    )
+    dependence[np.abs(dependence) < DEPENDENT] = 0.0
+    return GravitySplit(np.array(pivots, dtype=np.intp), np.array(rest, dtype=np.intp), dependence)
+
+
+def calibrate_gravity(
+    chain: Chain,
+    model: Regressor,
+    split: GravitySplit,
+    motors: Motors,
+    runs: Sequence[GravityRun],
+    options: StepOptions,
+    theta_b: Array | None = None,
+    file_theta: Array | None = None,
+) -> GravityResult:
+    """phi by linear least squares over samples averaged over both directions.
+
+    theta_b     from an earlier pass: its velocity and acceleration torques are subtracted
+    file_theta  the file's values, kept where the runs show nothing; None: zero
+    """
+    q, target, use, currents = _even_parts(chain, model, motors, runs, options, theta_b)
+    columns = gravity_regressor(model, q)[:, :, split.pivots]
+    out = held_out(len(q), options.split)
+    kept = use & ~out[:, None]
+    consider = Consider(-currents[:, :, None] * np.eye(len(chain)), np.diag(motors.relative_std**2))
+    scale = base_scale(chain, model, torque_sizes(currents), file_theta)[split.pivots]
+    start = np.zeros(len(scale)) if file_theta is None else split.phi(file_theta)
+    solved = estimate(columns, target, options.fit, consider, kept, Prior(start, scale))
+    return GravityResult(split, solved, noise_warnings("gravity", chain.joint_names, solved))
+
+
+def judge_gravity(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    runs: Sequence[GravityRun],
+    options: StepOptions,
+    theta_b: Array,
+) -> StepQuality:
+    """Torque averaged over both directions against the gravity of these base parameters."""
+    q, target, use, _ = _even_parts(chain, model, motors, runs, options, theta_b)
+    out = held_out(len(q), options.split)
+    predicted = gravity_regressor(model, q) @ theta_b
+    row = np.arange(len(q), dtype=np.float64)
+    return judged("Gravity", chain.joint_names, row, target, predicted, out, use, "sample")
+
+
+def _even_parts(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    runs: Sequence[GravityRun],
+    options: StepOptions,
+    theta_b: Array | None,
+) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+    """All runs' rows one after the other: position, torque without friction, usable entries, total motor torque."""
+    parts = [_even_part(chain, model, motors, run, options, theta_b) for run in runs]
+    q, target, use, torque = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return q, target, use, torque
+
+
+def _even_part(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    run: GravityRun,
+    options: StepOptions,
+    theta_b: Array | None,
+) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+    """Mean position, torque without friction, usable entries and total motor torque, one row per independent sample."""
+    states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
+    there, back = _pairs(states, options)
+    torque = motors.torque(states.effort)
+    target = torque.copy()
+    if theta_b is not None:
+        full = model.regressor(
+            states.q[[*there, *back]], states.qd[[*there, *back]], states.qdd[[*there, *back]]
+        )
+        still = gravity_regressor(model, states.q[[*there, *back]])
+        target[[*there, *back]] -= (full - still) @ theta_b
+    if run.tool is not None:
+        target -= payload_torque(chain, states.q, run.tool.mass, run.tool.com)
+    turning = np.any(np.abs(states.qdd) >= STEADY_ACCELERATION, axis=1)
+    steady = away_from(turning, options.filter, states.period)
+    moves = np.abs(states.qd) > MOVING
+    near = np.all(np.abs(states.q[there] - states.q[back]) < SAME_PLACE, axis=1)
+    use = (near & steady[there] & steady[back])[:, None] & moves[there] & moves[back]
+    if use.sum() < 10 * len(chain):
+        raise InputError(
+            f"{run.log.name}: the way back does not retrace the way there at constant speed",
+            "gravity needs each path run forwards and backwards, slowly: `psdmc excite` plans such runs",
+        )
+    return (
+        0.5 * (states.q[there] + states.q[back]),
+        0.5 * (target[there] + target[back]),
+        use,
+        0.5 * (torque[there] + torque[back]),
+    )
+
+
+def _pairs(states: States, options: StepOptions) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows of the way there and the rows of the way back at the same place, one cut-off's independence apart."""
+    last = len(states.time) - 1
+    step = max(1, int(np.floor(0.5 / (options.filter.cutoff * states.period))))
+    there = np.flatnonzero(states.use[: last // 2 + 1])[::step]
+    return there, last - there

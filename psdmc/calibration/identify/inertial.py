@@ -1,0 +1,270 @@
+"""Step four: the inertial parameters from fast motion, relieved of what the steps before know, (21).
+
+Every prediction passes through the same filter as the measurement, and at the same time: a current that is read late is
+compared with a prediction read late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.friction import FrictionResult
+from psdmc.calibration.identify.friction_fit import JointFriction
+from psdmc.calibration.identify.gravity import GravityResult, gravity_split
+from psdmc.calibration.identify.least_squares import Consider, Estimate, Prior, estimate
+from psdmc.calibration.identify.lugre import Lugre, friction_torque
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor, payload_torque
+from psdmc.calibration.identify.prior import base_scale, torque_sizes
+from psdmc.calibration.identify.residuals import noise_warnings
+from psdmc.calibration.identify.steps import InertialRun, StepOptions, StepQuality, judged
+from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.robot.chain import Chain
+
+FRICTION_STEP = 0.1
+"""Finite difference in standard deviations of a friction parameter, for its effect on the torque."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InertialResult:
+    """theta_b complete.
+
+    theta_b      (l,)    gravity and inertial parameters together
+    covariance   (l, l)  with the uncertainty of torque constants, gravity and friction
+    identifiable (l,)
+    estimate     of psi, the parameters that gravity does not show
+    unseen       (l, k)  directions of theta_b that no run shows, SI, each as long as is believable
+    scale        (l,)    believable size of each base parameter
+    """
+
+    theta_b: Array
+    covariance: Array
+    identifiable: NDArray[np.bool_]
+    estimate: Estimate
+    unseen: Array
+    scale: Array
+    warnings: tuple[str, ...]
+
+    @property
+    def prior_covariance(self) -> Array:
+        """(l, l) what the prior leaves open where no run sees anything."""
+        return np.asarray(self.estimate.prior_std**2 * self.unseen @ self.unseen.T)
+
+    @property
+    def std(self) -> Array:
+        variance = np.diag(self.covariance) + np.diag(self.prior_covariance)
+        return np.where(self.identifiable, np.sqrt(np.maximum(variance, 0.0)), np.inf)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """One run's independent samples: torque (N, n) and its parts, all filtered alike."""
+
+    time: Array
+    torque: Array
+    known: Array
+    columns: Array
+    noise: Array
+    friction: Array
+    friction_columns: Array
+
+
+def calibrate_inertial(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    gravity: GravityResult,
+    friction: FrictionResult,
+    runs: Sequence[InertialRun],
+    options: StepOptions,
+    file_theta: Array | None = None,
+) -> InertialResult:
+    """psi by linear least squares, and theta_b with what gravity found.
+
+    file_theta  the file's values, kept where the runs show nothing; None: zero
+    """
+    split = gravity.split
+    rows = _stacked([_rows(chain, model, motors, friction, run, options) for run in runs])
+    static = rows.columns @ (split.from_phi() @ gravity.estimate.values) + rows.known
+    target = rows.torque - static - rows.friction
+    out = held_out(len(target), options.split)
+    consider = _considered(motors, gravity, friction, rows)
+    kept = np.repeat(~out[:, None], len(chain), axis=1)
+    scale = base_scale(chain, model, torque_sizes(rows.torque), file_theta)
+    start = np.zeros(len(split.rest)) if file_theta is None else file_theta[split.rest]
+    prior = Prior(start, scale[split.rest], rows.noise @ split.from_psi())
+    solved = estimate(rows.columns @ split.from_psi(), target, options.fit, consider, kept, prior)
+    theta_b = split.from_phi() @ gravity.estimate.values + split.from_psi() @ solved.values
+    by_phi, by_psi = split.from_phi(), split.from_psi()
+    return InertialResult(
+        theta_b=theta_b,
+        covariance=_combined(motors, gravity, friction, solved),
+        identifiable=_identifiable(gravity, solved),
+        estimate=solved,
+        unseen=np.hstack([by_phi @ _believable(gravity.estimate), by_psi @ _believable(solved)]),
+        scale=scale,
+        warnings=noise_warnings("inertial", chain.joint_names, solved),
+    )
+
+
+def _believable(solved: Estimate) -> Array:
+    """Unseen directions, SI, as long as is believable."""
+    return np.asarray(solved.scale[:, None] * solved.unseen)
+
+
+def judge_inertial(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    theta_b: Array,
+    friction: FrictionResult,
+    runs: Sequence[InertialRun],
+    options: StepOptions,
+) -> tuple[StepQuality, StepQuality]:
+    """What gravity and friction leave of the fast motion against inertia alone; and the whole torque."""
+    split = gravity_split(chain, model, len(theta_b))
+    rows = _stacked([_rows(chain, model, motors, friction, run, options, sensitive=False) for run in runs])
+    still = split.from_phi() @ split.phi(theta_b)
+    static = rows.columns @ still + rows.known + rows.friction
+    moving = rows.columns @ (theta_b - still)
+    out = held_out(len(rows.time), options.split)
+    names = chain.joint_names
+    return (
+        judged("Inertial", names, rows.time, rows.torque - static, moving, out),
+        judged("All", names, rows.time, rows.torque, static + moving, out),
+    )
+
+
+def _stacked(parts: Sequence[_Rows]) -> _Rows:
+    """All runs' rows one after the other."""
+    return _Rows(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(_Rows)))
+
+
+def _rows(
+    chain: Chain,
+    model: Regressor,
+    motors: Motors,
+    friction: FrictionResult,
+    run: InertialRun,
+    options: StepOptions,
+    sensitive: bool = True,
+) -> _Rows:
+    """`sensitive`: with noise columns and slopes of friction, which the fit needs and a prediction does not."""
+    states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
+    at = thinned(states, options.filter)
+    late = _Late(states, friction.delay, at)
+    known = np.zeros_like(states.q)
+    if run.tool is not None:
+        known = payload_torque(chain, states.q, run.tool.mass, run.tool.com)
+    columns = _late_columns(model, late, (states.q, states.qd, states.qdd))
+    by_noise = (
+        _late_columns(model, late, states.jittered()) - columns if sensitive else np.zeros_like(columns)
+    )
+    rubbed = np.zeros_like(states.q)
+    slopes: list[Array] = []
+    for k, name in enumerate(chain.joint_names):
+        if name in friction.joints:
+            rubbed[:, k] = friction_torque(friction.joints[name].friction, states.qd[:, k], states.period)
+            if sensitive:
+                own = _friction_slopes(friction.joints[name], states, k, rubbed[:, k])
+                slopes += [late(slope, k) for slope in own]
+    return _Rows(
+        time=states.time[at],
+        torque=motors.torque(states.effort)[at],
+        known=late(known),
+        columns=columns,
+        noise=by_noise,
+        friction=late(rubbed),
+        friction_columns=np.stack(slopes, axis=-1) if slopes else np.zeros((len(at), len(chain), 0)),
+    )
+
+
+def _late_columns(model: Regressor, late: _Late, motion: tuple[Array, Array, Array]) -> Array:
+    """(rows, n, l) the regressor along a motion as the log would hold it."""
+    columns = model.regressor(*motion)
+    return np.stack([late(columns[:, :, j]) for j in range(columns.shape[2])], axis=-1)
+
+
+class _Late:
+    """A prediction as the log would hold it: read late, filtered, one row per independent sample."""
+
+    def __init__(self, states: States, delay: float, at: NDArray[np.intp]) -> None:
+        self.states, self.delay, self.at = states, delay, at
+
+    def __call__(self, values: Array, joint: int | None = None) -> Array:
+        """(rows, n) of (N, n), or of (N,) for one joint alone."""
+        states = self.states
+        shape = states.q.shape
+        columns = values if joint is None else values[:, None]
+        if self.delay:
+            later = states.time + self.delay
+            columns = np.column_stack([np.interp(later, states.time, column) for column in columns.T])
+        rows = states.low_pass(columns)[self.at]
+        if joint is None:
+            return rows
+        spread = np.zeros((len(rows), shape[1]))
+        spread[:, joint] = rows[:, 0]
+        return spread
+
+
+def _friction_slopes(found: JointFriction, states: States, k: int, base: Array) -> list[Array]:
+    """d torque / d parameter for each of the seven, by one-sided differences that keep the bounds."""
+    slopes = []
+    values, std = found.friction.as_array(), found.std
+    for j in range(7):
+        step = FRICTION_STEP * min(std[j], 0.5 * abs(values[j])) or 1e-6 * max(abs(values[j]), 1e-6)
+        moved = values.copy()
+        moved[j] += step if j != 0 or values[0] + step <= values[1] else -step
+        changed = friction_torque(Lugre(*moved.tolist()), states.qd[:, k], states.period)
+        slopes.append((changed - base) / (moved[j] - values[j]))
+    return slopes
+
+
+def _considered(motors: Motors, gravity: GravityResult, friction: FrictionResult, rows: _Rows) -> Consider:
+    """Effects of torque constants, phi and friction on (prediction - target); constants move all three."""
+    n = len(motors.relative_std)
+    by_phi = rows.columns @ gravity.split.from_phi()
+    moved = (rows.torque - rows.friction)[:, :, None] * np.eye(n)
+    by_constant = by_phi @ gravity.estimate.considered - moved
+    stacked = np.concatenate([by_constant, by_phi, rows.friction_columns], axis=2)
+    return Consider(stacked, _source_covariance(motors, gravity, friction))
+
+
+def _source_covariance(motors: Motors, gravity: GravityResult, friction: FrictionResult) -> Array:
+    blocks = [np.diag(motors.relative_std**2), gravity.estimate.covariance]
+    blocks += [joint.covariance for joint in friction.joints.values()]
+    size = sum(len(block) for block in blocks)
+    covariance = np.zeros((size, size))
+    start = 0
+    for block in blocks:
+        covariance[start : start + len(block), start : start + len(block)] = block
+        start += len(block)
+    return covariance
+
+
+def _combined(motors: Motors, gravity: GravityResult, friction: FrictionResult, solved: Estimate) -> Array:
+    """(l, l) covariance of theta_b from its independent sources."""
+    split = gravity.split
+    n, r = len(motors.relative_std), len(split.pivots)
+    by_source = split.from_psi() @ solved.considered
+    by_source[:, :n] += split.from_phi() @ gravity.estimate.considered
+    by_source[:, n : n + r] += split.from_phi()
+    sources = _source_covariance(motors, gravity, friction)
+    own = split.from_psi() @ solved.covariance @ split.from_psi().T
+    return np.asarray(own + by_source @ sources @ by_source.T)
+
+
+def _identifiable(gravity: GravityResult, solved: Estimate) -> NDArray[np.bool_]:
+    """A theta_b entry counts where all that it hangs on does."""
+    split = gravity.split
+    seen = np.ones(len(split.pivots) + len(split.rest), dtype=bool)
+    seen[split.rest] = solved.identifiable
+    unseen_rest = np.abs(split.dependence[:, ~solved.identifiable]).sum(axis=1) > 0
+    seen[split.pivots] = gravity.estimate.identifiable & ~unseen_rest
+    return seen

@@ -1,0 +1,292 @@
+"""Linear estimation shared by the steps: weights, robustness, standard deviations, and what the data cannot see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.residuals import noise_factor, sample_correlation, spread
+from psdmc.calibration.logs.log import Array
+
+Method = Literal["ols", "wls", "irls"]
+
+
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """How a linear problem is solved.
+
+    method          ols: all rows alike; wls: each joint by its own residual; irls: wls, and outliers count less (Huber)
+    rounds          of reweighting
+    huber           residual in standard deviations beyond which irls turns from squares to magnitudes: 1.345 keeps
+                    95 % of least squares' efficiency where errors are normal
+    rank_tolerance  share of its own size by which a column may be wrong, beside its noise: differentiation and filters
+                    leave about 1e-4
+    noise_ratio     how many times stronger than noise alone a direction must be: at ten, noise in the columns shrinks
+                    what is found by a tenth at most
+    seen            standard deviation, in units of the prior's scale, from which the data no longer show a direction
+    unseen_share    share (squared, in the prior's units) of a parameter in unseen directions from which it is
+                    unidentifiable
+    clusters        contiguous stretches whose errors may be dependent, for the robust standard deviations
+    """
+
+    method: Method = "wls"
+    rounds: int = 6
+    huber: float = 1.345
+    rank_tolerance: float = 3e-4
+    noise_ratio: float = 10.0
+    seen: float = 0.2
+    unseen_share: float = 1e-2
+    clusters: int = 30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Consider:
+    """What an earlier step left uncertain and this one takes as given: its effect is counted, not estimated.
+
+    columns     (N, n, k)  change of (prediction - target) per unit of each quantity
+    covariance  (k, k)
+    """
+
+    columns: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """What is known before the data: where unseen directions stay, and in which units "near" is measured.
+
+    values  (l,)       the file's parameters, or zero
+    scale   (l,)       positive: how far from them a parameter may believably lie
+    noise   (N, n, l)  columns that the sensors' noise alone would give; None where states are exact
+    """
+
+    values: Array
+    scale: Array
+    noise: Array | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """The solution of target = columns @ values. l unknowns, n joints, r directions seen.
+
+    values            (l,)      as near to the prior as the data allow: in unseen directions, on it
+    covariance        (l, l)    of the fit alone, from residuals taken as white; none in unseen directions
+    considered        (l, k)    change of `values` per unit of what was considered; k may be 0
+    total_covariance  (l, l)    with what was considered
+    unseen            (l, l - r)  orthonormal directions that the data do not show, in units of `scale`
+    scale             (l,)      the prior's, or the columns' where there is none
+    prior_std         of unseen directions, in units of `scale`; zero without a prior
+    whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances: the data's where they see
+                                (widened by noise_factor), the prior's where not
+    identifiable      (l,)      whether the data see the parameter by itself
+    singular_values   (l,)      of the weighted, column-scaled problem, descending
+    rank              how many directions are seen
+    sigma             (n,)      residual RMS per joint, target's unit
+    weights           (N, n)    of the last round, one over unit; zero where a row did not count
+    correlation       (n,)      of the residual from sample to sample: near zero for noise
+    optimism          robust over white standard deviation, median over parameters: near one for noise
+    """
+
+    values: Array
+    covariance: Array
+    considered: Array
+    total_covariance: Array
+    unseen: Array
+    scale: Array
+    prior_std: float
+    whitening: Array
+    identifiable: NDArray[np.bool_]
+    singular_values: Array
+    rank: int
+    sigma: Array
+    weights: Array
+    correlation: Array
+    optimism: float
+
+    @property
+    def prior_covariance(self) -> Array:
+        """(l, l) what the prior leaves open where the data see nothing."""
+        directions = self.scale[:, None] * self.unseen
+        return np.asarray(self.prior_std**2 * directions @ directions.T)
+
+    @property
+    def std(self) -> Array:
+        """(l,) standard deviations with what was considered and what unseen directions leave open; infinite where
+        unidentifiable."""
+        variance = np.diag(self.total_covariance) + np.diag(self.prior_covariance)
+        return np.where(self.identifiable, np.sqrt(np.maximum(variance, 0.0)), np.inf)
+
+    @property
+    def condition(self) -> float:
+        """Of the part that counts, columns scaled."""
+        return (
+            float(self.singular_values[0] / self.singular_values[self.rank - 1])
+            if self.rank
+            else float("inf")
+        )
+
+
+def estimate(
+    columns: Array,
+    target: Array,
+    options: FitOptions | None = None,
+    consider: Consider | None = None,
+    use: NDArray[np.bool_] | None = None,
+    prior: Prior | None = None,
+) -> Estimate:
+    """Solve target = columns @ values in the least squares that the options name.
+
+    columns  (N, n, l), target (N, n): samples that may be taken as independent (filter.thinned)
+    use      (N, n)  entries that count; None: all
+    prior    None: zero, in units of the columns, and no bound on what is believable
+    """
+    options = options or FitOptions()
+    use = np.ones(target.shape, dtype=bool) if use is None else use
+    solved = _Solved(columns, target, use.astype(np.float64), options, prior, 0.0)
+    for _ in range(1 if options.method == "ols" else options.rounds):
+        plain = options.method == "ols"
+        weights = (
+            use.astype(np.float64) if plain else np.where(use, _weights(solved.residual, use, options), 0.0)
+        )
+        solved = _Solved(columns, target, weights, options, prior, _level(solved.residual * weights, use))
+    return solved.estimate(consider)
+
+
+def _level(weighted: Array, use: NDArray[np.bool_]) -> float:
+    """RMS of a weighted residual's usable entries."""
+    return float(np.sqrt(np.sum(np.where(use, weighted, 0.0) ** 2) / max(int(use.sum()), 1)))
+
+
+def _weights(residual: Array, use: NDArray[np.bool_], options: FitOptions) -> Array:
+    """(N, n) one over standard deviation, per joint; smaller for outliers with irls."""
+    sigma = spread(residual, use)
+    if options.method == "irls":
+        size = np.nan_to_num(np.nanmedian(np.where(use, np.abs(residual), np.nan), axis=0))
+        sigma = 1.4826 * size  # a normal law's deviation from its median size
+    sigma = np.maximum(sigma, 1e-12 + 1e-9 * sigma.max(initial=0.0))
+    if options.method == "wls":
+        return np.broadcast_to(1.0 / sigma, residual.shape)
+    size = np.maximum(np.abs(residual) / sigma, 1e-12)
+    return np.asarray(np.sqrt(np.minimum(1.0, options.huber / size)) / sigma)
+
+
+NUMERICAL = 1e-9
+"""Of the largest column: what rounding alone leaves of one."""
+
+
+ROUNDING = 1e-12
+"""Share of a parameter in shown directions that is none: its value is then the prior's to the last digit."""
+
+
+class _Solved:
+    """One weighted solution, in units z of the prior: v = v0 + S z.
+
+    Directions in which the data are stronger than `_floor` are shown, the others hidden: hidden ones form a subspace,
+    in which z = 0; the rest of z is the least-squares solution.
+    """
+
+    def __init__(
+        self,
+        columns: Array,
+        target: Array,
+        weights: Array,
+        options: FitOptions,
+        prior: Prior | None,
+        level: float,
+    ) -> None:
+        self.options = options
+        self.columns = columns
+        self.weights = weights
+        l = columns.shape[2]
+        self.rows = (columns * weights[:, :, None]).reshape(-1, l)
+        factor = np.asarray(np.linalg.qr(self.rows, mode="r"))
+        factor = np.vstack([factor, np.zeros((l - len(factor), l))]) if len(factor) < l else factor
+        sizes = np.linalg.norm(factor, axis=0)
+        unit = np.where(sizes > 0, sizes, 1.0)
+        self.column_values = np.asarray(np.linalg.svd(factor / unit, compute_uv=False), dtype=np.float64)
+        start = np.zeros(l) if prior is None else prior.values
+        scale = 1.0 / unit if prior is None else prior.scale
+        chol = np.linalg.cholesky(self._floor(sizes * scale, scale, prior, level))
+        by_prior = factor * scale
+        _, strength, right = np.linalg.svd(by_prior @ np.linalg.inv(chol).T)
+        self.rank = int(np.sum(strength > 1.0))
+        hidden = np.linalg.inv(chol).T @ right[self.rank :].T
+        basis = np.linalg.qr(hidden, mode="complete")[0]
+        self.unseen, shown = basis[:, : l - self.rank], basis[:, l - self.rank :]
+        self.scale = scale
+        self.prior_std = 0.0 if prior is None else options.seen
+        _, self.singular, turned = np.linalg.svd(by_prior @ shown, full_matrices=False)
+        self.inverse = scale[:, None] * (shown @ turned.T) / self.singular
+        self.forth = self.singular[:, None] * (turned @ shown.T) / scale
+        left = target - columns @ start
+        self.left = self.rows @ self.inverse
+        self.coordinates = self.left.T @ (left * weights).reshape(-1)
+        share = np.sum(self.unseen**2, axis=1)
+        self.values = np.where(share > 1.0 - ROUNDING, start, start + self.inverse @ self.coordinates)
+        self.residual = target - columns @ self.values
+        self.identifiable = share < options.unseen_share
+
+    def _floor(self, sizes: Array, scale: Array, prior: Prior | None, level: float) -> Array:
+        """(l, l), in the prior's units: the square of what a direction must exceed to be seen.
+
+        Noise in the columns, times the ratio asked for; the error of differentiation, a share of each column; and the
+        torque's noise, against the prior's scale.
+        """
+        options = self.options
+        largest = float(sizes.max(initial=0.0)) or 1.0
+        believable = 0.0 if prior is None else level / options.seen
+        floor = np.diag((options.rank_tolerance * sizes) ** 2 + max(believable, NUMERICAL * largest) ** 2)
+        if prior is None or prior.noise is None:
+            return floor
+        noise = (prior.noise * self.weights[:, :, None]).reshape(-1, len(sizes)) * scale
+        return np.asarray(floor + options.noise_ratio * noise.T @ noise)
+
+    def estimate(self, consider: Consider | None) -> Estimate:
+        l = self.columns.shape[2]
+        freedom = max(int(np.count_nonzero(self.weights)) - self.rank, 1)
+        weighted = self.residual * self.weights
+        variance = float(np.sum(weighted**2)) / freedom
+        fit = variance * self.inverse @ self.inverse.T
+        considered = np.zeros((l, 0))
+        total = fit
+        if consider is not None and consider.columns.shape[2]:
+            rows = (consider.columns * self.weights[:, :, None]).reshape(-1, consider.columns.shape[2])
+            considered = -self.inverse @ (self.left.T @ rows)
+            total = fit + considered @ consider.covariance @ considered.T
+        unit = np.sqrt(variance) or 1.0
+        found = Estimate(
+            values=self.values,
+            covariance=fit,
+            considered=considered,
+            total_covariance=total,
+            unseen=self.unseen,
+            scale=self.scale,
+            prior_std=self.prior_std,
+            whitening=np.zeros((0, l)),
+            identifiable=self.identifiable,
+            singular_values=self.column_values,
+            rank=self.rank,
+            sigma=spread(self.residual, self.weights > 0),
+            weights=self.weights,
+            correlation=sample_correlation(self.residual, self.weights > 0),
+            optimism=self._optimism(np.diag(fit), weighted),
+        )
+        by_prior = self.unseen.T / self.scale / self.options.seen
+        return replace(found, whitening=np.vstack([self.forth / (unit * noise_factor(found)), by_prior]))
+
+    def _optimism(self, white: Array, weighted: Array) -> float:
+        """Cluster-robust over white standard deviation (Liang and Zeger 1986): clusters are stretches of time."""
+        count = min(self.options.clusters, len(weighted) // 4)
+        if count < 5 or not self.rank:
+            return 1.0
+        n = self.columns.shape[1]
+        scores = self.left * weighted.reshape(-1, 1)
+        cluster = np.repeat(np.arange(len(weighted)) * count // len(weighted), n)
+        sums = np.zeros((count, self.rank))
+        np.add.at(sums, cluster, scores)
+        robust = np.sum((sums @ self.inverse.T) ** 2, axis=0) * count / (count - 1)
+        seen = np.flatnonzero((white > 0) & self.identifiable)
+        return float(np.sqrt(np.median(robust[seen] / white[seen]))) if len(seen) else 1.0

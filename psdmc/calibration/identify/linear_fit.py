@@ -1,0 +1,235 @@
+"""Everything linear at once, from one log: base parameters, Coulomb and viscous friction, offsets.
+
+The alternative to the four steps where a robot gives a single exciting log and torques, or currents with known
+constants. Regressor and friction columns pass through the filter that the measurement passed through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.least_squares import Consider, Estimate, FitOptions, Prior, estimate
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.prior import base_scale, torque_sizes
+from psdmc.calibration.identify.residuals import noise_warnings
+from psdmc.calibration.logs.check_options import CheckOptions
+from psdmc.calibration.logs.filter import (
+    FilterOptions,
+    SplitOptions,
+    States,
+    filtered,
+    held_out,
+    smoothed_rows,
+    thinned,
+)
+from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.robot.chain import Chain
+
+
+@dataclass(frozen=True, slots=True)
+class LinearOptions:
+    """One log, one linear fit.
+
+    exponents       of the viscous terms |qd|^d sign(qd), each with a coefficient of its own; the first is `viscous`
+    sign_speed      rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
+    offset          whether each joint's torque has a constant of its own
+    """
+
+    filter: FilterOptions = field(default_factory=lambda: FilterOptions(cutoff=8.0))
+    split: SplitOptions = field(default_factory=lambda: SplitOptions(held_out=0.3, blocks=0))
+    fit: FitOptions = field(default_factory=lambda: FitOptions(method="irls"))
+    check: CheckOptions = field(default_factory=CheckOptions)
+    exponents: tuple[float, ...] = (1.0,)
+    sign_speed: float = 0.03
+    offset: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearResult:
+    """One vector: theta_b, then each joint's friction and offset.
+
+    estimate   of the whole vector, without constraints
+    problem    what it was estimated from;  prior  where unseen directions stay
+    motors     that made torques of what was logged
+    """
+
+    estimate: Estimate
+    problem: LinearProblem
+    prior: Prior
+    motors: Motors
+    warnings: tuple[str, ...]
+
+    @property
+    def theta_b(self) -> Array:
+        return self.estimate.values[: self.problem.l]
+
+    @property
+    def std(self) -> Array:
+        return self.estimate.std[: self.problem.l]
+
+    @property
+    def identifiable(self) -> NDArray[np.bool_]:
+        return self.estimate.identifiable[: self.problem.l]
+
+    @property
+    def friction(self) -> Array:
+        """(n, f) in the order of problem.friction."""
+        return self.estimate.values[self.problem.l :].reshape(len(self.problem.chain), -1)
+
+    @property
+    def friction_std(self) -> Array:
+        return self.estimate.std[self.problem.l :].reshape(len(self.problem.chain), -1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearProblem:
+    """The stacked rows of independent samples.
+
+    columns, noise  (N, n, l + n f)  of the unknowns, and what the position sensors' noise alone would make of them
+    torque          (N, n)  N m;  held_out (N,)
+    names           l + n f  of the unknowns, for messages
+    """
+
+    chain: Chain
+    columns: Array
+    noise: Array
+    torque: Array
+    held_out: NDArray[np.bool_]
+    l: int
+    friction: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        own = tuple(f"{name} of {joint}" for joint in self.chain.joint_names for name in self.friction)
+        return (*(f"theta_{k + 1}" for k in range(self.l)), *own)
+
+    @property
+    def never_negative(self) -> NDArray[np.bool_]:
+        """(l + n f,) friction other than offsets: it takes energy, whatever the data say."""
+        own = np.array([name != "offset" for name in self.friction] * len(self.chain), dtype=bool)
+        return np.concatenate([np.zeros(self.l, dtype=bool), own])
+
+
+def calibrate_linear(
+    chain: Chain,
+    model: Regressor,
+    l: int,
+    logs: Sequence[Log],
+    options: LinearOptions | None = None,
+    motors: Motors | None = None,
+    theta_b: Array | None = None,
+) -> LinearResult:
+    """Base parameters and simple friction by linear least squares; InputError where a log cannot be used.
+
+    theta_b  (l,)  the file's values, kept in directions that the logs do not show; None: zero
+    """
+    options = options or LinearOptions()
+    motors = motors or Motors.torques(len(chain))
+    checked_logs = [checked(log, chain, options.filter.cutoff, options.check) for log in logs]
+    problem, resting = linear_problem(chain, model, l, checked_logs, options, motors)
+    kept = np.repeat(~problem.held_out[:, None], len(chain), axis=1)
+    scale = -problem.torque[:, :, None] * np.eye(len(chain))
+    consider = Consider(scale, np.diag(motors.relative_std**2))
+    prior = _prior(chain, model, problem, options, theta_b)
+    solved = estimate(problem.columns, problem.torque, options.fit, consider, kept, prior)
+    notes = tuple(note for log in checked_logs for note in log.notes)
+    warnings = (*notes, *resting, *noise_warnings("linear fit", chain.joint_names, solved))
+    return LinearResult(solved, problem, prior, motors, warnings)
+
+
+def _prior(
+    chain: Chain, model: Regressor, problem: LinearProblem, options: LinearOptions, theta_b: Array | None
+) -> Prior:
+    """The file's theta_b and no friction; friction may be as large as its joint's torque at an ordinary speed."""
+    sizes = torque_sizes(problem.torque[~problem.held_out])
+    rigid = base_scale(chain, model, sizes, theta_b)
+    own = np.repeat(sizes, len(problem.friction))
+    values = np.concatenate([np.zeros(problem.l) if theta_b is None else theta_b, np.zeros(len(own))])
+    return Prior(values, np.concatenate([rigid, own]), problem.noise)
+
+
+def friction_names(exponents: Sequence[float], offset: bool) -> tuple[str, ...]:
+    """Names of a joint's friction columns, in order."""
+    viscous = tuple("viscous" if k == 0 else f"viscous^{d:g}" for k, d in enumerate(exponents))
+    return ("coulomb", *viscous, *(("offset",) if offset else ()))
+
+
+def friction_terms(qd: Array, sign_speed: float, exponents: Sequence[float], offset: bool) -> list[Array]:
+    """(N, n) each: what Coulomb friction, the viscous terms and the offset are multiplied with, before the filter."""
+    sign = np.tanh(qd / sign_speed)
+    terms = [sign, *(sign * np.abs(qd) ** d for d in exponents)]
+    return [*terms, np.ones_like(sign)] if offset else terms
+
+
+def linear_problem(
+    chain: Chain, model: Regressor, l: int, logs: Sequence[Log], options: LinearOptions, motors: Motors
+) -> tuple[LinearProblem, tuple[str, ...]]:
+    """The stack of all logs' independent samples, every log split on its own; and remarks on joints that rest."""
+    columns, noise, torques, outs, remarks = [], [], [], [], []
+    for log in logs:
+        states = filtered(log, options.filter, options.check)
+        at = thinned(states, options.filter)
+        measured, by_noise = _columns(model, states, at, options)
+        columns.append(measured)
+        noise.append(by_noise)
+        torques.append(motors.torque(states.effort)[at])
+        outs.append(held_out(len(at), options.split))
+        remarks += _ripples(log, states, options)
+    problem = LinearProblem(
+        chain,
+        np.concatenate(columns),
+        np.concatenate(noise),
+        np.concatenate(torques),
+        np.concatenate(outs),
+        l,
+        friction_names(options.exponents, options.offset),
+    )
+    return problem, tuple(remarks)
+
+
+def _ripples(log: Log, states: States, options: LinearOptions) -> list[str]:
+    """Names the joints that move by no more than noise, where the log's own check did not call them still."""
+    motion = np.ptp(log.position, axis=0)
+    found = [
+        f"{name} ({size:.1e} rad)" if name not in (log.sliding or ()) else f"{name} ({size:.1e} m)"
+        for name, size, rests in zip(log.joint_names, motion, states.still, strict=True)
+        if rests and size >= options.check.smallest_motion
+    ]
+    if not found:
+        return []
+    return [f"{log.name}: joint(s) {', '.join(found)} ripple by no more than sensor noise: taken as resting"]
+
+
+def _columns(
+    model: Regressor, states: States, at: NDArray[np.intp], options: LinearOptions
+) -> tuple[Array, Array]:
+    """(rows, n, l + n f) filtered like the torque; and what another draw of the position noise adds to it."""
+    measured = (states.q, states.qd, states.qdd)
+    jittered = states.jittered()
+    plain = _filtered_columns(model, states, measured, at, options)
+    if not states.noise.any():
+        return plain, np.zeros_like(plain)
+    return plain, _filtered_columns(model, states, jittered, at, options) - plain
+
+
+def _filtered_columns(
+    model: Regressor,
+    states: States,
+    motion: tuple[Array, Array, Array],
+    at: NDArray[np.intp],
+    options: LinearOptions,
+) -> Array:
+    smoothed = smoothed_rows(states, at, lambda rows: model.regressor(*(part[rows] for part in motion)))
+    terms = friction_terms(motion[1], options.sign_speed, options.exponents, options.offset)
+    rubbed = np.stack([states.low_pass(term)[at] for term in terms], axis=-1)
+    n, f = rubbed.shape[1:]
+    spread = np.zeros((len(at), n, n * f))
+    for k in range(n):
+        spread[:, k, k * f : (k + 1) * f] = rubbed[:, k]
+    return np.concatenate([smoothed, spread], axis=2)

@@ -1,0 +1,160 @@
+"""Step one: torque constants from the current that a known load adds, (16) and (17)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.predictor import payload_torque
+from psdmc.calibration.identify.quality import quality
+from psdmc.calibration.identify.steps import JointQuality, MotorRun, Sample, StepOptions, StepQuality
+from psdmc.calibration.logs.filter import FilterOptions, away_from, filtered, held_out
+from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.errors import InputError
+from psdmc.robot.chain import Chain
+
+STEADY = 0.9
+"""Share of the sweep's typical speed below which a sample belongs to a turn."""
+SMALLEST_SHARE = 20.0
+"""A joint is reached by a load whose torque stands this many residuals above the noise, over all samples."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotorResult:
+    """Torque constants, joint by joint; NaN where the load cannot reach the joint, or no run was given.
+
+    torque_constant, std  (n,)  N m/A (N/A for sliding joints)
+    """
+
+    torque_constant: Array
+    std: Array
+    warnings: tuple[str, ...]
+
+    @property
+    def identified(self) -> NDArray[np.bool_]:
+        return np.isfinite(self.torque_constant)
+
+
+def calibrate_motors(chain: Chain, runs: Sequence[MotorRun], options: StepOptions) -> MotorResult:
+    """Torque constants from pairs of sweeps; InputError where a run is no sweep of its joint.
+
+    The current is fitted on the load's torque, which is known exactly, so that noise does not bias the slope.
+    """
+    n = len(chain)
+    constant, std = np.full(n, np.nan), np.full(n, np.nan)
+    warnings: list[str] = []
+    for k, joint in enumerate(chain.joints):
+        sweeps = _sweeps(chain, k, runs, options)
+        if sweeps is None:
+            continue
+        angle, torque, current = sweeps
+        out = held_out(len(angle), options.split)
+        slope, error = _slope(torque[~out], current[~out])
+        if not abs(slope) > SMALLEST_SHARE * error:
+            reach = float(np.abs(torque).max())
+            warnings.append(
+                f"joint {joint.name}: torque constant unidentifiable: the load reaches it with {reach:.3g} Nm"
+            )
+            continue
+        constant[k], std[k] = 1.0 / slope, error / slope**2
+        if slope < 0:
+            warnings.append(
+                f"joint {joint.name}: torque constant is negative: the current's sign is against the joint's"
+            )
+    return MotorResult(constant, std, tuple(warnings))
+
+
+def judge_motors(
+    chain: Chain, runs: Sequence[MotorRun], options: StepOptions, constants: Mapping[str, float]
+) -> StepQuality:
+    """The known load's torque against what these constants (N m/A, by joint name) say of the current that it adds."""
+    joints: dict[str, JointQuality] = {}
+    samples: list[Sample] = []
+    for k, joint in enumerate(chain.joints):
+        sweeps = _sweeps(chain, k, runs, options)
+        if sweeps is None or joint.name not in constants:
+            continue
+        angle, torque, current = sweeps
+        measured = constants[joint.name] * current
+        out = held_out(len(angle), options.split)
+        joints[joint.name] = JointQuality(
+            quality(torque[~out], measured[~out]), quality(torque[out], measured[out])
+        )
+        samples.append(Sample(joint.name, "position [rad]", angle, measured, torque, out))
+    return StepQuality("Motor", joints, tuple(samples))
+
+
+def _sweeps(
+    chain: Chain, k: int, runs: Sequence[MotorRun], options: StepOptions
+) -> tuple[Array, Array, Array] | None:
+    """Angle, load torque and added current of all of a joint's runs; None where it has none."""
+    own = [run for run in runs if run.joint == chain.joints[k].name]
+    if not own:
+        return None
+    angle, torque, current = (
+        np.concatenate(x) for x in zip(*(_added(chain, k, run, options) for run in own), strict=True)
+    )
+    return angle, torque, current
+
+
+def _slope(x: Array, y: Array) -> tuple[float, float]:
+    """Of y = slope x, and its standard deviation."""
+    power = float(x @ x)
+    if power == 0 or len(x) < 3:
+        return 0.0, np.inf
+    slope = float(x @ y) / power
+    variance = float(np.sum((y - slope * x) ** 2)) / (len(x) - 1)
+    return slope, float(np.sqrt(variance / power))
+
+
+def _added(chain: Chain, k: int, run: MotorRun, options: StepOptions) -> tuple[Array, Array, Array]:
+    """Angle, load torque (N m) and current that the load adds (A), both ways averaged so that friction cancels."""
+    unloaded, loaded = (_both_ways(chain, k, log, options.filter) for log in (run.unloaded, run.loaded))
+    low = max(unloaded[0][0], loaded[0][0])
+    high = min(unloaded[0][-1], loaded[0][-1])
+    if not high > low:
+        raise InputError(
+            f"{run.loaded.name}: joint {run.joint}: loaded and unloaded sweeps do not overlap",
+            "sweep the joint through the same range with and without the load",
+        )
+    count = min(len(unloaded[0]), len(loaded[0]))
+    angle = np.linspace(low, high, count)
+    current = np.interp(angle, *loaded[:2]) - np.interp(angle, *unloaded[:2])
+    q = np.tile(loaded[2], (count, 1))
+    q[:, k] = angle
+    return angle, payload_torque(chain, q, run.load.mass, run.load.com)[:, k], current
+
+
+def _both_ways(chain: Chain, k: int, log: Log, options: FilterOptions) -> tuple[Array, Array, Array]:
+    """Angle, current averaged over both directions there, and the pose of the other joints."""
+    log = checked(log, chain, options.cutoff)
+    if log.quantity != "current":
+        raise InputError(
+            f"{log.name}: torque constants need currents, the log has {log.quantity}",
+            "record motor currents, or leave the motor runs out",
+        )
+    states = filtered(log, options)
+    speed = states.qd[:, k]
+    typical = float(np.median(np.abs(speed[states.use])))
+    steady = states.use & (typical > 0) & away_from(np.abs(speed) <= STEADY * typical, options, states.period)
+    ways = [np.flatnonzero(steady & (np.sign(speed) == sign)) for sign in (1.0, -1.0)]
+    name = chain.joints[k].name
+    if any(len(way) < 10 for way in ways):
+        raise InputError(
+            f"{log.name}: joint {name} is not swept both ways at a constant speed",
+            "run `psdmc excite` for sweeps, or check which joint the run belongs to",
+        )
+    branches = []
+    for way in ways:
+        order = way[np.argsort(states.q[way, k], kind="stable")]
+        branches.append((states.q[order, k], states.effort[order, k]))
+    low = max(branch[0][0] for branch in branches)
+    high = min(branch[0][-1] for branch in branches)
+    independent = max(10, int(2 * options.cutoff * len(ways[0]) * states.period))
+    angle = np.linspace(low, high, independent)
+    current = 0.5 * sum(np.interp(angle, *branch) for branch in branches)
+    return angle, np.asarray(current), np.asarray(np.mean(states.q[steady], axis=0))

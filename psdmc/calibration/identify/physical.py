@@ -1,0 +1,233 @@
+"""Physically consistent parameters: every link's pseudo-inertia positive definite, every drive inertia positive.
+
+Wensing, Kim, Slotine 2018: a link is a distribution of mass just when the 4 x 4 matrix of its integrals of 1, r and r r^T
+is positive. Then the mass matrix is positive definite everywhere, and forward dynamics exist.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.logs.log import Array
+from psdmc.dynamics.parameters import inertia_matrix, second_moments
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.chain import PARAMETERS_PER_LINK
+
+SETTLING = 1e-6
+"""Pull towards the prior's standard parameters (SI, squared) beside a squared standard deviation: settles what theta_b
+leaves open, moves nothing that it fixes."""
+
+
+class NotPhysical(InputError):
+    """No parameters that a real robot could have were found near an estimate."""
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicalOptions:
+    """How far inside, and how near to the file's bodies.
+
+    smallest        eigenvalue of each link's pseudo-inertia, kg with lengths in units of 0.1 m
+    smallest_drive  kg m^2, of each drive inertia that is a parameter
+    known_body      variances that one unit of divergence from the file's body costs (Lee, Wensing, Park 2020: the
+                    divergence of one distribution of mass from another, the same in any unit and frame)
+    unknown_body    likewise from an ordinary body, where the file has none: enough to keep off the boundary
+    """
+
+    smallest: float = 1e-6
+    smallest_drive: float = 1e-4
+    known_body: float = 1.0
+    unknown_body: float = 1e-2
+
+
+ORDINARY_BODY = (1.0, 1.0, 1.0, 5.0)
+"""Diagonal of a pseudo-inertia: 5 kg spread over 0.1 m."""
+THIN_BODY = 1e-3
+"""Eigenvalues of the file's pseudo-inertias count as at least this share of the largest: some published bodies are no
+distribution of mass, and others are points."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Physical:
+    """All values of the fit, theta_b first; theta_b = B x of physical standard parameters x (11 n,).
+
+    distance  from the unconstrained values, in standard deviations
+    """
+
+    x: Array
+    values: Array
+    distance: float
+
+
+def nearest_physical(
+    model: DynamicsModel,
+    values: Array,
+    whitening: Array,
+    never_negative: NDArray[np.bool_] | None = None,
+    options: PhysicalOptions | None = None,
+) -> Physical:
+    """The parameters that a real robot could have, nearest to an estimate of the whole vector.
+
+    values          (l + k,)  theta_b and whatever was estimated with it, friction and offsets
+    whitening       (l + k, l + k)  W: the cost of v is |W (v - values)|^2, in variances (Estimate.whitening)
+    never_negative  (l + k,)  entries that may not be negative
+    For a linear fit that cost is what v adds to its sum of squares: one problem, its weights, and the prior where the
+    data see nothing. InputError where cvxpy is missing, NotPhysical where no solution is found.
+    """
+    options = options or PhysicalOptions()
+    cp: Any = require_cvxpy()
+    l, span = model.l, model.chain.parameter_span
+    inner = cp.Variable(span.shape[1])
+    extra = cp.Variable(len(values) - l) if len(values) > l else None
+    x = span @ inner
+    theta = model.B @ x
+    vector = theta if extra is None else cp.hstack([theta, extra])
+    goal = whitening @ values
+    loss = cp.sum_squares(whitening @ vector - goal)
+    constraints, divergence = [], 0.0
+    for link in range(len(model.chain)):
+        own, away = _link_terms(cp, model, x, link, options)
+        constraints += own
+        divergence += away
+    bounded = np.zeros(len(values), dtype=bool) if never_negative is None else never_negative
+    if extra is not None and bounded[l:].any():
+        constraints.append(extra[np.flatnonzero(bounded[l:])] >= 0)
+    settle = SETTLING * cp.sum_squares(inner - _known_inner(model))
+    problem = cp.Problem(cp.Minimize(loss + settle + divergence), constraints)
+    with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; what matters is checked below
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            problem.solve(solver=cp.CLARABEL)
+        except cp.error.SolverError:
+            raise NotPhysical("physical consistency: clarabel failed") from None
+    if inner.value is None:
+        raise NotPhysical(f"physical consistency: clarabel found no solution ({problem.status})")
+    found = np.asarray(span @ inner.value)
+    _require_physical(model, found)
+    rest = np.zeros(0) if extra is None else np.asarray(extra.value)
+    if bounded[l:].any() and float(rest[bounded[l:]].min()) < -SOLVER_SLACK * float(np.abs(rest).max()):
+        raise InputError(
+            f"physical consistency: friction came out at {float(rest[bounded[l:]].min()):.3g}",
+            "see the unconstrained fit with --no-physical",
+        )
+    rest = np.where(bounded[l:], np.maximum(rest, 0.0), rest)
+    whole = np.concatenate([model.B @ found, rest])
+    return Physical(found, whole, float(np.linalg.norm(whitening @ (whole - values))))
+
+
+def whitening_of(covariance: Array) -> Array:
+    """(m, m) W with W^T W the inverse of a covariance, by way of its correlations."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    correlation = covariance / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)) / scale)
+
+
+def _known_inner(model: DynamicsModel) -> Array:
+    """The span's coordinates of the file's standard parameters; zero where it has none."""
+    span = model.chain.parameter_span
+    known = np.nan_to_num(model.chain.parameters.reshape(-1))
+    return np.asarray(np.linalg.lstsq(span, known, rcond=None)[0])
+
+
+def _require_physical(model: DynamicsModel, x: Array) -> None:
+    """The solver's word, held against the pseudo-inertias themselves; none may be negative beyond rounding."""
+    for joint, link in zip(model.chain.joints, x.reshape(-1, PARAMETERS_PER_LINK), strict=True):
+        matrix = np.zeros((4, 4))
+        matrix[:3, :3] = second_moments(inertia_matrix(link))
+        matrix[:3, 3] = matrix[3, :3] = link[1:4]
+        matrix[3, 3] = link[0]
+        smallest = float(np.linalg.eigvalsh(matrix)[0])
+        if smallest < -ROUNDING * float(np.abs(matrix).max()):
+            raise NotPhysical(
+                f"physical consistency: link {joint.link_name} came out with pseudo-inertia {smallest:.3g}"
+            )
+
+
+SOLVER_SLACK = 1e-5
+"""Of the largest friction or offset: by this much the solver may leave a bound, and it then counts as kept."""
+ROUNDING = 1e-7
+"""Negative eigenvalue of a pseudo-inertia, relative to its largest entry, that counts as zero: the solver keeps
+constraints to 1e-8. The mass matrix is tested by itself."""
+
+
+def _link_terms(
+    cp: Any, model: DynamicsModel, x: Any, link: int, options: PhysicalOptions
+) -> tuple[list[Any], Any]:
+    """Constraints, pseudo-inertia above its bound, and divergence from the file's body; a link that the chain assumes
+    massless has neither."""
+    start = PARAMETERS_PER_LINK * link
+    span: Array = model.chain.parameter_span
+    constraints: list[Any] = []
+    if np.any(span[start + 10]):
+        constraints.append(x[start + 10] >= options.smallest_drive)
+    if not np.any(span[start]):
+        return constraints, 0.0
+    flat = _flat_rows(span, start)
+    held = [k for k in range(4) if k not in flat and not _vanishes(span, start, k)]
+    body = cp.bmat(_pseudo_inertia([x[start + k] for k in range(10)]))
+    constraints += [body[k, :] == 0 for k in flat if not _vanishes(span, start, k)]
+    block = body[held, :][:, held] if len(held) < 4 else body
+    near, weight = _reference_body(model.chain.parameters[link], held, options)
+    divergence = cp.trace(np.linalg.inv(near) @ block) - cp.log_det(block)
+    return [*constraints, block >> options.smallest * np.eye(len(held))], weight * divergence
+
+
+def _pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
+    """Of m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz; metres to tenths: entries of one size, which the solver likes."""
+    m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = link
+    half = 0.5 * (ixx + iyy + izz)
+    t = 10.0
+    return [
+        [t * t * (half - ixx), -t * t * ixy, -t * t * ixz, t * hx],
+        [-t * t * ixy, t * t * (half - iyy), -t * t * iyz, t * hy],
+        [-t * t * ixz, -t * t * iyz, t * t * (half - izz), t * hz],
+        [t * hx, t * hy, t * hz, m],
+    ]
+
+
+def _reference_body(link: Array, held: list[int], options: PhysicalOptions) -> tuple[Array, float]:
+    """The body that a link should resemble, and how much that counts: the file's, or an ordinary one."""
+    if not np.isfinite(link[:10]).all() or not link[0] > 0:
+        return np.diag([ORDINARY_BODY[k] for k in held]), options.unknown_body
+    body = np.array(_pseudo_inertia(link[:10].tolist()))[np.ix_(held, held)]
+    values, axes = np.linalg.eigh(body)
+    return np.asarray((axes * np.maximum(values, THIN_BODY * values[-1])) @ axes.T), options.known_body
+
+
+def _flat_rows(span: Array, start: int) -> list[int]:
+    """Rows of a pseudo-inertia that are zero in any body that the assumptions allow: a link without moment of inertia
+    about an axis has no extent across it, whatever its other moments are (a rod along x where Ixx is assumed zero)."""
+    rows: set[int] = set()
+    for axis, inertia in enumerate((4, 6, 9)):
+        if not np.any(np.abs(span[start + inertia]) > 1e-12):
+            rows |= {k for k in range(3) if k != axis}
+    return sorted(rows)
+
+
+def _vanishes(span: Array, start: int, k: int) -> bool:
+    """Whether the assumptions leave the k-th row of a pseudo-inertia zero (a planar link has no extent along z)."""
+    mass, moments = start, (start + 1, start + 2, start + 3)
+    if k == 3:
+        return not np.any(span[mass])
+    inertia = span[[start + 4, start + 6, start + 9]]
+    own = 0.5 * inertia.sum(axis=0) - inertia[k]
+    return not np.any(span[moments[k]]) and not np.any(np.abs(own) > 1e-12)
+
+
+def require_cvxpy() -> Any:
+    """cvxpy; InputError with the remedy where it or its solver is not installed."""
+    missing = [name for name in ("cvxpy", "clarabel") if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"physical consistency needs {' and '.join(missing)}, not installed here",
+            "pip install 'psdmc[calibrate]', or see the unconstrained fit with --no-physical",
+        )
+    return import_module("cvxpy")

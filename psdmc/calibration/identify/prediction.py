@@ -1,0 +1,65 @@
+"""What a calibrated model file says, beside theta_b, of how torques are predicted: enough to judge it by logs alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from psdmc.calibration.identify.steps import StepOptions
+from psdmc.calibration.logs.filter import FilterOptions, SplitOptions
+
+Law = Literal["linear", "lugre"]
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionRunConstants:
+    """What belongs to a joint's friction run and not to its friction: inertia in that pose (kg m^2), constant torque
+    (N m), and the time between position and current (s)."""
+
+    inertia: float
+    offset: float
+    delay: float
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Numbers of the prediction that are neither theta_b nor a row of friction or motors.
+
+    law         of friction: linear (Coulomb, viscous terms, offset), or LuGre
+    steps       filter and split by step: "all" of one log, else motor, gravity, friction, inertial
+    sign_speed  rad/s over which Coulomb friction changes sign, linear law
+    exponents   of the viscous terms, linear law;  offset  whether each joint has one
+    runs        constants of the friction runs by joint, LuGre
+    """
+
+    law: Law
+    steps: Mapping[str, StepOptions]
+    sign_speed: float = 0.0
+    exponents: tuple[float, ...] = ()
+    offset: bool = False
+    runs: Mapping[str, FrictionRunConstants] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values, which read back the same."""
+        return {
+            "law": self.law,
+            "steps": {
+                name: {"filter": asdict(step.filter), "split": asdict(step.split)}
+                for name, step in self.steps.items()
+            },
+            "sign_speed": self.sign_speed,
+            "exponents": list(self.exponents),
+            "offset": self.offset,
+            "runs": {joint: asdict(constants) for joint, constants in self.runs.items()},
+        }
+
+
+def prediction_from_json(kept: Mapping[str, Any]) -> Prediction:
+    """The reverse of as_json; KeyError or TypeError where something is missing."""
+    steps = {
+        name: StepOptions(FilterOptions(**step["filter"]), SplitOptions(**step["split"]))
+        for name, step in kept["steps"].items()
+    }
+    runs = {joint: FrictionRunConstants(**constants) for joint, constants in kept["runs"].items()}
+    return Prediction(kept["law"], steps, kept["sign_speed"], tuple(kept["exponents"]), kept["offset"], runs)

@@ -1,0 +1,88 @@
+"""What calibration asks of a model: its regressor. Compiled robots have it; here is one straight from the recursion."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from psdmc.calibration.logs.log import Array
+from psdmc.dynamics.frames import base_acceleration, frames_of
+from psdmc.dynamics.kinematics import jacobian, tip_placement
+from psdmc.dynamics.regressor import regressor
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.chain import Chain
+
+
+class Regressor(Protocol):
+    """Y with tau = Y theta_b: q, qd, qdd (..., n) -> (..., n, l). psdmc.compile(model) is one, fast."""
+
+    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array: ...
+
+
+class ChainRegressor:
+    """The regressor of a model by Newton-Euler on arrays of states: no compiler needed."""
+
+    def __init__(self, model: DynamicsModel) -> None:
+        chain = model.chain
+        self._frames = frames_of(chain)
+        self._link_frames = [joint.link_frame for joint in chain.joints]
+        self._base = base_acceleration(chain)
+        self._shape = (len(chain), model.l)
+        self._expand = expansion(model)
+        self._wanted = [int(k) for k in np.flatnonzero(np.abs(self._expand).any(axis=1))]
+
+    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+        q, qd, qdd = (np.moveaxis(np.asarray(a, dtype=np.float64), -1, 0) for a in (q, qd, qdd))
+        rows = regressor(
+            self._frames, self._link_frames, self._wanted, list(q), list(qd), list(qdd), self._base
+        )
+        out = np.zeros((*q.shape[1:], *self._shape))
+        for i, row in enumerate(rows):
+            if row:
+                stacked = np.stack([np.broadcast_to(value, q.shape[1:]) for value in row.values()], axis=-1)
+                out[..., i, :] = stacked @ self._expand[list(row)]
+        return out
+
+
+def expansion(model: DynamicsModel) -> Array:
+    """(11 n, l) standard parameters, within the chain's span, that a theta_b stands for: B @ expansion = identity.
+
+    Where B is in echelon form, its unit columns do it sparsely.
+    """
+    span = model.chain.parameter_span
+    reduced = model.B @ span
+    columns: list[int] = []
+    for i in range(model.l):
+        unit = np.eye(model.l)[i]
+        found = np.flatnonzero(np.abs(reduced - unit[:, None]).max(axis=0) < 1e-12)
+        if not len(found):
+            return np.asarray(span @ np.linalg.pinv(reduced))
+        columns.append(int(found[0]))
+    return np.asarray(span[:, columns])
+
+
+def gravity_regressor(model: Regressor, q: Array) -> Array:
+    """Y_grav(q), (..., n, l): the model's gravity functions alone."""
+    still = np.zeros_like(q)
+    return model.regressor(q, still, still)
+
+
+def payload_torque(chain: Chain, q: Array, mass: float, com: tuple[float, float, float]) -> Array:
+    """(N, n) N m that hold a mass (kg) at `com` (m, tip frame) against gravity: -J^T f with f of (17)."""
+    frames = frames_of(chain)
+    states = [q[:, k] for k in range(len(chain))]
+    rotation, _ = tip_placement(frames, chain.tip, states)
+    arm = [sum(rotation[r][c] * com[c] for c in range(3)) for r in range(3)]
+    weight = (mass * chain.gravity).tolist()
+    moment = (
+        arm[1] * weight[2] - arm[2] * weight[1],
+        arm[2] * weight[0] - arm[0] * weight[2],
+        arm[0] * weight[1] - arm[1] * weight[0],
+    )
+    rows = jacobian(frames, chain.tip, states)
+    torque = np.zeros_like(q)
+    for row, component in zip(rows, (*weight, *moment), strict=True):
+        for k, entry in enumerate(row):
+            torque[:, k] -= entry * component
+    return torque

@@ -1,0 +1,44 @@
+"""What is believable of parameters before any fit: the file's values, and how far from them they may lie."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.logs.log import Array
+from psdmc.robot.chain import Chain
+
+STATES = 200
+SEED = 51_407
+ORDINARY_SPEED = 1.0
+"""rad/s, m/s: what a robot does without haste."""
+ORDINARY_ACCELERATION = 5.0
+"""rad/s^2, m/s^2: likewise."""
+QUIET_JOINT = 0.02
+"""Share of the largest joint torque that every joint is granted: one that carries nothing shows only noise."""
+NO_EFFECT = 1e-9
+"""Share of a column's largest entry below which it does not act on a joint."""
+
+
+def torque_sizes(torque: Array) -> Array:
+    """(n,) RMS of each joint's torque (N, n), N m; none below QUIET_JOINT of the largest."""
+    size = np.sqrt(np.mean(torque**2, axis=0))
+    return np.asarray(np.maximum(size, QUIET_JOINT * float(size.max(initial=0.0)) or 1.0))
+
+
+def base_scale(chain: Chain, model: Regressor, sizes: Array, theta_b: Array | None) -> Array:
+    """(l,) believable size of each base parameter: what would explain a joint's whole torque in an ordinary motion.
+
+    sizes    (n,) N m, of the joints' torques
+    theta_b  the file's values, which are believable themselves; None where it has none
+    """
+    rng = np.random.default_rng(SEED)
+    n = len(chain)
+    q = rng.uniform(-np.pi, np.pi, (STATES, n))
+    qd = rng.uniform(-ORDINARY_SPEED, ORDINARY_SPEED, (STATES, n))
+    qdd = rng.uniform(-ORDINARY_ACCELERATION, ORDINARY_ACCELERATION, (STATES, n))
+    effect = np.sqrt(np.mean(model.regressor(q, qd, qdd) ** 2, axis=0))
+    acts = effect > NO_EFFECT * effect.max(axis=0, initial=0.0)
+    scale = np.min(np.where(acts, sizes[:, None] / np.where(acts, effect, 1.0), np.inf), axis=0)
+    scale = np.where(np.isfinite(scale), scale, 1.0)
+    return scale if theta_b is None else np.maximum(scale, np.abs(theta_b))

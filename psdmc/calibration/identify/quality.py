@@ -1,0 +1,31 @@
+"""How well a prediction meets what was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from psdmc.calibration.logs.log import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """RMSE (target's unit) and R^2 of one joint in one step; R^2 is NaN where the target does not vary."""
+
+    rmse: float
+    r2: float
+
+
+def quality(measured: Array, predicted: Array) -> Quality:
+    """Of one joint, (N,) each: R^2 = 1 - sum of squared errors over that about the mean."""
+    if len(measured) == 0:
+        return Quality(float("nan"), float("nan"))
+    error = float(np.mean((measured - predicted) ** 2))
+    spread = float(np.var(measured))
+    return Quality(float(np.sqrt(error)), 1.0 - error / spread if spread > 0 else float("nan"))
+
+
+def qualities(measured: Array, predicted: Array) -> tuple[Quality, ...]:
+    """Of every joint, (N, n) each."""
+    return tuple(quality(measured[:, k], predicted[:, k]) for k in range(measured.shape[1]))

@@ -1,0 +1,109 @@
+"""Which unknowns the data show: by themselves, weakly, only together with others, or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.least_squares import FitOptions
+from psdmc.calibration.logs.log import Array
+
+IDENTIFIED = "identified"
+WEAK = "weakly visible"
+TOGETHER_WORDS = "only in combination with "
+WEAK_SHARE = 0.5
+"""Standard deviation, as a share of the value, from which a parameter is called weakly visible: its sign is then known
+with two standard deviations at most."""
+INVISIBLE_SHARE = 0.9999
+"""Share (squared) of a parameter in unseen directions from which nothing of it is seen: a hundredth may leak."""
+TOGETHER = 0.2
+"""Correlation within unseen directions from which two parameters are said to show together."""
+NAMED = 4
+"""Partners that a message names."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Visibility:
+    """What the data show of each unknown.
+
+    words       (m)  "identified", "weakly visible", "only in combination with ...", "not visible: kept at ..."
+    determined  (m,) whether the data fix the unknown by itself, however weakly: then it has a standard deviation
+    """
+
+    words: tuple[str, ...]
+    determined: NDArray[np.bool_]
+
+
+def visibility(
+    names: Sequence[str],
+    values: Array,
+    std: Array,
+    unseen: Array,
+    kept_at: Sequence[str],
+    options: FitOptions | None = None,
+) -> Visibility:
+    """Words for every unknown.
+
+    values, std   (m,)  delivered;  unseen  (m, k)  directions in units of what is believable
+    kept_at       (m) where each stays where it is unseen, in words
+    """
+    limit = (options or FitOptions()).unseen_share
+    share = np.minimum(np.sum(unseen**2, axis=1), 1.0)
+    size = np.linalg.norm(unseen, axis=1)
+    size[size == 0] = 1.0
+    together = np.abs(unseen @ unseen.T) / np.outer(size, size)
+    words = []
+    for j in range(len(names)):
+        if share[j] < limit:
+            weak = not std[j] < WEAK_SHARE * abs(values[j])
+            words.append(WEAK if weak else IDENTIFIED)
+        else:
+            words.append(_unseen(names, j, share, together[j], limit, kept_at[j]))
+    return Visibility(tuple(words), share < limit)
+
+
+def _unseen(names: Sequence[str], j: int, share: Array, together: Array, limit: float, kept_at: str) -> str:
+    if share[j] > INVISIBLE_SHARE:
+        return f"not visible: kept at {kept_at}"
+    partly = (share >= limit) & (share <= INVISIBLE_SHARE) & (together > TOGETHER)
+    partners = [k for k in np.argsort(-together, kind="stable") if partly[k] and k != j]
+    if not partners:
+        return f"mostly invisible: near {kept_at}"
+    named = ", ".join(names[k] for k in partners[:NAMED])
+    more = f" and {len(partners) - NAMED} more" if len(partners) > NAMED else ""
+    return f"{TOGETHER_WORDS}{named}{more}"
+
+
+def visibility_warnings(step: str, names: Sequence[str], found: Visibility) -> tuple[str, ...]:
+    """One sentence for each way in which the data do not show unknowns, friction and offsets like base parameters."""
+    together = [
+        f"{name} (with {words.removeprefix(TOGETHER_WORDS)})"
+        for name, words in zip(names, found.words, strict=True)
+        if words.startswith(TOGETHER_WORDS)
+    ]
+    groups: dict[str, list[str]] = {}
+    for name, words in zip(names, found.words, strict=True):
+        if words not in (IDENTIFIED, WEAK) and not words.startswith(TOGETHER_WORDS):
+            groups.setdefault(words, []).append(name)
+    alone = tuple(f"{step}: {', '.join(own)}: {words}" for words, own in groups.items())
+    if not together:
+        return alone
+    return (
+        f"{step}: visible only in combination, each as near to the prior as it may be: {'; '.join(together)}",
+        *alone,
+    )
+
+
+def weak_notes(step: str, names: Sequence[str], found: Visibility) -> tuple[str, ...]:
+    """Names what the data fix, but hardly better than its own size."""
+    weak = [name for name, words in zip(names, found.words, strict=True) if words == WEAK]
+    if not weak:
+        return ()
+    seen = sum(words == IDENTIFIED for words in found.words)
+    return (
+        f"{step}: {seen} of {len(names)} unknowns identified; {len(weak)} weakly visible (standard deviation above "
+        f"half of the value): {', '.join(weak)}",
+    )

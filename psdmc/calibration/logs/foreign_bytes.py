@@ -1,0 +1,67 @@
+"""Files that others wrote: opened with a bound on their size, decoded with nothing but InputErrors coming out."""
+
+from __future__ import annotations
+
+import stat
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from psdmc.calibration.logs.wording import LONGEST_QUOTE
+from psdmc.errors import InputError, PsdmcError
+
+LARGEST_FILE = 2 * 1024**3
+"""Bytes of a table or bag: two hours of seven joints at 1 kHz as text, and what a workstation's memory holds."""
+LARGEST_TOML = 256 * 1024
+"""Bytes of a campaign or plant: a thousand runs; beyond, the standard library's reader takes seconds."""
+
+WRITE_AGAIN = "record, export or copy it again; the format goes by the file's ending"
+
+
+@contextmanager
+def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
+    """The file, for reading bytes; InputError where it is missing, unreadable, empty, no file or larger than `largest`."""
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{path}: is not a file", "give the path of a file")
+        if status.st_size == 0:
+            raise InputError(f"{path}: is empty", "record or export it again")
+        if status.st_size > largest:
+            raise InputError(
+                f"{path}: has {status.st_size:,} bytes, expected at most {largest:,}", "cut it into several"
+            )
+        file = path.open("rb")
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such file", "check the path") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise InputError(f"{path}: cannot be read: {_reason(error)}", "check its path and rights") from error
+    with file:
+        yield file
+
+
+@contextmanager
+def decoding(name: str, what: str, hint: str = WRITE_AGAIN) -> Iterator[None]:
+    """Whatever a decoder of foreign bytes raises inside becomes "NAME: not WHAT, or damaged: why".
+
+    Decoders of damaged bytes fail in many ways (struct.error, KeyError, AssertionError, MemoryError, ...): none of
+    them is a fault of psdmc, and each is the file's.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("error", RuntimeWarning)
+            yield
+    except PsdmcError:
+        raise
+    except Exception as error:
+        raise InputError(f"{name}: not {what}, or damaged: {_reason(error)}", hint) from error
+
+
+def _reason(error: Exception) -> str:
+    """One short line."""
+    text = getattr(error, "strerror", None) or str(error)
+    lines = text.strip().splitlines()
+    return lines[0][: 2 * LONGEST_QUOTE] if lines else type(error).__name__

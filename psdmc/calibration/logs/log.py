@@ -1,0 +1,110 @@
+"""A robot's log: what the joints did and what the motors gave, row by row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.logs.wording import listed
+from psdmc.errors import InputError
+
+Array = NDArray[np.float64]
+Quantity = Literal["current", "motor_torque", "joint_torque"]
+
+QUANTITIES: tuple[Quantity, ...] = ("current", "motor_torque", "joint_torque")
+
+LARGEST_NUMBER = 1e20
+"""In any unit: what is beyond it is no time, angle or torque, and its square would soon overflow."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Log:
+    """Samples of one run. N rows, n joints.
+
+    name         how messages call it
+    joint_names  n, in the order of the columns
+    time         (N,)    s
+    position     (N, n)  rad; m for sliding joints
+    velocity     (N, n)  per s, or None where the log has none
+    effort       (N, n)  A, N m or N, as `quantity` says; motor torque counts positive in the joint's positive sense
+    quantity     current: of the motor; motor_torque: with friction; joint_torque: without
+    notes        what reading it assumed
+    sliding      names of joints whose position is in m, the others' being in rad; None: the log does not say
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    time: Array
+    position: Array
+    velocity: Array | None
+    effort: Array
+    quantity: Quantity
+    notes: tuple[str, ...] = ()
+    sliding: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joint_names", tuple(self.joint_names))
+        shape = (len(np.asarray(self.time)), len(self.joint_names))
+        object.__setattr__(self, "time", _column(self.time, shape[:1], f"{self.name}: time"))
+        for what in ("position", "velocity", "effort"):
+            values = getattr(self, what)
+            if values is not None:
+                object.__setattr__(self, what, _column(values, shape, f"{self.name}: {what}"))
+        if self.quantity not in QUANTITIES:
+            raise InputError(f"{self.name}: quantity {self.quantity!r}", f"known are {', '.join(QUANTITIES)}")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def duration(self) -> float:
+        """s from the first row to the last."""
+        return float(self.time[-1] - self.time[0]) if len(self) else 0.0
+
+    @property
+    def period(self) -> float:
+        """s between rows: the median."""
+        return float(np.median(np.diff(self.time))) if len(self) > 1 else np.inf
+
+    def ordered(self, joint_names: tuple[str, ...]) -> Log:
+        """The same log with its columns in the order of these joints; InputError names every joint that is missing."""
+        missing = [name for name in joint_names if name not in self.joint_names]
+        if missing:
+            raise InputError(
+                f"{self.name}: no columns for joint(s) {listed(missing)}",
+                f"the log has {listed(self.joint_names)}; joints are matched by name",
+            )
+        columns = [self.joint_names.index(name) for name in joint_names]
+        velocity = None if self.velocity is None else self.velocity[:, columns]
+        return replace(
+            self,
+            joint_names=joint_names,
+            position=self.position[:, columns],
+            velocity=velocity,
+            effort=self.effort[:, columns],
+        )
+
+    def between(self, start: float, end: float) -> Log:
+        """The rows with start <= time < end, s."""
+        rows = (self.time >= start) & (self.time < end)
+        velocity = None if self.velocity is None else self.velocity[rows]
+        return replace(
+            self,
+            time=self.time[rows],
+            position=self.position[rows],
+            velocity=velocity,
+            effort=self.effort[rows],
+        )
+
+
+def _column(values: object, shape: tuple[int, ...], what: str) -> Array:
+    array = np.array(values, dtype=np.float64)
+    if array.shape != shape:
+        raise InputError(
+            f"{what} has shape {array.shape}, expected {shape}", "one row per time, one column per joint"
+        )
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,177 @@
+"""ROS 2 bags: sensor_msgs/msg/JointState through rosbags, with or without the bag's metadata.yaml."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from psdmc.calibration.logs.foreign_bytes import decoding, opened
+from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.mcap_size import require_mcap_size
+from psdmc.calibration.logs.table_limits import LARGEST_COLUMNS, LARGEST_ROWS, LARGEST_VALUES
+from psdmc.calibration.logs.wording import listed, quoted
+from psdmc.errors import InputError
+
+MESSAGE_TYPE = "sensor_msgs/msg/JointState"
+BAGS = (".db3", ".mcap")
+METADATA = "metadata.yaml"
+LARGEST_METADATA = 1024**2
+"""Bytes of a bag's metadata.yaml: thousands of topics."""
+STEPS_PER_BYTE = 100
+"""SQLite's instructions per byte of a bag; honest ones take less than one."""
+STEPS = 1_000_000
+"""Instructions that any bag may take."""
+
+
+def read_bag(path: Path, topic: str = "/joint_states") -> Log:
+    """The joint states of one topic; effort is read as motor torque.
+
+    path   a bag's folder, or a bare .db3 or .mcap file of it
+    Time is each message's header stamp. InputError where the bag is damaged, the topic is missing, or its messages
+    disagree on joints.
+    """
+    name = path.name or str(path)
+    for file in _files(path):
+        with opened(file):
+            pass
+        if file.suffix.lower() == ".mcap":
+            require_mcap_size(file)
+    with decoding(str(path), "a ROS 2 bag"):
+        rows = _messages(path, topic)
+    if not rows:
+        raise InputError(
+            f"{path}: no {MESSAGE_TYPE} on topic '{topic}'", "the log's states are expected on that topic"
+        )
+    names = tuple(rows[0].name)
+    _require_alike(rows, names, str(path))
+    stamps = np.array([row.header.stamp.sec + 1e-9 * row.header.stamp.nanosec for row in rows])
+    has_velocity = all(len(row.velocity) == len(names) for row in rows)
+    return Log(
+        name=name,
+        joint_names=names,
+        time=stamps - stamps[0],
+        position=_stacked(rows, "position"),
+        velocity=_stacked(rows, "velocity") if has_velocity else None,
+        effort=_stacked(rows, "effort"),
+        quantity="motor_torque",
+        notes=(f"{name}: 'effort' is read as motor torque, friction included",),
+    )
+
+
+def _files(path: Path) -> tuple[Path, ...]:
+    """The files that reading a bag opens; InputError where a folder is no bag."""
+    if not is_folder(path):
+        return (path,)
+    found = tuple(sorted(entry for entry in path.iterdir() if entry.suffix.lower() in BAGS))
+    if not (path / METADATA).exists():
+        raise InputError(
+            f"{path}: a folder without {METADATA}, so no ROS 2 bag, and without campaign.toml, so no campaign",
+            f"give its file {found[0].name}" if found else "give a log, a bag or a campaign",
+        )
+    with opened(path / METADATA, LARGEST_METADATA):
+        pass
+    return found
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder of this name; names that no file can have are none."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def _require_alike(rows: Sequence[Any], names: tuple[str, ...], path: str) -> None:
+    """InputError names the first message that does not fit the first one."""
+    if not names or len(names) != len(dict.fromkeys(names)) or 4 * len(names) > LARGEST_COLUMNS:
+        raise InputError(
+            f"{path}: message 1 names {len(names)} joints: {listed([quoted(x) for x in names])}",
+            "record messages that name every joint once",
+        )
+    for k, row in enumerate(rows, start=1):
+        if tuple(row.name) != names:
+            raise InputError(
+                f"{path}: message {k} names joints {listed([quoted(x) for x in row.name])}, "
+                f"the first {listed([quoted(x) for x in names])}",
+                "record the joints of one publisher on a topic of their own",
+            )
+        for what in ("position", "effort"):
+            if len(getattr(row, what)) != len(names):
+                raise InputError(
+                    f"{path}: message {k} has {len(getattr(row, what))} {what}s for {len(names)} joints",
+                    "record a topic whose messages carry position and effort of every joint",
+                )
+
+
+def _stacked(rows: Sequence[Any], what: str) -> Array:
+    return np.array([getattr(row, what) for row in rows], dtype=np.float64)
+
+
+def _messages(path: Path, topic: str) -> list[Any]:
+    try:
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise InputError("ROS 2 bags need rosbags", "pip install 'psdmc[calibrate]'") from error
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    rows: list[Any] = []
+    size = 0
+    for raw in _raw_messages(path, topic):
+        rows.append(store.deserialize_cdr(raw, MESSAGE_TYPE))
+        size += len(raw)
+        if len(rows) > LARGEST_ROWS or size > 8 * LARGEST_VALUES:
+            raise InputError(
+                f"{path}: more than {LARGEST_ROWS:,} messages or {8 * LARGEST_VALUES:,} bytes of them",
+                "cut the bag into several",
+            )
+    return rows
+
+
+def _raw_messages(path: Path, topic: str) -> Iterator[bytes]:
+    """Serialised messages in the order of recording: a bare .db3 is read as the SQLite file it is."""
+    if path.suffix.lower() == ".db3" and not (path.parent / METADATA).exists():
+        yield from _sqlite_messages(path, topic)
+        return
+    from rosbags.highlevel import AnyReader
+
+    folder = path if is_folder(path) or path.suffix.lower() == ".mcap" else path.parent
+    with AnyReader([folder]) as reader:
+        connections = [c for c in reader.connections if c.topic == topic and c.msgtype == MESSAGE_TYPE]
+        for _, _, raw in reader.messages(connections=connections) if connections else ():
+            yield bytes(raw)
+
+
+def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
+    """Blobs of a bag's table `messages`; a view of that name, which could compute for ever, is refused."""
+    tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('messages', 'topics')"
+    query = (
+        "SELECT data FROM messages JOIN topics ON topics.id = messages.topic_id "
+        "WHERE topics.name = ? AND topics.type = ? ORDER BY messages.timestamp, messages.id"
+    )
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
+        connection.execute("PRAGMA trusted_schema = OFF")
+        connection.set_progress_handler(lambda: 1, STEPS + STEPS_PER_BYTE * path.stat().st_size)
+        if _count(connection, tables) != 2:
+            raise InputError(
+                f"{path}: not a ROS 2 bag: no tables 'messages' and 'topics'",
+                "give a .db3 or .mcap file that ros2 bag recorded, or its folder",
+            )
+        for (data,) in connection.execute(query, (topic, MESSAGE_TYPE)):
+            if not isinstance(data, bytes):
+                raise InputError(
+                    f"{path}: not a ROS 2 bag: a message is {type(data).__name__}, expected bytes",
+                    "record the bag again",
+                )
+            yield data
+
+
+def _count(connection: sqlite3.Connection, query: str) -> int:
+    """A count; -1 where SQLite says that memory ran out, which it says of some damaged heads at once."""
+    try:
+        return int(connection.execute(query).fetchone()[0])
+    except MemoryError:
+        return -1

@@ -1,0 +1,214 @@
+"""What can be wrong with a log, found before anything is fitted, and named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import zip_longest
+from typing import NamedTuple
+
+import numpy as np
+
+from psdmc.calibration.logs.check_options import CheckOptions
+from psdmc.calibration.logs.log import LARGEST_NUMBER, Array, Log
+from psdmc.calibration.logs.log_time import position_slope, time_faults, velocity_ratios
+from psdmc.calibration.logs.wording import first_faults, listed
+from psdmc.errors import InputError
+from psdmc.robot.chain import Chain
+
+
+class Fault(NamedTuple):
+    """What forbids a log's use, and the remedy."""
+
+    text: str
+    remedy: str
+
+
+def checked(log: Log, chain: Chain, cutoff: float, options: CheckOptions | None = None) -> Log:
+    """The log with its joints in the chain's order and what was noticed in its notes.
+
+    cutoff   Hz, of the filter that the log is meant for
+    InputError names what forbids its use: first values that are no numbers, then faults of time, then the rest.
+    """
+    options = options or CheckOptions()
+    if len(log) < 2:
+        raise InputError(
+            f"{log.name}: too short: {len(log)} row(s)", f"at least {options.shortest:g} s are needed"
+        )
+    log = log.ordered(chain.joint_names)
+    for stage in _FAULTS:
+        found = [check(log, chain, cutoff, options) for check in stage]
+        # the first of each kind before the others: one wrong unit gives a fault for every joint
+        faults = [fault for same_rank in zip_longest(*found) for fault in same_rank if fault is not None]
+        if faults:
+            raise InputError(
+                f"{log.name}: {first_faults([fault.text for fault in faults])}", faults[0].remedy
+            )
+    notes = [text for check in _REMARKS for text in check(log, chain, cutoff, options)]
+    return replace(log, notes=(*log.notes, *(f"{log.name}: {note}" for note in notes)))
+
+
+def still_joints(log: Log, options: CheckOptions | None = None) -> tuple[bool, ...]:
+    """Per joint, whether it does not move."""
+    smallest = (options or CheckOptions()).smallest_motion
+    return tuple(bool(motion < smallest) for motion in np.ptp(log.position, axis=0))
+
+
+def _no_numbers(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    faults = [_no_number("time", log.time, log)]
+    for what, values in (("position", log.position), ("velocity", log.velocity), ("effort", log.effort)):
+        if values is None:
+            continue
+        called = f"effort ({log.quantity})" if what == "effort" else what
+        faults += [_no_number(f"{called} of joint {name}", values[:, k], log) for k, name in _numbered(log)]
+    return [fault for fault in faults if fault is not None]
+
+
+def _no_number(what: str, values: Array, log: Log) -> Fault | None:
+    """A column's first value that is not finite, or so large that it is no measurement."""
+    rows = np.flatnonzero(~(np.abs(values) < LARGEST_NUMBER))
+    if not len(rows):
+        return None
+    first = values[rows[0]]
+    word = "is not finite" if not np.isfinite(first) else f"reaches {first:.3g}"
+    return Fault(
+        f"{what} {word} in {len(rows)} row(s), the first is row {rows[0] + 1} of {len(log)}",
+        "cut the log to a clean stretch, or leave a damaged velocity out",
+    )
+
+
+def _numbered(log: Log) -> Iterator[tuple[int, str]]:
+    return enumerate(log.joint_names)
+
+
+def _units(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    """Columns in rad for joints that slide, or in m for joints that turn."""
+    if log.sliding is None:
+        return []
+    faults = []
+    for joint in chain.joints:
+        slides = joint.kind == "prismatic"
+        if slides != (joint.name in log.sliding):
+            found, right = ("rad", "m") if slides else ("m", "rad")
+            faults.append(
+                Fault(
+                    f"joint {joint.name}: position_{found}.{joint.name}, but it {'slides' if slides else 'turns'}",
+                    f"expected position_{right}.<joint>, and its other columns in units to match",
+                )
+            )
+    return faults
+
+
+def _positions(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    faults = []
+    for k, joint in enumerate(chain.joints):
+        reach = float(np.abs(log.position[:, k]).max(initial=0.0))
+        bound = max(abs(joint.limits.lower), abs(joint.limits.upper))
+        bound = options.free_position if not np.isfinite(bound) else bound * (1 + options.limit_slack)
+        if not reach > bound:
+            continue
+        unit = "rad" if joint.kind == "revolute" else "m"
+        suspicion = ": degrees?" if joint.kind == "revolute" and np.radians(reach) <= bound else ""
+        faults.append(
+            Fault(
+                f"joint {joint.name}: position reaches {reach:.4g} {unit}, limit {bound:.4g} {unit}{suspicion}",
+                "positions are expected in rad: convert the columns"
+                if suspicion
+                else "correct the columns, or the limits in the robot file",
+            )
+        )
+    return faults
+
+
+def _speeds(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    faults = []
+    slope = position_slope(log)
+    for k, joint in enumerate(chain.joints):
+        speed = float(np.quantile(np.abs(slope[:, k]), 0.99))
+        bound = joint.limits.speed
+        bound = options.free_speed if not np.isfinite(bound) else bound * (1 + options.limit_slack)
+        if speed > bound:
+            faults.append(
+                Fault(
+                    f"joint {joint.name}: moves at {speed:.4g} per s, limit {bound:.4g}: unit of time or position?",
+                    "time is expected in s, positions in rad or m: convert the columns",
+                )
+            )
+    return faults
+
+
+def _rates(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    """The logged velocity against the position's slope: a ratio far from one is a wrong unit."""
+    faults = []
+    for k, ratio in velocity_ratios(log).items():
+        if abs(ratio - 1.0) <= options.rate_disagreement:
+            continue
+        degrees = 40 < abs(ratio) < 70 or 0.014 < abs(ratio) < 0.025
+        faults.append(
+            Fault(
+                f"joint {log.joint_names[k]}: velocity is {ratio:.4g} times the position's slope"
+                f"{': degrees?' if degrees else ''}",
+                "velocities are expected in rad/s or m/s, with the position's sign: convert the columns, "
+                "or leave them out",
+            )
+        )
+    return faults
+
+
+def _nothing_there(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    faults = []
+    if all(still_joints(log, options)):
+        faults.append(Fault("no joint moves", "give a log of a motion; `psdmc excite` plans one"))
+    if not log.effort.any():
+        faults.append(
+            Fault(
+                f"{log.quantity} is zero throughout, for every joint",
+                "record the motors' currents or torques too",
+            )
+        )
+    return faults
+
+
+def _jitter(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+    steps = np.diff(log.time)
+    jitter = float(np.abs(steps - log.period).max() / log.period)
+    return [f"sample times jitter by {jitter:.0%}: resampled"] if jitter > options.largest_jitter else []
+
+
+def _saturation(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+    notes = []
+    for k, name in enumerate(log.joint_names):
+        size = np.abs(log.effort[:, k])
+        share = float(np.mean(size >= size.max() * (1 - 1e-9)))
+        if size.max() > 0 and share > options.saturated_share:
+            notes.append(
+                f"joint {name}: {share:.0%} of its {log.quantity} sits at {size.max():.4g}: saturated?"
+            )
+    return notes
+
+
+def _still(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+    still = [name for name, rests in zip(log.joint_names, still_joints(log, options), strict=True) if rests]
+    return [f"joint(s) {listed(still)} stand still"] if still else []
+
+
+def _dead_effort(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+    dead = [name for k, name in enumerate(log.joint_names) if not log.effort[:, k].any()]
+    return [f"joint(s) {listed(dead)}: {log.quantity} is zero throughout"] if dead else []
+
+
+Check = Callable[[Log, Chain, float, CheckOptions], list[Fault]]
+Remark = Callable[[Log, Chain, float, CheckOptions], list[str]]
+
+
+def _times(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    return [Fault(*fault) for fault in time_faults(log, cutoff, options)]
+
+
+_FAULTS: tuple[tuple[Check, ...], ...] = (
+    (_no_numbers, _units),
+    (_times,),
+    (_positions, _speeds, _rates, _nothing_there),
+)
+"""In stages: what a later one computes makes sense only where the earlier ones found nothing."""
+_REMARKS: tuple[Remark, ...] = (_jitter, _saturation, _still, _dead_effort)

@@ -1,0 +1,93 @@
+"""What an MCAP file's record heads say of sizes, looked at before its reader makes room for them."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import BinaryIO
+
+from psdmc.calibration.logs.foreign_bytes import WRITE_AGAIN, opened
+from psdmc.calibration.logs.table_limits import ALWAYS_ALLOWED, LARGEST_EXPANSION
+from psdmc.errors import InputError
+
+MAGIC = b"\x89MCAP0\r\n"
+FOOTER, CHUNK, CHUNK_INDEX = 0x02, 0x06, 0x08
+HEAD = struct.Struct("<BQ")
+"""Kind and length of a record."""
+FROM_FOOTER = len(MAGIC) + 20
+"""Bytes from the footer's content to the end: two places, a checksum, and the magic again."""
+CHUNK_HEAD = struct.Struct("<QQQII")
+"""Of a chunk: first and last time, unpacked size, checksum, length of the compression's name; packed size follows it."""
+SIZES = struct.Struct("<QQ")
+"""The end of a chunk's index: packed and unpacked size."""
+
+
+def require_mcap_size(path: Path) -> None:
+    """InputError where a record is longer than the file, or chunks or their index unpack to more than its size allows."""
+    with opened(path) as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            raise InputError(f"{path}: not an MCAP file", "give a file that ros2 bag recorded")
+        records = _records(file, path)
+        for kind in (CHUNK, CHUNK_INDEX):
+            _require_size([_claims(file, *record) for record in records if record[0] == kind], file, path)
+        _require_summary(file, records, path)
+
+
+def _require_size(claims: list[tuple[int, int]], file: BinaryIO, path: Path) -> None:
+    """`claims`: packed and unpacked sizes of chunks, or those that their index says."""
+    file_bytes = file.seek(0, 2)
+    packed, unpacked = (sum(sizes) for sizes in zip(*claims, strict=True)) if claims else (0, 0)
+    allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file_bytes)
+    if unpacked > allowed:
+        raise InputError(
+            f"{path}: unpacks to {unpacked:,} bytes, expected at most {allowed:,}",
+            "record the bag again without compression, or cut it into several",
+        )
+    if packed > file_bytes:
+        raise InputError(
+            f"{path}: damaged: chunks of {packed:,} bytes in a file of {file_bytes:,}", WRITE_AGAIN
+        )
+
+
+def _records(file: BinaryIO, path: Path) -> list[tuple[int, int, int]]:
+    """Kind, place (of the head) and length of every record up to the footer or the end."""
+    found: list[tuple[int, int, int]] = []
+    end, place = file.seek(0, 2), len(MAGIC)
+    while place + HEAD.size <= end:
+        file.seek(place)
+        kind, length = HEAD.unpack(file.read(HEAD.size))
+        if length > end - place - HEAD.size:
+            raise InputError(
+                f"{path}: damaged: a record of {length:,} bytes at byte {place:,} of {end:,}", WRITE_AGAIN
+            )
+        found.append((kind, place, length))
+        if kind == FOOTER:
+            break
+        place += HEAD.size + length
+    return found
+
+
+def _claims(file: BinaryIO, kind: int, place: int, length: int) -> tuple[int, int]:
+    """Packed and unpacked size that a chunk, or its index, says; none where the record is too short to say it."""
+    start = place + HEAD.size
+    if kind == CHUNK_INDEX:
+        file.seek(start + max(length - SIZES.size, 0))
+        packed, unpacked = SIZES.unpack(file.read(SIZES.size)) if length >= SIZES.size else (0, 0)
+        return packed, unpacked
+    file.seek(start)
+    head = file.read(CHUNK_HEAD.size) if length >= CHUNK_HEAD.size else b""
+    if not head:
+        return 0, 0
+    _, _, unpacked, _, name = CHUNK_HEAD.unpack(head)
+    file.seek(start + CHUNK_HEAD.size + name)
+    size = file.read(8)
+    return struct.unpack("<Q", size)[0] if len(size) == 8 else 0, unpacked
+
+
+def _require_summary(file: BinaryIO, records: list[tuple[int, int, int]], path: Path) -> None:
+    """InputError where the footer at the file's end leads to what is no record: its length would be any bytes."""
+    file.seek(max(file.seek(0, 2) - FROM_FOOTER, 0))
+    footer = file.read(8)
+    summary = struct.unpack("<Q", footer)[0] if len(footer) == 8 else 0
+    if summary and summary not in [place for _, place, _ in records]:
+        raise InputError(f"{path}: damaged: its summary is not where its footer says", WRITE_AGAIN)

@@ -1,0 +1,56 @@
+"""Noise of the position sensors, from the log itself, and what it does to states: a joint at rest that ripples, and
+columns of a regressor that noise alone would give."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.logs.log import Array
+
+CLIPPED = 10.0
+"""Typical deviations beyond which a sample is a fault, not noise, and counts as this much."""
+SMALLEST_SHARE = 0.05
+"""Of the spectrum above the cut-off; below it, the filter leaves nothing to judge noise by, and this is assumed."""
+REST_DEVIATIONS = 10.0
+"""Peak to peak of filtered noise, in standard deviations, over as many samples as logs have: 8 to 9 for normal noise."""
+REST_STEPS = 3.0
+"""Steps of the encoder within which a joint counts as resting: a position between two steps flickers."""
+SEED = 30_301
+
+
+def position_noise(position: Array, filtered: Array, in_band: float) -> Array:
+    """(n,) standard deviation of a raw sample, rad or m, from what the low-pass took away.
+
+    position, filtered  (N, n) of a log on an even grid;  in_band  share of the spectrum below the cut-off
+    Taken as white: what lies above the cut-off stands for what lies below.
+    """
+    left = position - filtered
+    left = left - np.median(left, axis=0)
+    typical = 1.4826 * np.median(np.abs(left), axis=0)
+    bound = CLIPPED * np.maximum(typical, smallest_steps(position))
+    size = np.sqrt(np.mean(np.clip(left, -bound, bound) ** 2, axis=0))
+    return np.asarray(size / np.sqrt(max(1.0 - in_band, SMALLEST_SHARE)))
+
+
+def smallest_steps(position: Array) -> Array:
+    """(n,) smallest difference between two readings: the encoder's step where a joint hardly moves."""
+    steps = np.zeros(position.shape[1])
+    for k, column in enumerate(position.T):
+        values = np.unique(column)
+        steps[k] = float(np.diff(values).min()) if len(values) > 1 else 0.0
+    return steps
+
+
+def resting(
+    position: Array, filtered: Array, noise: Array, in_band: float, smallest: float
+) -> NDArray[np.bool_]:
+    """(n,) whether a joint's motion is no more than its sensor's noise, a few encoder steps, or `smallest` (rad or m)."""
+    by_noise = np.ptp(filtered, axis=0) < REST_DEVIATIONS * noise * np.sqrt(in_band)
+    motion = np.ptp(position, axis=0)
+    return np.asarray(by_noise | (motion <= REST_STEPS * smallest_steps(position)) | (motion < smallest))
+
+
+def noise_like(noise: Array, count: int) -> Array:
+    """(count, n) raw position noise of these standard deviations: seeded, the same on every call."""
+    return np.asarray(noise * np.random.default_rng(SEED).standard_normal((count, len(noise))))

@@ -1,0 +1,170 @@
+"""CSV as loggers and spreadsheets write it: named columns of numbers, every fault with its line and column.
+
+UTF-8, with or without a byte-order mark; cells separated by comma, semicolon or tab, quoted or not. Where a semicolon or
+tab separates them, numbers may have decimal commas.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+from collections.abc import Sequence
+
+import numpy as np
+
+from psdmc.calibration.logs.foreign_bytes import decoding
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.table_limits import require_names, require_size
+from psdmc.calibration.logs.wording import quoted
+from psdmc.errors import InputError
+
+SEPARATORS = (",", ";", "\t")
+TIME = "time_s"
+
+_OTHER_MARKS = (
+    (codecs.BOM_UTF32_LE, "UTF-32"),
+    (codecs.BOM_UTF16_LE, "UTF-16"),
+    (codecs.BOM_UTF16_BE, "UTF-16"),
+)
+
+
+def columns_from_csv(data: bytes, name: str) -> dict[str, Array]:
+    """Named columns of a CSV file's bytes; InputError says which line and column is no number."""
+    first, header, body = _header_and_body(_text(data, name), name)
+    separator = _separator(header)
+    with decoding(f"{name}: line {first}", "a header"):
+        names = _cells(header, separator)
+    _require_header(names, name)
+    require_names(names, name)
+    if not body.strip():
+        raise InputError(f"{name}: no rows under its header", "record or export it again")
+    require_size(body.count("\n") + 1, len(names), len(data), name)
+    body = _with_points(body, separator, name)
+    values = _numbers(body, separator)
+    if values is None or values.shape[1] != len(names):
+        raise _first_fault(body, names, separator, first + 1, name)
+    return {column: values[:, k] for k, column in enumerate(names)}
+
+
+def header_names(line: bytes, name: str) -> tuple[str, ...]:
+    """The column names of a CSV file's first line."""
+    _, header, _ = _header_and_body(_text(line, name), name)
+    with decoding(name, "a header"):
+        return tuple(_cells(header, _separator(header)))
+
+
+def _text(data: bytes, name: str) -> str:
+    for mark, encoding in _OTHER_MARKS:
+        if data.startswith(mark):
+            raise InputError(f"{name}: is {encoding} text, expected UTF-8", "save it as CSV in UTF-8")
+    if b"\0" in data:
+        raise InputError(
+            f"{name}: not a CSV file: it holds binary data or UTF-16 text", "save it as CSV in UTF-8"
+        )
+    data = data.removeprefix(codecs.BOM_UTF8)
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{name}: line {line}: byte 0x{data[error.start]:02x} is no UTF-8", "save it as CSV in UTF-8"
+        ) from error
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _header_and_body(text: str, name: str) -> tuple[int, str, str]:
+    """The first line with something on it, its number, and what follows."""
+    stripped = text.lstrip("\n")
+    header, _, body = stripped.partition("\n")
+    if not header.strip():
+        raise InputError(
+            f"{name}: holds no table", "the first line names the columns: time_s,position_rad.<joint>,..."
+        )
+    return len(text) - len(stripped) + 1, header, body
+
+
+def _separator(header: str) -> str:
+    """The one that leaves a column of time; else the one that leaves most columns."""
+    counted = []
+    for separator in SEPARATORS:
+        try:
+            cells = _cells(header, separator)
+        except csv.Error:
+            continue
+        if TIME in cells:
+            return separator
+        counted.append((len(cells), separator))
+    most = max((count for count, _ in counted), default=0)
+    return next((separator for count, separator in counted if count == most), SEPARATORS[0])
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+
+
+def _require_header(names: Sequence[str], name: str) -> None:
+    expected = f"expected a first line such as {TIME},position_rad.<joint>,motor_torque_nm.<joint>"
+    if all(_is_number(cell) for cell in names):
+        raise InputError(f"{name}: no header: its first line holds numbers", expected)
+    nameless = [k for k, cell in enumerate(names, start=1) if not cell]
+    if nameless:
+        raise InputError(f"{name}: column {nameless[0]} of {len(names)} has no name in the header", expected)
+
+
+def _with_points(body: str, separator: str, name: str) -> str:
+    """Decimal commas as points; both in one file may be thousands' marks, which are not guessed at."""
+    if separator == "," or "," not in body:
+        return body
+    if "." in body:
+        raise InputError(
+            f"{name}: numbers with both ',' and '.'", "write them with a point, and without thousands' marks"
+        )
+    return body.replace(",", ".")
+
+
+def _numbers(body: str, separator: str) -> Array | None:
+    """(rows, columns), or None where a cell is no number or a line has more cells than another."""
+    try:
+        return np.loadtxt(body.split("\n"), delimiter=separator, comments=None, quotechar='"', ndmin=2)
+    except (ValueError, csv.Error):
+        return None
+
+
+def _first_fault(body: str, names: Sequence[str], separator: str, first: int, name: str) -> InputError:
+    """What is wrong with the first line that is; `first` is the number of the body's first line."""
+    for number, line in enumerate(body.split("\n"), start=first):
+        if not line:
+            continue
+        try:
+            cells = _cells(line, separator)
+        except csv.Error as error:
+            return InputError(
+                f"{name}: line {number}: {error}", "export it as plain numbers separated by commas"
+            )
+        if len(cells) != len(names):
+            return InputError(
+                f"{name}: line {number} has {len(cells)} cells under {len(names)} names",
+                "each line has one cell per column",
+            )
+        for column, cell in zip(names, cells, strict=True):
+            if not _is_number(cell):
+                return _no_number(name, number, column, cell)
+    return InputError(f"{name}: not a table of numbers", "export it as plain numbers separated by commas")
+
+
+def _no_number(name: str, line: int, column: str, cell: str) -> InputError:
+    what = f"{quoted(cell)} is no number" if cell else "the cell is empty"
+    decimal = _is_number(cell.replace(",", ".", 1))
+    comma = "decimal commas are read where ';' or tab separates the columns"
+    hint = comma if decimal else "below the header each cell is a number"
+    return InputError(f"{name}: line {line}, column {quoted(column)}: {what}", hint)
+
+
+def _is_number(cell: str) -> bool:
+    if not cell.isascii() or "_" in cell:
+        return False
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

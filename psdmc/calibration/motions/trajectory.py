@@ -1,0 +1,127 @@
+"""A motion to be run: positions, speeds and accelerations on an even time grid, as a table that robots can be fed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.calibration.logs.log import LARGEST_NUMBER, Array
+from psdmc.calibration.logs.table_files import column_names, read_columns, write_columns
+from psdmc.calibration.logs.wording import listed
+from psdmc.errors import InputError
+from psdmc.robot.chain import Chain
+
+_TURNING = ("position_rad", "velocity_rad_s", "acceleration_rad_s2")
+_SLIDING = ("position_m", "velocity_m_s", "acceleration_m_s2")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """A motion of n joints at N even times.
+
+    time        (N,)    s, from zero
+    q, qd, qdd  (N, n)  rad, rad/s, rad/s^2 (m for sliding joints)
+    sliding     names of joints whose position is in m
+    """
+
+    joint_names: tuple[str, ...]
+    time: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    sliding: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        shape = (len(self.time), len(self.joint_names))
+        for what in ("q", "qd", "qdd"):
+            if getattr(self, what).shape != shape:
+                raise ValueError(f"{what} has shape {getattr(self, what).shape}, expected {shape}")
+
+    @property
+    def period(self) -> float:
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def duration(self) -> float:
+        return float(self.time[-1])
+
+
+def write_trajectory(trajectory: Trajectory, path: str | Path) -> None:
+    """Write time_s and, per joint, position, velocity and acceleration as .csv, .parquet or .npz."""
+    columns = {"time_s": trajectory.time}
+    for part, values in enumerate((trajectory.q, trajectory.qd, trajectory.qdd)):
+        for k, name in enumerate(trajectory.joint_names):
+            columns[_column(part, name, trajectory.sliding)] = values[:, k]
+    write_columns(columns, Path(path))
+
+
+def _column(part: int, name: str, sliding: Sequence[str]) -> str:
+    return f"{(_SLIDING if name in sliding else _TURNING)[part]}.{name}"
+
+
+def read_trajectory(path: str | Path) -> Trajectory:
+    """A trajectory from its table; InputError where a column is missing, a value is not finite or time is uneven."""
+    path = Path(path)
+    columns = read_columns(path)
+    names, sliding = _named(tuple(columns))
+    wanted = [[_column(part, name, sliding) for name in names] for part in range(3)]
+    listed_columns = ["time_s", *(column for part in wanted for column in part)]
+    missing = [column for column in listed_columns if column not in columns]
+    if missing or not names:
+        raise InputError(
+            f"{path}: no column(s) {listed(missing) or 'position_rad.<joint>'}",
+            "a trajectory has time_s and position, velocity and acceleration of each joint, as `psdmc excite` writes them",
+        )
+    for column in listed_columns:
+        odd = np.flatnonzero(~(np.abs(columns[column]) < LARGEST_NUMBER))
+        if len(odd):
+            raise InputError(
+                f"{path}: column '{column}', row {odd[0] + 1}: {columns[column][odd[0]]:g} is no motion",
+                "correct the row",
+            )
+    steps = np.diff(columns["time_s"])
+    if len(steps) < 2 or not steps[0] > 0 or np.abs(steps - steps[0]).max() > 1e-6 * steps[0] + 1e-9:
+        raise InputError(
+            f"{path}: a trajectory needs evenly spaced, growing times",
+            "sample the motion at one rate, from the start on",
+        )
+    q, qd, qdd = (np.column_stack([columns[column] for column in part]) for part in wanted)
+    return Trajectory(names, columns["time_s"] - columns["time_s"][0], q, qd, qdd, sliding)
+
+
+def trajectory_joints(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the joints that a trajectory's table moves, and of those that slide, without reading all of it."""
+    return _named(column_names(Path(path)))
+
+
+def _named(columns: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    split = [column.partition(".") for column in columns]
+    names = tuple(name for prefix, _, name in split if prefix in (_TURNING[0], _SLIDING[0]))
+    return names, tuple(name for prefix, _, name in split if prefix == _SLIDING[0])
+
+
+def sliding_joints(chain: Chain) -> tuple[str, ...]:
+    """Names of the chain's joints that slide."""
+    return tuple(joint.name for joint in chain.joints if joint.kind == "prismatic")
+
+
+def limit_faults(trajectory: Trajectory, chain: Chain) -> list[str]:
+    """One sentence for each joint and limit that the trajectory exceeds; empty where it keeps all of them."""
+    faults: list[str] = []
+    for k, joint in enumerate(chain.joints):
+        limits = joint.limits
+        reach: Sequence[tuple[str, float, float]] = (
+            ("position", float(trajectory.q[:, k].max()), limits.upper),
+            ("position", -float(trajectory.q[:, k].min()), -limits.lower),
+            ("speed", float(np.abs(trajectory.qd[:, k]).max()), limits.speed),
+            ("acceleration", float(np.abs(trajectory.qdd[:, k]).max()), limits.acceleration),
+        )
+        faults += [
+            f"{joint.name}: {what} {value:.6g} beyond {limit:.6g}"
+            for what, value, limit in reach
+            if value > limit
+        ]
+    return faults

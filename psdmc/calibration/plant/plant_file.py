@@ -1,0 +1,269 @@
+"""A virtual robot's files: the plant (motors, friction, sensors, harness) and the DH table that it names.
+
+The robot's values are read here a second time, so that the virtual robot shares no code with what is calibrated by it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, decoding, opened
+from psdmc.calibration.logs.toml_tables import TomlTable, is_number, read_toml, require_none, toml_content
+from psdmc.calibration.logs.wording import listed, quoted
+from psdmc.errors import InputError
+from psdmc.robot.dh import read_dh
+
+Triple = tuple[float, float, float]
+WHAT = "a plant (.toml), such as examples/plants/denso_virtual.toml"
+HINT = "compare it with examples/plants/denso_virtual.toml"
+
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Of a motor's or friction's numbers in SI: wider than any joint, narrow enough that nothing overflows."""
+SLOWEST = 1e-6
+"""rad/s, Stribeck velocity: below, the integrator would have to resolve what no encoder shows."""
+LARGEST_EXPONENT = 3.0
+"""Of viscous friction: air drag has 2."""
+LARGEST_DELAY = 1.0
+"""s, between a motion and its current."""
+FINEST = 1e-12
+"""rad or A, step of a sensor that has one: below, doubles of ordinary angles have no such steps."""
+LARGEST_LENGTH = 1e3
+"""m, of a link;  also m/s^2 of gravity."""
+LARGEST_BODY = 1e6
+"""kg, kg m^2 of a link or drive."""
+ROUNDED = 1e-12
+"""Share of an inertia's largest entry by which a principal moment may be negative: rounding."""
+LARGEST_PLANT = 100
+"""Joints of a virtual robot."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointTruth:
+    """One joint's motor and friction: K_t (N m/A) and the seven LuGre parameters of (12) to (14), SI."""
+
+    name: str
+    torque_constant: float
+    coulomb: float
+    static: float
+    stribeck_velocity: float
+    viscous: float
+    viscous_exponent: float
+    stiffness: float
+    damping: float
+
+    def bristle_limit(self, v: float) -> float:
+        """g(v), (13)."""
+        ratio = v / self.stribeck_velocity
+        peak = (self.static - self.coulomb) * math.exp(-ratio * ratio) if abs(ratio) < 25.0 else 0.0
+        return (self.coulomb + peak) / self.stiffness
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """How the log differs from the truth.
+
+    position_step   rad, quantisation
+    current_noise   A RMS, white
+    current_step    A, quantisation
+    effort_delay    s; a row's current belongs to a motion this much later
+    """
+
+    position_step: float = 0.0
+    current_noise: float = 0.0
+    current_step: float = 0.0
+    effort_delay: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Harness:
+    """A cable harness that no model here knows: a spring that saturates at `torque` (N m) beyond about `angle` (rad)."""
+
+    joints: tuple[str, ...]
+    torque: float
+    angle: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlantRow:
+    """One joint of a standard DH table with its link; m, rad, kg, kg m^2 about the centre of mass, link's frame."""
+
+    name: str
+    slides: bool
+    a: float
+    alpha: float
+    d: float
+    theta: float
+    drive_inertia: float
+    mass: float
+    com: Triple
+    inertia_com: tuple[Triple, Triple, Triple]
+
+
+@dataclass(frozen=True, slots=True)
+class PlantRobot:
+    """gravity in m/s^2, base frame."""
+
+    name: str
+    gravity: Triple
+    rows: tuple[PlantRow, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """What both files say."""
+
+    robot: PlantRobot
+    joints: tuple[JointTruth, ...]
+    sensors: Sensors
+    harness: Harness | None
+
+
+def read_plant(path: Path) -> Plant:
+    """A plant from its file; InputError names the table and key that is missing or wrong."""
+    return plant_of(read_toml(path, WHAT), path)
+
+
+def plant_of(content: dict[str, Any], path: Path) -> Plant:
+    """The plant of a file's content; `path` is the file that it came from."""
+    faults: list[str] = []
+    table = TomlTable(content, "plant", ("robot", "sensors", "harness", "joint"), faults)
+    where = path.parent / table.text("robot")
+    rows = table.items("joint")
+    if len(rows) > LARGEST_PLANT:
+        faults.append(f"{len(rows)} joints, expected at most {LARGEST_PLANT}")
+        rows = []
+    joints = tuple(_truth(row, f"joint {k}", faults) for k, row in enumerate(rows, start=1))
+    sensors = _sensors(table.content.get("sensors", {}), faults)
+    names = [joint.name for joint in joints]
+    held = _harness(table.content["harness"], names, faults) if table.has("harness") else None
+    require_none(faults, str(path), HINT)
+    robot = read_plant_robot(where)
+    wanted = [row.name for row in robot.rows]
+    if names != wanted:
+        raise InputError(
+            f"{path}: joints {listed([quoted(name) for name in names]) or 'none'}, its robot {where.name} has "
+            f"{listed([quoted(name) for name in wanted])}",
+            "a plant lists its robot's joints, all of them, in their order",
+        )
+    return Plant(robot, joints, sensors, held)
+
+
+def plant_texts(path: str | Path) -> tuple[bytes, bytes]:
+    """The bytes that decide a plant: its own file's and its robot's."""
+    path = Path(path)
+    robot = path.parent / str(read_toml(path, WHAT).get("robot"))
+    with opened(path, LARGEST_TOML) as own, opened(robot, LARGEST_TOML) as other:
+        return own.read(), other.read()
+
+
+def _truth(value: object, where: str, faults: list[str]) -> JointTruth:
+    keys = tuple(field.name for field in fields(JointTruth))
+    table = TomlTable(value, where, keys, faults)
+    name = table.text("name")
+    table.where = f"joint {quoted(name)}" if name else where
+    return JointTruth(
+        name=name,
+        torque_constant=table.number("torque_constant", SMALLEST, LARGEST),
+        coulomb=table.number("coulomb", SMALLEST, LARGEST),
+        static=table.number("static", SMALLEST, LARGEST),
+        stribeck_velocity=table.number("stribeck_velocity", SLOWEST, LARGEST),
+        viscous=table.number("viscous", 0.0, LARGEST),
+        viscous_exponent=table.number("viscous_exponent", 0.0, LARGEST_EXPONENT),
+        stiffness=table.number("stiffness", SMALLEST, LARGEST),
+        damping=table.number("damping", 0.0, LARGEST),
+    )
+
+
+def _sensors(value: object, faults: list[str]) -> Sensors:
+    keys = tuple(field.name for field in fields(Sensors))
+    table = TomlTable(value, "sensors", keys, faults)
+    steps = [table.number(key, 0.0, LARGEST, 0.0) for key in ("position_step", "current_step")]
+    for key, step in zip(("position_step", "current_step"), steps, strict=True):
+        if 0.0 < step < FINEST:
+            faults.append(f"sensors: {key}: found {step:g}, expected 0 or at least {FINEST:g}")
+    return Sensors(
+        position_step=steps[0],
+        current_noise=table.number("current_noise", 0.0, LARGEST, 0.0),
+        current_step=steps[1],
+        effort_delay=table.number("effort_delay", 0.0, LARGEST_DELAY, 0.0),
+    )
+
+
+def _harness(value: object, names: Sequence[str], faults: list[str]) -> Harness:
+    table = TomlTable(value, "harness", ("joints", "torque", "angle"), faults)
+    joints = table.items("joints")
+    odd = [quoted(str(name)) for name in joints if name not in names]
+    if odd or not joints:
+        faults.append(f"harness: joints: found {listed(odd) or 'none'}, expected some of {listed(names)}")
+    return Harness(
+        tuple(str(name) for name in joints),
+        table.number("torque", 0.0, LARGEST),
+        table.number("angle", SMALLEST, LARGEST, 1.0),
+    )
+
+
+def read_plant_robot(path: Path) -> PlantRobot:
+    """The DH table of a virtual robot; InputError where it is no such table, or a value is not known."""
+    with opened(path, LARGEST_TOML) as file:
+        data = file.read()
+    content = toml_content(data, str(path), "a robot as a DH table (.toml)")
+    with decoding(str(path), "a DH table"):
+        read_dh(data.decode("utf-8-sig").replace("\r\n", "\n"), str(path))  # refuses what is malformed
+    faults: list[str] = []
+    if content.get("convention", "standard") != "standard":
+        faults.append("a virtual robot needs standard DH")
+    rows = tuple(_row(joint, faults) for joint in content["joint"])
+    gravity = content.get("gravity", [0.0, 0.0, -9.81])
+    if any(abs(x) > LARGEST_LENGTH for x in gravity):
+        faults.append(f"gravity: expected numbers of at most {LARGEST_LENGTH:g}")
+    require_none(faults, str(path), "a virtual robot has to know everything: see docs/notation.md")
+    return PlantRobot(
+        str(content.get("name", "robot")), (float(gravity[0]), float(gravity[1]), float(gravity[2])), rows
+    )
+
+
+def _row(joint: dict[str, Any], faults: list[str]) -> PlantRow:
+    """One joint of a table that is well formed; what is unknown or absurd goes to the faults."""
+    where = f"joint {quoted(str(joint.get('name', '')))}"
+    keys = tuple(joint)
+    table = TomlTable(
+        {"drive_inertia": 0.0, "a": 0.0, "d": 0.0} | joint, where, (*keys, "drive_inertia", "a", "d"), faults
+    )
+    link = joint.get("link", {})
+    body = TomlTable(link, f"{where}: link", tuple(link), faults)
+    about = link.get("inertia_com", {})
+    inertia = TomlTable(about, f"{where}: inertia_com", tuple(about), faults)
+    xx, yy, zz, xy, xz, yz = (
+        inertia.number(name, -LARGEST_BODY, LARGEST_BODY) for name in ("xx", "yy", "zz", "xy", "xz", "yz")
+    )
+    matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    largest = max(abs(entry) for row in matrix for entry in row)
+    if float(np.linalg.eigvalsh(matrix)[0]) < -ROUNDED * largest:
+        faults.append(f"{where}: inertia_com: no body has it: it has a negative principal moment")
+    return PlantRow(
+        name=str(joint.get("name", "")),
+        slides=joint.get("type", "revolute") == "prismatic",
+        a=table.number("a", -LARGEST_LENGTH, LARGEST_LENGTH),
+        alpha=_angle(joint.get("alpha", 0.0)),
+        d=table.number("d", -LARGEST_LENGTH, LARGEST_LENGTH),
+        theta=_angle(joint.get("theta", 0.0)),
+        drive_inertia=table.number("drive_inertia", 0.0, LARGEST_BODY),
+        mass=body.number("mass", 0.0, LARGEST_BODY),
+        com=body.triple("com", LARGEST_LENGTH),
+        inertia_com=matrix,
+    )
+
+
+def _angle(value: float | str) -> float:
+    """rad, from a number or a text such as "90 deg" or "1.5 rad", already known to be one of these."""
+    if is_number(value):
+        return float(value)
+    text = str(value).strip()
+    number = float(text[:-3])
+    return math.radians(number) if text.endswith("deg") else number

@@ -1,0 +1,59 @@
+"""Logs made wrong on purpose, as logs go wrong: what a verdict must notice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from psdmc.calibration.logs.log import Array, Log
+
+MOVED = ("position", "velocity")
+ALL = (*MOVED, "effort")
+
+
+def scaled(log: Log, factor: float | Sequence[float]) -> Log:
+    """Efforts times one factor, or one a joint: another unit, or currents where torques should stand."""
+    return replace(log, effort=log.effort * np.asarray(factor, dtype=np.float64))
+
+
+def turned(log: Log, joint: int, columns: Sequence[str]) -> Log:
+    """One joint's columns (of "position", "velocity", "effort") with the opposite sign."""
+    signs = np.ones(len(log.joint_names))
+    signs[joint] = -1.0
+    return _changed(log, columns, lambda values: signs * values)
+
+
+def swapped(log: Log, first: int, second: int, columns: Sequence[str]) -> Log:
+    """Two joints' columns exchanged."""
+    order = list(range(len(log.joint_names)))
+    order[first], order[second] = second, first
+    return _changed(log, columns, lambda values: values[:, order])
+
+
+def decimated(log: Log, every: int) -> Log:
+    """Each so many-th row."""
+    velocity = None if log.velocity is None else log.velocity[::every]
+    return replace(
+        log,
+        time=log.time[::every],
+        position=log.position[::every],
+        velocity=velocity,
+        effort=log.effort[::every],
+    )
+
+
+def noise_only(log: Log, seed: int = 0) -> Log:
+    """Efforts that have nothing to do with the motion, of the same size."""
+    rng = np.random.default_rng(seed)
+    return replace(log, effort=rng.standard_normal(log.effort.shape) * np.std(log.effort, axis=0))
+
+
+def _changed(log: Log, columns: Sequence[str], change: Callable[[Array], Array]) -> Log:
+    position = change(log.position) if "position" in columns else log.position
+    effort = change(log.effort) if "effort" in columns else log.effort
+    velocity = log.velocity
+    if velocity is not None and "velocity" in columns:
+        velocity = change(velocity)
+    return replace(log, position=position, velocity=velocity, effort=effort)

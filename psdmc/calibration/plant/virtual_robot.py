@@ -1,0 +1,239 @@
+"""A robot with known truth: Pinocchio's dynamics, LuGre friction by scipy's stiff integrator, imperfect sensors.
+
+It shares no code with what is calibrated: robot files, friction law and sensors are read and written here a second time.
+The motion is prescribed, as a stiff position controller would keep it; the motors give what the motion takes.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.integrate import ODEintWarning, odeint
+
+from psdmc.calibration.logs.foreign_bytes import decoding
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.motions.trajectory import Trajectory
+from psdmc.calibration.plant.plant_file import Harness, JointTruth, PlantRobot, Sensors, read_plant
+from psdmc.errors import InputError
+
+Array = NDArray[np.float64]
+
+RELATIVE_ERROR = 1e-9
+"""Of the bristle deflection, per step of the stiff integrator."""
+ABSOLUTE_ERROR = 1e-14
+"""rad: a millionth of the stiffest joint's smallest deflection of interest."""
+LONGEST_STEP = 2e-3
+"""s: no reversal of a sine below 50 Hz is stepped over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Payload:
+    """A mass (kg) at the tip; com (m) in the tip frame."""
+
+    mass: float
+    com: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VirtualRobot:
+    """A plant: Pinocchio's model, joint truths, sensors and perhaps a harness."""
+
+    name: str
+    model: Any
+    tip: Any
+    joints: tuple[JointTruth, ...]
+    sensors: Sensors
+    harness: Harness | None = None
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def sliding(self) -> tuple[str, ...]:
+        """Names of the joints that slide."""
+        kinds = [self.model.joints[k].shortname() for k in range(1, self.model.njoints)]
+        pairs = zip(self.joint_names, kinds, strict=True)
+        return tuple(name for name, kind in pairs if kind == "JointModelPZ")
+
+
+def load_virtual_robot(
+    path: str | Path, *, ideal_sensors: bool = False, harness: bool = False
+) -> VirtualRobot:
+    """A plant from its TOML file; `robot` there names a DH file beside it.
+
+    ideal_sensors  no noise, no steps, no delay;  harness  with the file's cable harness
+    InputError names what is wrong with either file.
+    """
+    plant = read_plant(Path(path))
+    if harness and plant.harness is None:
+        raise InputError(
+            f"{path}: no [harness] in this file", "leave --harness out, or add a [harness] to the plant"
+        )
+    with decoding(str(path), "a robot that Pinocchio takes", "correct the robot's file"):
+        model, tip = _pinocchio_model(plant.robot)
+    sensors = Sensors() if ideal_sensors else plant.sensors
+    held = plant.harness if harness else None
+    return VirtualRobot(plant.robot.name, model, tip, plant.joints, sensors, held)
+
+
+def _pinocchio_model(robot: PlantRobot) -> tuple[Any, Any]:
+    """Pinocchio's model of a standard DH table, and the tip's placement in the last joint."""
+    model = pin.Model()
+    model.gravity.linear = np.array(robot.gravity)
+    parent, placement = 0, pin.SE3.Identity()
+    for row in robot.rows:
+        turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, row.theta), np.zeros(3))
+        rest = pin.SE3(pin.rpy.rpyToMatrix(row.alpha, 0.0, 0.0), np.array([row.a, 0.0, row.d]))
+        before, after = (placement * turn, rest) if row.slides else (placement, turn * rest)
+        kind = pin.JointModelPZ() if row.slides else pin.JointModelRZ()
+        parent = model.addJoint(parent, kind, before, row.name)
+        body = pin.Inertia(row.mass, np.array(row.com), np.array(row.inertia_com))
+        model.appendBodyToJoint(parent, body, after)
+        armature = np.array(model.armature)
+        armature[model.joints[parent].idx_v] = row.drive_inertia
+        model.armature = armature
+        placement = after
+    return model, placement
+
+
+def simulate(
+    robot: VirtualRobot, trajectory: Trajectory, *, payload: Payload | None = None, seed: int = 0
+) -> Log:
+    """The log that the robot's sensors would give while it runs a trajectory from rest. Rows as the trajectory's."""
+    shifted = _at(trajectory, trajectory.time + robot.sensors.effort_delay)
+    tau = _rigid_torque(_loaded(robot, payload), *shifted)
+    for k, joint in enumerate(robot.joints):
+        tau[:, k] += _friction(joint, trajectory, k, robot.sensors.effort_delay)
+    if robot.harness is not None:
+        held = np.array([name in robot.harness.joints for name in robot.joint_names])
+        tau += np.where(held, robot.harness.torque * np.tanh(shifted[0] / robot.harness.angle), 0.0)
+    rng = np.random.default_rng(seed)
+    current = tau / np.array([joint.torque_constant for joint in robot.joints])
+    current = current + robot.sensors.current_noise * rng.standard_normal(current.shape)
+    return Log(
+        name=robot.name,
+        joint_names=robot.joint_names,
+        time=trajectory.time,
+        position=_quantised(trajectory.q, robot.sensors.position_step),
+        velocity=None,
+        effort=_quantised(current, robot.sensors.current_step),
+        quantity="current",
+        sliding=trajectory.sliding,
+    )
+
+
+def _quantised(values: Array, step: float) -> Array:
+    return np.round(values / step) * step if step > 0 else values
+
+
+def _loaded(robot: VirtualRobot, payload: Payload | None) -> Any:
+    if payload is None:
+        return robot.model
+    model = robot.model.copy()
+    body = pin.Inertia(payload.mass, np.array(payload.com), np.zeros((3, 3)))
+    model.appendBodyToJoint(model.njoints - 1, body, robot.tip)
+    return model
+
+
+def _rigid_torque(model: Any, q: Array, qd: Array, qdd: Array) -> Array:
+    data = model.createData()
+    return np.array([pin.rnea(model, data, a, b, c) for a, b, c in zip(q, qd, qdd, strict=True)])
+
+
+def _at(trajectory: Trajectory, times: Array) -> tuple[Array, Array, Array]:
+    """Position, speed and acceleration between the rows: the quintic that meets all three at both ends."""
+    h = trajectory.period
+    k = np.clip((times / h + 1e-9).astype(int), 0, len(trajectory.time) - 2)
+    s = np.clip(times - trajectory.time[k], 0.0, h)[:, None]
+    c = _quintic(trajectory.q, trajectory.qd, trajectory.qdd, h)[:, k]
+    q = c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5]))))
+    qd = c[1] + s * (2 * c[2] + s * (3 * c[3] + s * (4 * c[4] + s * 5 * c[5])))
+    qdd = 2 * c[2] + s * (6 * c[3] + s * (12 * c[4] + s * 20 * c[5]))
+    return q, qd, qdd
+
+
+def _quintic(q: Array, v: Array, a: Array, h: float) -> Array:
+    """(6, N-1, ...) coefficients in the time since each row."""
+    move = q[1:] - q[:-1] - h * v[:-1] - 0.5 * h**2 * a[:-1]
+    rate = v[1:] - v[:-1] - h * a[:-1]
+    bend = a[1:] - a[:-1]
+    return np.stack(
+        [
+            q[:-1],
+            v[:-1],
+            0.5 * a[:-1],
+            (10 * move - 4 * h * rate + 0.5 * h**2 * bend) / h**3,
+            (-15 * move + 7 * h * rate - h**2 * bend) / h**4,
+            (6 * move - 3 * h * rate + 0.5 * h**2 * bend) / h**5,
+        ]
+    )
+
+
+def _friction(joint: JointTruth, trajectory: Trajectory, k: int, delay: float) -> Array:
+    """Friction torque (14) at each row's time plus the delay; bristles start unbent, nothing where the joint rests."""
+    if not trajectory.qd[:, k].any():
+        return np.zeros(len(trajectory.time))
+    speed = _speed_function(trajectory, k)
+    times = np.minimum(trajectory.time + delay, trajectory.duration)
+    grid = times if delay == 0 else np.concatenate([[0.0], times])
+
+    def bend_rate(z: Array, t: float) -> float:
+        v = speed(t)
+        return v - abs(v) * float(z[0]) / joint.bristle_limit(v)
+
+    def jacobian(z: Array, t: float) -> list[list[float]]:
+        v = speed(t)
+        return [[-abs(v) / joint.bristle_limit(v)]]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ODEintWarning)  # told below, with the joint's name
+        bend, told = odeint(
+            bend_rate,
+            [0.0],
+            grid,
+            Dfun=jacobian,
+            rtol=RELATIVE_ERROR,
+            atol=ABSOLUTE_ERROR,
+            hmax=LONGEST_STEP,
+            mxstep=100_000,
+            full_output=True,
+        )
+    if told["message"] != "Integration successful.":
+        raise InputError(
+            f"joint {joint.name}: its friction cannot be integrated: {told['message']}",
+            "give the joint a friction that changes more slowly: a larger stribeck_velocity or a smaller stiffness",
+        )
+    torque = [
+        _friction_torque(joint, speed(t), float(z)) for t, z in zip(grid.tolist(), bend[:, 0], strict=True)
+    ]
+    return np.array(torque[len(grid) - len(times) :])
+
+
+def _friction_torque(joint: JointTruth, v: float, z: float) -> float:
+    rate = v - abs(v) * z / joint.bristle_limit(v)
+    viscous = math.copysign(joint.viscous * abs(v) ** joint.viscous_exponent, v)
+    return joint.stiffness * z + joint.damping * rate + viscous
+
+
+def _speed_function(trajectory: Trajectory, k: int) -> Callable[[float], float]:
+    h = trajectory.period
+    c = _quintic(trajectory.q[:, k], trajectory.qd[:, k], trajectory.qdd[:, k], h)
+    rows = np.stack([c[1], 2 * c[2], 3 * c[3], 4 * c[4], 5 * c[5]], axis=1).tolist()
+    last = len(rows) - 1
+
+    def speed(t: float) -> float:
+        index = min(max(int(t / h), 0), last)
+        s = t - index * h
+        v, a, b, d, e = rows[index]
+        return float(v + s * (a + s * (b + s * (d + s * e))))
+
+    return speed

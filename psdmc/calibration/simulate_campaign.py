@@ -1,0 +1,154 @@
+"""Logs of a whole campaign from a virtual robot, each kept until what decides it changes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from psdmc.atomic import make_folder, write_whole
+from psdmc.calibration.campaign_file import ListedRun, listed_runs
+from psdmc.calibration.identify.workers import in_processes
+from psdmc.calibration.logs.log_bag import is_folder
+from psdmc.calibration.logs.log_files import write_log
+from psdmc.calibration.logs.wording import listed
+from psdmc.calibration.motions.trajectory import read_trajectory, trajectory_joints
+from psdmc.calibration.plant import plant_file, virtual_robot
+from psdmc.calibration.plant.plant_file import plant_texts
+from psdmc.calibration.plant.virtual_robot import Payload, VirtualRobot, load_virtual_robot, simulate
+from psdmc.errors import InputError
+
+INDEX = "simulated.json"
+LARGEST_SEED = 2**31
+"""Each run adds its number to it."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulateOptions:
+    """Which plant, as a variant of its file.
+
+    ideal_sensors  no noise, no steps, no delay
+    harness        with the file's cable harness, an effect that no model here has
+    seed           of the sensors' noise; each run adds its number
+    workers        processes
+    """
+
+    ideal_sensors: bool = False
+    harness: bool = False
+    seed: int = 0
+    workers: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    plant: Path
+    options: SimulateOptions
+    run: ListedRun
+    seed: int
+
+
+def simulate_campaign(
+    plant: str | Path,
+    campaign: str | Path,
+    options: SimulateOptions,
+    progress: Callable[[str], None] = lambda step: None,
+) -> int:
+    """Write the log of every run of a campaign; returns how many had to be simulated, the others being up to date.
+
+    InputError, before anything is written, where the campaign is another robot's or a log would leave its folder.
+    """
+    plant = Path(plant)
+    if not 0 <= options.seed <= LARGEST_SEED:
+        raise InputError(f"seed is {options.seed}, expected 0 to {LARGEST_SEED}", "give another --seed")
+    robot = load_virtual_robot(plant, ideal_sensors=options.ideal_sensors, harness=options.harness)
+    runs = listed_runs(campaign)
+    root = Path(campaign) if is_folder(Path(campaign)) else Path(campaign).parent
+    _require_runs(runs, root, str(campaign))
+    for run in runs:
+        _require_robot(run, robot, plant)
+    jobs = [_Job(plant, options, run, options.seed + number) for number, run in enumerate(runs)]
+    keys = {job.run.log: _key(job) for job in jobs}
+    index_path = runs[0].log.parent / INDEX
+    known = _index(index_path)
+    stale = [
+        job for job in jobs if known.get(job.run.log.name) != keys[job.run.log] or not job.run.log.exists()
+    ]
+    for name in in_processes(_simulated, stale, min(options.workers, len(stale))):
+        progress(name)
+    index = {path.name: key for path, key in sorted(keys.items())}
+    make_folder(index_path.parent)
+    write_whole(index_path, json.dumps(index, indent=1) + "\n")
+    return len(stale)
+
+
+def _require_runs(runs: Sequence[ListedRun], root: Path, campaign: str) -> None:
+    """InputError where a run has no motion, or its log would be written outside the campaign or over another's."""
+    missing = [run.name for run in runs if run.trajectory is None]
+    if missing:
+        raise InputError(
+            f"{campaign}: run(s) {listed(missing)} name no trajectory to simulate",
+            'give each run its trajectory = "..."',
+        )
+    outside = [str(run.log) for run in runs if not run.log.resolve().is_relative_to(root.resolve())]
+    if outside:
+        raise InputError(
+            f"{campaign}: log(s) {listed(outside)} outside the campaign's folder",
+            "logs are written inside it only",
+        )
+    names = [run.log.name for run in runs]
+    twice = list(dict.fromkeys(name for name in names if names.count(name) > 1))
+    if twice:
+        raise InputError(f"{campaign}: several runs write log(s) {listed(twice)}", "give each run its own")
+
+
+def _require_robot(run: ListedRun, robot: VirtualRobot, plant: Path) -> None:
+    """InputError where a run moves other joints than the plant has."""
+    assert run.trajectory is not None
+    names, sliding = trajectory_joints(run.trajectory)
+    if names != robot.joint_names or (run.joint and run.joint not in names):
+        raise InputError(
+            f"{run.trajectory}: moves joints {listed(names) or 'none'}, {plant.name} has {listed(robot.joint_names)}",
+            "the campaign is another robot's: plan one with `psdmc excite` from this robot's model",
+        )
+    if sliding != robot.sliding:
+        raise InputError(
+            f"{run.trajectory}: joint(s) {listed(sliding) or 'none'} slide, "
+            f"of {plant.name} {listed(robot.sliding) or 'none'}",
+            "the campaign is another robot's: plan one with `psdmc excite` from this robot's model",
+        )
+
+
+def _index(path: Path) -> dict[str, str]:
+    """Digests by log; none where the file is missing or damaged, so that everything is simulated again."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _simulated(job: _Job) -> str:
+    robot = load_virtual_robot(
+        job.plant, ideal_sensors=job.options.ideal_sensors, harness=job.options.harness
+    )
+    assert job.run.trajectory is not None
+    load = job.run.load
+    payload = None if load is None else Payload(load.mass, load.com)
+    write_log(
+        simulate(robot, read_trajectory(job.run.trajectory), payload=payload, seed=job.seed), job.run.log
+    )
+    return job.run.name
+
+
+def _key(job: _Job) -> str:
+    """Digest of everything that decides a log: plant, variant, motion, load, seed and the simulation's own code."""
+    assert job.run.trajectory is not None
+    digest = hashlib.sha256()
+    variant = (job.options.ideal_sensors, job.options.harness, job.seed, job.run.load)
+    code = [Path(str(module.__file__)).read_bytes() for module in (virtual_robot, plant_file)]
+    for part in (repr(variant).encode("utf-8"), *plant_texts(job.plant), *code):
+        digest.update(part + b"\0")
+    digest.update(job.run.trajectory.read_bytes())
+    return digest.hexdigest()

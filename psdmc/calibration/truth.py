@@ -1,0 +1,96 @@
+"""A calibration against the truth that only a virtual robot has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from psdmc.calibration.identify.lugre import PARAMETERS
+from psdmc.calibration.logs.wording import listed
+from psdmc.calibration.plant.virtual_robot import VirtualRobot
+from psdmc.calibration.verdict.record import Calibration
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Largest errors.
+
+    torque_constant      relative, of any joint
+    gravity, inertial    of any base parameter, relative to the largest of its group
+    friction             relative, by parameter name, of any joint
+    within_three_std     share of base parameters whose truth lies within three standard deviations
+    """
+
+    torque_constant: float
+    gravity: float
+    inertial: float
+    friction: dict[str, float]
+    within_three_std: float
+
+    def lines(self) -> list[str]:
+        """For people."""
+        worst = ", ".join(f"{name} {error:.2%}" for name, error in self.friction.items())
+        return [
+            f"  largest error: K_t {self.torque_constant:.4%}, gravity {self.gravity:.4%}, inertial {self.inertial:.4%}",
+            f"  largest error of friction: {worst}",
+            f"  truth within 3 standard deviations: {self.within_three_std:.0%} of base parameters",
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "torque_constant": self.torque_constant,
+            "gravity": self.gravity,
+            "inertial": self.inertial,
+            "friction": self.friction,
+            "within_three_std": self.within_three_std,
+        }
+
+
+def compare(record: Calibration, true_model: DynamicsModel, robot: VirtualRobot) -> Comparison:
+    """Errors of a campaign's record; the model of the truth has the same base parameters as the record's."""
+    assert true_model.theta_b is not None
+    truth = true_model.theta_b
+    std = np.array([row.std for row in record.parameters])
+    groups = np.array([row.group for row in record.parameters])
+    joints = {joint.name: joint for joint in robot.joints}
+    unknown = [row.joint for row in (*record.motors, *record.friction) if row.joint not in joints]
+    if unknown:
+        raise InputError(
+            f"{robot.name}: not the robot that was calibrated: it has no joint {listed(unknown)}",
+            "compare with the plant that the logs are of",
+        )
+    error = np.array([row.value for row in record.parameters]) - truth
+    constants = [_relative(row.value, joints[row.joint].torque_constant) for row in record.motors]
+    friction = {
+        name: max(
+            (
+                _relative(row.value, getattr(joints[row.joint], name))
+                for row in record.friction
+                if row.name == name
+            ),
+            default=0.0,
+        )
+        for name in PARAMETERS
+    }
+    return Comparison(
+        torque_constant=max(constants, default=0.0),
+        gravity=_largest(error, truth, groups == "gravity"),
+        inertial=_largest(error, truth, groups == "inertial"),
+        friction={name: float(value) for name, value in friction.items()},
+        within_three_std=float(np.mean(np.abs(error) < 3.0 * std)),
+    )
+
+
+def _relative(found: float, truth: float) -> float:
+    """Relative error; infinite where the truth is zero and something was found."""
+    if truth == 0.0:
+        return 0.0 if found == 0.0 else float("inf")
+    return abs(found / truth - 1.0)
+
+
+def _largest(error: np.ndarray, truth: np.ndarray, group: np.ndarray) -> float:
+    return float(np.abs(error[group]).max() / np.abs(truth[group]).max())

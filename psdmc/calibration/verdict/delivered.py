@@ -1,0 +1,156 @@
+"""How well a calibrated model file predicts logs: every figure from what the file holds, nothing from the fit.
+
+The regressor is not used where one log was fitted: torques come from Newton-Euler on the file's theta_b.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.calibration.identify.four_steps import Runs
+from psdmc.calibration.identify.friction import FrictionResult, judge_friction
+from psdmc.calibration.identify.friction_fit import JointFriction
+from psdmc.calibration.identify.gravity import judge_gravity
+from psdmc.calibration.identify.inertial import judge_inertial
+from psdmc.calibration.identify.linear_fit import friction_names, friction_terms
+from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
+from psdmc.calibration.identify.motor import judge_motors
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.prediction import Prediction, prediction_from_json
+from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.identify.steps import StepOptions, StepQuality, judged
+from psdmc.calibration.logs.check_options import CheckOptions
+from psdmc.calibration.logs.filter import States, filtered, held_out, smoothed_rows, thinned
+from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.errors import InputError
+from psdmc.model import evaluate
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.store import load, save
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Delivered:
+    """A calibrated model as its file tells it.
+
+    friction         by joint and parameter name;  constants  N m/A by joint, empty where torques were logged
+    """
+
+    model: DynamicsModel
+    prediction: Prediction
+    friction: Mapping[tuple[str, str], float]
+    constants: Mapping[str, float]
+
+    @property
+    def theta_b(self) -> Array:
+        return evaluate.known(self.model)
+
+    @property
+    def motors(self) -> Motors:
+        """What makes torques of logged effort."""
+        names = self.model.joint_names
+        constants = (
+            np.array([self.constants[name] for name in names]) if self.constants else np.ones(len(names))
+        )
+        return Motors(constants, np.zeros(len(names)))
+
+
+def delivered(model: DynamicsModel) -> Delivered:
+    """What a calibrated model holds; InputError where it was not calibrated by this psdmc or a newer one."""
+    kept = model.provenance.get("calibration")
+    if model.theta_b is None or not isinstance(kept, Mapping) or "prediction" not in kept:
+        raise InputError(
+            f"the model of '{model.chain.name}' holds no calibration that torques can be predicted from",
+            "run `psdmc calibrate` first",
+        )
+    return Delivered(
+        model,
+        prediction_from_json(kept["prediction"]),
+        {(row["joint"], row["name"]): float(row["value"]) for row in kept["friction"]},
+        {row["joint"]: float(row["value"]) for row in kept["motors"]},
+    )
+
+
+def reread(model: DynamicsModel) -> DynamicsModel:
+    """The model after it was written to a file and read back."""
+    with tempfile.TemporaryDirectory(prefix="psdmc_") as folder:
+        path = Path(folder) / "model.npz"
+        save(model, path)
+        return load(path)
+
+
+def delivered_quality(
+    model: DynamicsModel, source: Sequence[Log] | Runs, check: CheckOptions | None = None
+) -> tuple[StepQuality, ...]:
+    """R^2 and RMSE of a calibrated model on logs, or on a campaign's runs, by what its file holds.
+
+    InputError where the model holds no calibration, or a log cannot be used.
+    """
+    found = delivered(model)
+    if isinstance(source, Runs):
+        return _campaign_quality(found, source)
+    return (_log_quality(found, source, check or CheckOptions()),)
+
+
+def _log_quality(found: Delivered, logs: Sequence[Log], check: CheckOptions) -> StepQuality:
+    chain, step = found.model.chain, found.prediction.steps["all"]
+    parts = [_log_parts(found, log, step, check) for log in logs]
+    time, measured, predicted = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    out = np.concatenate([held_out(len(part[0]), step.split) for part in parts])
+    return judged("All", chain.joint_names, time, measured, predicted, out)
+
+
+def _log_parts(
+    found: Delivered, log: Log, step: StepOptions, check: CheckOptions
+) -> tuple[Array, Array, Array]:
+    """Time, measured and predicted torque of one log's independent samples."""
+    states = filtered(checked(log, found.model.chain, step.filter.cutoff, check), step.filter, check)
+    at = thinned(states, step.filter)
+    measured = found.motors.torque(states.effort)[at]
+    return states.time[at], measured, smoothed_rows(states, at, lambda rows: _torque(found, states, rows))
+
+
+def _torque(found: Delivered, states: States, rows: slice) -> Array:
+    """(rows, n) motor torque before the filter: rigid bodies and friction."""
+    q, qd, qdd = states.q[rows], states.qd[rows], states.qdd[rows]
+    rigid = evaluate.newton_euler_torques(found.model, found.theta_b, [q, qd, qdd])
+    law = found.prediction
+    terms = friction_terms(qd, law.sign_speed, law.exponents, law.offset)
+    names = friction_names(law.exponents, law.offset)
+    for name, term in zip(names, terms, strict=True):
+        rigid = rigid + term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
+    return rigid
+
+
+def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
+    chain, motors, theta, steps = found.model.chain, found.motors, found.theta_b, found.prediction.steps
+    regressor = ChainRegressor(found.model)
+    friction = _lugre(found)
+    joints = friction.joints
+    motor = (judge_motors(chain, runs.motor, steps["motor"], _identified(found)),) if runs.motor else ()
+    return (
+        *motor,
+        judge_gravity(chain, regressor, motors, runs.gravity, steps["gravity"], theta),
+        judge_friction(chain, regressor, motors, theta, runs.friction, steps["friction"], joints),
+        *judge_inertial(chain, regressor, motors, theta, friction, runs.inertial, steps["inertial"]),
+    )
+
+
+def _identified(found: Delivered) -> dict[str, float]:
+    """Torque constants that a motor step found; what was given is not judged by it."""
+    rows = found.model.provenance["calibration"]["motors"]
+    return {row["joint"]: found.constants[row["joint"]] for row in rows if row["seen"]}
+
+
+def _lugre(found: Delivered) -> FrictionResult:
+    joints = {}
+    for joint, run in found.prediction.runs.items():
+        law = Lugre(*(found.friction[joint, name] for name in PARAMETERS))
+        exact = np.zeros((len(PARAMETERS), len(PARAMETERS)))
+        joints[joint] = JointFriction(joint, law, exact, (), run.inertia, run.offset, run.delay)
+    return FrictionResult(joints, ())

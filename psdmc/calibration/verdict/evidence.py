@@ -1,0 +1,117 @@
+"""What a verdict is judged from: independent samples of the exciting motion, as the log has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor, payload_torque
+from psdmc.calibration.identify.steps import Load
+from psdmc.calibration.logs.filter import FilterOptions, States, evenly_spaced, filtered, thinned
+from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.model.dynamics_model import DynamicsModel
+
+SIGN_SPEED = 0.03
+"""rad/s over which Coulomb friction changes sign, as in the linear fit."""
+MOST_ROWS = 4000
+"""Samples that a verdict looks at; longer logs are thinned further, evenly."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """A run to judge by: its log and what the tip carried."""
+
+    log: Log
+    tool: Load | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Independent samples, one per half period of the cut-off. N samples, n joints.
+
+    model       as it was before it was calibrated: its theta_b is the file's, or None
+    regressor   of the model
+    q, qd, qdd  (N, n)
+    sign        (N, n)  smooth sign of the speed, filtered like the torque: Coulomb friction's column
+    torque      (N, n)  of the motors, N m (N), filtered, without what the tool weighs
+    noise       (n,)    RMS of the sensor noise that passes the filter, from what lies above its cut-off
+    """
+
+    model: DynamicsModel
+    regressor: Regressor
+    q: Array
+    qd: Array
+    qdd: Array
+    sign: Array
+    torque: Array
+    noise: Array
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @property
+    def n(self) -> int:
+        return int(self.q.shape[1])
+
+    def columns(self) -> Array:
+        """(N, n, l) the regressor in these states."""
+        return self.regressor.regressor(self.q, self.qd, self.qdd)
+
+    def file_torque(self) -> Array | None:
+        """(N, n) torque by the file's own theta_b, without friction; None where it states none."""
+        theta_b = self.model.theta_b
+        return None if theta_b is None else np.asarray(self.columns() @ theta_b)
+
+    def thinned(self, most: int) -> Evidence:
+        """At most about so many samples, evenly spread."""
+        return self._at(slice(None, None, max(1, -(-len(self) // most))))
+
+    def _at(self, rows: slice) -> Evidence:
+        kept = {name: getattr(self, name)[rows] for name in ("q", "qd", "qdd", "sign", "torque")}
+        return replace(self, **kept)
+
+    def turned(self, signs: Array, order: Sequence[int]) -> Evidence:
+        """As if joint k's position were `signs[k]` times column `order[k]` of the log."""
+        columns = list(order)
+        moved = {name: signs * getattr(self, name)[:, columns] for name in ("q", "qd", "qdd", "sign")}
+        return replace(self, **moved)
+
+
+def evidence_of(
+    model: DynamicsModel,
+    regressor: Regressor,
+    motions: Sequence[Motion],
+    motors: Motors,
+    options: FilterOptions,
+) -> Evidence:
+    """Samples of all motions, one after the other; InputError where a log cannot be used."""
+    parts = [_samples(model, motion, motors, options) for motion in motions]
+    q, qd, qdd, sign, torque = (np.concatenate(x) for x in zip(*(part[:5] for part in parts), strict=True))
+    noise = np.sqrt(np.mean([part[5] ** 2 for part in parts], axis=0))
+    return Evidence(model, regressor, q, qd, qdd, sign, torque, noise).thinned(MOST_ROWS)
+
+
+def _samples(
+    model: DynamicsModel, motion: Motion, motors: Motors, options: FilterOptions
+) -> tuple[Array, Array, Array, Array, Array, Array]:
+    log = checked(motion.log, model.chain, options.cutoff)
+    states = filtered(log, options)
+    at = thinned(states, options)
+    sign = states.low_pass(np.tanh(states.qd / SIGN_SPEED))
+    torque = motors.torque(states.effort)[at]
+    if motion.tool is not None:
+        torque = torque - payload_torque(model.chain, states.q[at], motion.tool.mass, motion.tool.com)
+    noise = motors.torque(_noise(log, states, options))
+    return states.q[at], states.qd[at], states.qdd[at], sign[at], torque, np.abs(noise)
+
+
+def _noise(log: Log, states: States, options: FilterOptions) -> Array:
+    """(n,) RMS in the pass band, were the noise as dense there as above the cut-off."""
+    above = (evenly_spaced(log)[2] - states.effort)[states.use]
+    nyquist = 0.5 / states.period
+    share = options.cutoff / (nyquist - options.cutoff)
+    return np.asarray(np.sqrt(share * np.mean(above**2, axis=0)))

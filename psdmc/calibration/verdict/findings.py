@@ -1,0 +1,116 @@
+"""What a verdict's reasons and doubts are found in: the record's figures beside the log's, joint by joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.quality import Quality
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.verdict.evidence import Evidence
+from psdmc.calibration.verdict.gains import friction_powers, joint_gains
+from psdmc.calibration.verdict.record import Calibration
+from psdmc.calibration.verdict.verdict import JointFigures, listed
+from psdmc.calibration.verdict.verdict_limits import VerdictOptions
+
+NOISE_FLOOR = 1e-4
+"""Of the torque's variation: less noise above the cut-off is a log that was smoothed, or no sensor's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """A step's independent samples that were fitted, and how many unknowns the data determined from them."""
+
+    step: str
+    samples: int
+    unknowns: int
+
+    @property
+    def per_unknown(self) -> float:
+        return self.samples / self.unknowns if self.unknowns else float("inf")
+
+
+class Findings:
+    """A record and the log that it was found from, and figures of both.
+
+    variation, speed   (n,) standard deviation of the torque; RMS speed
+    fitted, held_out   per joint, of the whole torque: RMSE and R^2
+    """
+
+    def __init__(
+        self, record: Calibration, evidence: Evidence, demands: tuple[Demand, ...], options: VerdictOptions
+    ) -> None:
+        self.record, self.evidence, self.demands, self.limits = record, evidence, demands, options
+        self.names = record.joint_names
+        self.gains = joint_gains(evidence)
+        self.powers = friction_powers(evidence)
+        self.variation: Array = np.std(evidence.torque, axis=0)
+        self.speed: Array = np.sqrt(np.mean(evidence.qd**2, axis=0))
+        self.fitted = [_whole_torque(record, name, held_out=False) for name in self.names]
+        self.held_out = [_whole_torque(record, name, held_out=True) for name in self.names]
+
+    @property
+    def starved(self) -> bool:
+        return any(demand.per_unknown < self.limits.fewest_samples for demand in self.demands)
+
+    def follows_badly(self, k: int) -> bool:
+        """Also where R^2 is no number though there is a torque to follow."""
+        return not self.held_out[k].r2 >= self.limits.poor_r2 and bool(self.variation[k] > 0)
+
+    def excused(self, k: int) -> bool:
+        """A joint that hardly moves, or whose torque is sensor noise, has nothing to follow."""
+        noise = float(self.evidence.noise[k])
+        noisy = noise > NOISE_FLOOR * self.variation[k] and self.held_out[k].rmse < self.limits.sure * noise
+        return bool(self.speed[k] < self.limits.hardly) or noisy
+
+    def noticeable(self, k: int) -> bool:
+        return bool(self.held_out[k].rmse > self.limits.noticeable * self.variation[k])
+
+    def noise_ratio(self, k: int) -> float:
+        noise = float(self.evidence.noise[k])
+        known = noise > NOISE_FLOOR * self.variation[k]
+        return self.held_out[k].rmse / noise if known else float("nan")
+
+    def moved(self) -> NDArray[np.bool_]:
+        return np.asarray((self.speed >= self.limits.hardly) & (self.variation > 0))[:, None]
+
+    def unit(self, k: int) -> str:
+        return "N m" if self.evidence.model.chain.joints[k].kind == "revolute" else "N"
+
+    def gained(self, joints: Sequence[int]) -> str:
+        words = [f"{self.gains[k].value:.3g} +- {self.gains[k].std:.1g}" for k in joints]
+        return listed([f"joint {self.names[k]} {word}" for k, word in zip(joints, words, strict=True)])
+
+    def followed(self, joints: Sequence[int]) -> str:
+        return listed(
+            [
+                f"joint {self.names[k]} {self.held_out[k].r2:.3g} (RMSE {self.held_out[k].rmse:.3g} {self.unit(k)})"
+                for k in joints
+            ]
+        )
+
+    def figures(self, k: int) -> JointFigures:
+        gain, power = self.gains[k], self.powers[k]
+        return JointFigures(
+            joint=self.names[k],
+            r2=self.held_out[k].r2,
+            rmse=self.held_out[k].rmse,
+            gain=gain.value,
+            gain_std=gain.std,
+            visible=gain.visible,
+            friction_power=power.value,
+            friction_power_std=power.std,
+            noise_ratio=self.noise_ratio(k),
+            speed=float(self.speed[k]),
+        )
+
+
+def _whole_torque(record: Calibration, joint: str, held_out: bool) -> Quality:
+    """Of the last step: there the whole torque is predicted."""
+    both = record.steps[-1].joints.get(joint)
+    if both is None:
+        return Quality(float("nan"), float("nan"))
+    return both.held_out if held_out else both.fit

@@ -1,0 +1,335 @@
+"""What a calibration found, as tables: the report and the model file are made from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from psdmc.calibration.identify.four_steps import FourSteps
+from psdmc.calibration.identify.linear_fit import LinearOptions, LinearResult
+from psdmc.calibration.identify.lugre import PARAMETERS, UNITS
+from psdmc.calibration.identify.motor import MotorResult
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.prediction import FrictionRunConstants, Prediction
+from psdmc.calibration.identify.steps import CalibrationOptions, StepOptions, StepQuality
+from psdmc.calibration.identify.visibility import (
+    IDENTIFIED,
+    Visibility,
+    visibility,
+    visibility_warnings,
+    weak_notes,
+)
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.verdict.verdict import Verdict
+from psdmc.errors import InternalError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.equations import base_parameters
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterRow:
+    """One base parameter of table 4.
+
+    std           infinite where the data do not fix it by itself; value then as near to the prior as they allow
+    identifiable  whether `visibility` is "identified": fixed by itself, to less than half of its value
+    """
+
+    name: str
+    group: str
+    value: float
+    std: float
+    unit: str
+    equation: str
+    identifiable: bool
+    visibility: str = IDENTIFIED
+
+    @property
+    def relative(self) -> float:
+        return self.std / abs(self.value) if self.value else float("inf")
+
+
+@dataclass(frozen=True, slots=True)
+class NumberRow:
+    """A number of one joint with its standard deviation; `seen` says whether the data determine it."""
+
+    joint: str
+    name: str
+    value: float
+    std: float
+    unit: str
+    seen: bool = True
+    visibility: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """Everything a calibration hands on.
+
+    model       the calibrated model, its provenance carrying these numbers
+    motors      torque constants; friction: seven per joint, or Coulomb, viscous and offset
+    steps       table 3's columns, by what the model's file holds (delivered.delivered_quality)
+    prediction  what else a prediction needs
+    notes       what a reader should know and need not worry about
+    facts       plain values: ranks, condition numbers, singular values, delay, options
+    verdict     whether it can be used; None before it was judged
+    """
+
+    robot: str
+    method: str
+    joint_names: tuple[str, ...]
+    model: DynamicsModel
+    parameters: tuple[ParameterRow, ...]
+    motors: tuple[NumberRow, ...]
+    friction: tuple[NumberRow, ...]
+    steps: tuple[StepQuality, ...]
+    warnings: tuple[str, ...]
+    facts: dict[str, Any] = field(default_factory=dict)
+    prediction: Prediction | None = None
+    notes: tuple[str, ...] = ()
+    verdict: Verdict | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values; numbers that are not finite become null."""
+        judged = {} if self.verdict is None else {"verdict": self.verdict.as_json()}
+        return judged | {
+            "robot": self.robot,
+            "method": self.method,
+            "joints": list(self.joint_names),
+            "base_parameters": [
+                {
+                    "name": row.name,
+                    "group": row.group,
+                    "value": row.value,
+                    "std": _finite(row.std),
+                    "relative": _finite(row.relative),
+                    "unit": row.unit,
+                    "equation": row.equation,
+                    "identifiable": row.identifiable,
+                    "visibility": row.visibility,
+                }
+                for row in self.parameters
+            ],
+            "motors": [_number(row) for row in self.motors],
+            "friction": [_number(row) for row in self.friction],
+            "quality": {step.step: _quality(step) for step in self.steps},
+            "warnings": list(self.warnings),
+            "notes": list(self.notes),
+            "prediction": None if self.prediction is None else self.prediction.as_json(),
+            "facts": self.facts,
+        }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _number(row: NumberRow) -> dict[str, Any]:
+    return {
+        "joint": row.joint,
+        "name": row.name,
+        "value": _finite(row.value),
+        "std": _finite(row.std),
+        "unit": row.unit,
+        "seen": row.seen,
+        "visibility": row.visibility,
+    }
+
+
+def _quality(step: StepQuality) -> dict[str, Any]:
+    return {
+        name: {
+            "fit": {"rmse": _finite(both.fit.rmse), "r2": _finite(both.fit.r2)},
+            "held_out": {"rmse": _finite(both.held_out.rmse), "r2": _finite(both.held_out.r2)},
+        }
+        for name, both in step.joints.items()
+    }
+
+
+def four_step_record(
+    model: DynamicsModel, found: FourSteps, theta_b: Array, options: CalibrationOptions
+) -> Calibration:
+    """The record of a campaign with these base parameters; its quality is still to be found."""
+    inertial, gravity = found.inertial, found.gravity
+    groups = ["inertial"] * model.l
+    for k in gravity.split.pivots:
+        groups[int(k)] = "gravity"
+    names = [f"theta_{k + 1}" for k in range(model.l)]
+    kept_at = _kept_at(model, theta_b, inertial.scale)
+    seen = visibility(names, theta_b, inertial.std, inertial.unseen / inertial.scale[:, None], kept_at)
+    facts = {
+        "delay_s": found.friction.delay,
+        "gravity_rank": gravity.estimate.rank,
+        "gravity_condition": gravity.estimate.condition,
+        "gravity_singular_values": gravity.estimate.singular_values.tolist(),
+        "inertial_rank": inertial.estimate.rank,
+        "inertial_condition": inertial.estimate.condition,
+        "inertial_singular_values": inertial.estimate.singular_values.tolist(),
+        "residual_correlation": _by_joint(model, inertial.estimate.correlation),
+    }
+    steps = {
+        "motor": options.motor,
+        "gravity": options.gravity,
+        "friction": options.friction,
+        "inertial": options.inertial,
+    }
+    runs = {
+        name: FrictionRunConstants(joint.inertia, joint.offset, joint.delay)
+        for name, joint in found.friction.joints.items()
+    }
+    return with_model(
+        Calibration(
+            robot=model.chain.name,
+            method="four steps",
+            joint_names=model.joint_names,
+            model=model,
+            parameters=_parameter_rows(model, theta_b, inertial.std, groups, seen),
+            motors=_motor_rows(model, found.motors, found.motor),
+            friction=_lugre_rows(model, found),
+            steps=(),
+            warnings=(*found.warnings, *visibility_warnings("inertial", names, seen)),
+            facts=facts,
+            prediction=Prediction("lugre", steps, runs=runs),
+            notes=weak_notes("inertial", names, seen),
+        ),
+        theta_b,
+    )
+
+
+def linear_record(
+    model: DynamicsModel, found: LinearResult, values: Array, options: LinearOptions
+) -> Calibration:
+    """The record of a linear fit with these values of the whole vector; its quality is still to be found."""
+    problem, solved = found.problem, found.estimate
+    kept_at = _kept_at(model, values, found.prior.scale)
+    seen = visibility(problem.names, values, solved.std, solved.unseen, kept_at)
+    facts = {
+        "rank": solved.rank,
+        "unknowns": len(values),
+        "condition": solved.condition,
+        "singular_values": solved.singular_values.tolist(),
+        "residual_correlation": _by_joint(model, solved.correlation),
+    }
+    each = [(joint, name) for joint in model.joint_names for name in problem.friction]
+    friction = tuple(
+        NumberRow(
+            joint,
+            name,
+            float(values[k]),
+            float(solved.std[k]),
+            _friction_unit(name),
+            seen.words[k] == IDENTIFIED,
+            seen.words[k],
+        )
+        for k, (joint, name) in enumerate(each, start=model.l)
+    )
+    step = StepOptions(options.filter, options.split, options.fit)
+    return with_model(
+        Calibration(
+            robot=model.chain.name,
+            method="linear fit",
+            joint_names=model.joint_names,
+            model=model,
+            parameters=_parameter_rows(model, values, solved.std, ["all"] * model.l, seen),
+            motors=_motor_rows(model, found.motors, None),
+            friction=friction,
+            steps=(),
+            warnings=(*found.warnings, *visibility_warnings("linear fit", problem.names, seen)),
+            facts=facts,
+            prediction=Prediction(
+                "linear", {"all": step}, options.sign_speed, options.exponents, options.offset
+            ),
+            notes=weak_notes("linear fit", problem.names, seen),
+        ),
+        values[: model.l],
+    )
+
+
+def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration:
+    """The record whose model carries its numbers as they now are; with these base parameters, where given."""
+    provenance = {**record.model.provenance, "calibration": record.as_json()}
+    theta = record.model.theta_b if theta_b is None else theta_b
+    return replace(record, model=replace(record.model, theta_b=theta, provenance=provenance))
+
+
+def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:
+    """The same calibration with its verdict, in the model's provenance, too."""
+    return with_model(replace(record, verdict=verdict))
+
+
+def verdict_of(record: Calibration) -> Verdict:
+    """The verdict of a record that calibration has finished."""
+    if record.verdict is None:
+        raise InternalError(f"{record.robot}: calibrated, but not judged")
+    return record.verdict
+
+
+MOVED = 1e-6
+"""Of what is believable: further from the prior, an invisible parameter was moved by physical consistency."""
+
+
+def _kept_at(model: DynamicsModel, values: Array, scale: Array) -> list[str]:
+    """Where each value stays that the data do not show: friction at zero, theta_b at the file's."""
+    prior = np.zeros(len(values))
+    prior[: model.l] = 0.0 if model.theta_b is None else model.theta_b
+    names = ["zero" if model.theta_b is None else "the file's value"] * model.l
+    names += ["zero"] * (len(values) - model.l)
+    moved = np.abs(values - prior) > MOVED * scale
+    return [
+        f"the physical value nearest to {name}" if m else name for name, m in zip(names, moved, strict=True)
+    ]
+
+
+def _by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:
+    return dict(zip(model.joint_names, values.tolist(), strict=True))
+
+
+def _parameter_rows(
+    model: DynamicsModel, theta: Array, std: Array, groups: list[str], seen: Visibility
+) -> tuple[ParameterRow, ...]:
+    return tuple(
+        ParameterRow(
+            name=f"theta_{k + 1}",
+            group=groups[k],
+            value=float(theta[k]),
+            std=float(std[k]) if seen.determined[k] else float("inf"),
+            unit=parameter.unit,
+            equation=parameter.equation,
+            identifiable=seen.words[k] == IDENTIFIED,
+            visibility=seen.words[k],
+        )
+        for k, parameter in enumerate(base_parameters(model))
+    )
+
+
+def _motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) -> tuple[NumberRow, ...]:
+    """None where torques were logged; a constant that was given, not identified, is marked as not seen."""
+    constants, relative = motors.torque_constant, motors.relative_std
+    if step is None and np.all(constants == 1.0):
+        return ()
+    seen = np.zeros(model.n, dtype=bool) if step is None else step.identified
+    return tuple(
+        NumberRow(name, "torque_constant", float(value), float(abs(value) * share), "Nm/A", bool(known))
+        for name, value, share, known in zip(model.joint_names, constants, relative, seen, strict=True)
+    )
+
+
+def _lugre_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
+    """The seven per joint; forces carry the torque constant's uncertainty too."""
+    relative = dict(zip(model.joint_names, found.motors.relative_std.tolist(), strict=True))
+    rows: list[NumberRow] = []
+    for name, joint in found.friction.joints.items():
+        values = zip(PARAMETERS, joint.friction.as_array().tolist(), joint.std.tolist(), UNITS, strict=True)
+        for parameter, value, std, unit in values:
+            by_constant = relative[name] * value if unit.startswith("Nm") else 0.0
+            seen = parameter not in joint.unseen
+            rows.append(NumberRow(name, parameter, value, float(np.hypot(std, by_constant)), unit, seen))
+    return tuple(rows)
+
+
+def _friction_unit(name: str) -> str:
+    if not name.startswith("viscous"):
+        return "Nm"
+    _, _, exponent = name.partition("^")
+    return f"Nm (s/rad)^{exponent}" if exponent else "Nms/rad"

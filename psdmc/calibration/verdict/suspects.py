@@ -1,0 +1,149 @@
+"""What would explain a bad fit: columns of joints exchanged, signs turned.
+
+Hypotheses on positions (a sign turned, two columns exchanged) are tried one after the other, the best kept. Under each,
+every effort column is explained by every joint with either sign (`explain`), and an assignment finds which column is
+whose. A change must explain enough more to be named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.verdict.evidence import Evidence
+from psdmc.calibration.verdict.explain import Explainer
+from psdmc.calibration.verdict.suspect_words import exchanges, in_words
+
+ROWS = 500
+"""Samples that hypotheses are tried on."""
+PRICE = 0.3
+"""Explained share, summed over joints, that a change must gain to be believed: a turned sign gains about 0.9 ..."""
+FACTOR = 4.0
+"""... or the factor by which what is left unexplained must fall, where little was, as with whole joints swapped ..."""
+LEAST = 0.05
+"""... by at least this much, summed over joints."""
+CLOSE = 0.2
+"""Share of a change's worth by which another hypothesis may fall short of the best and still be named."""
+MOST_NAMED = 3
+"""Hypotheses that explain a log equally well and are named; beyond, only the best."""
+CHANGES = 3
+"""Changes of positions that are tried on top of each other."""
+BELIEVED = 0.7
+"""Mean explained share that a hypothesis must reach: of so many, some explains even noise a little better."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """What the log would have to be: joint k's position is signs[k] times column order[k], its effort likewise.
+
+    score   explained share of the torque's variation, summed over joints
+    """
+
+    signs: tuple[int, ...]
+    order: tuple[int, ...]
+    effort_signs: tuple[int, ...]
+    effort_order: tuple[int, ...]
+    score: float
+
+    @property
+    def changes(self) -> int:
+        """Signs turned and pairs exchanged; all signs at once, or one change of position and effort, are one."""
+        swaps = exchanges(self.order)
+        if self.effort_order != self.order:
+            swaps += exchanges(self.effort_order)
+        if all(sign < 0 for sign in self.effort_signs) and all(sign > 0 for sign in self.signs):
+            return swaps + 1
+        return swaps + sum(-1 in both for both in zip(self.signs, self.effort_signs, strict=True))
+
+    def worth(self, stated: Hypothesis) -> float:
+        """Changes that would pay for what this explains more than the log as it is, less the changes it makes."""
+        gained = self.score - stated.score
+        left = max(len(self.signs) - self.score, 1e-12)
+        fallen = np.log((left + max(gained, 0.0)) / left) / np.log(FACTOR) if gained > LEAST else 0.0
+        return float(max(gained / PRICE, fallen)) - self.changes
+
+    def said(self, names: tuple[str, ...]) -> str:
+        return in_words(names, self.order, self.signs, self.effort_order, self.effort_signs)
+
+
+def suspect(evidence: Evidence, positions: bool = True) -> str | None:
+    """The best explanation of a log that differs from what it says, in words; None where none is much better.
+
+    positions   whether positions are suspected, too, or efforts alone
+    """
+    evidence = evidence.thinned(ROWS)
+    stated = _stated(evidence)
+    tried = _searched(evidence, stated, CHANGES if positions else 0)
+    best = max(tried, key=lambda one: one.worth(stated))
+    if best.worth(stated) <= 0 or best.score < BELIEVED * evidence.n:
+        return None
+    least = best.worth(stated) - CLOSE
+    alike = [one for one in tried if one.changes == best.changes and one.worth(stated) > least]
+    alike.sort(key=lambda one: -one.worth(stated))
+    words = list(dict.fromkeys(one.said(evidence.model.joint_names) for one in alike))
+    named = words if len(words) <= MOST_NAMED else words[:1]
+    explained, logged = (max(one.score, 0.0) / evidence.n for one in (best, stated))
+    return f"{', or '.join(named)} (that explains {explained:.0%} of the torque's variation; the log as it is {logged:.0%})"
+
+
+def _searched(evidence: Evidence, stated: Hypothesis, rounds: int) -> list[Hypothesis]:
+    """Everything that was tried, the log as it is first."""
+    best = _assigned(evidence, stated, stated.signs, stated.order)
+    tried = [stated, best]
+    for _ in range(rounds):
+        ways = [_assigned(evidence, stated, *way) for way in _moves(best)]
+        tried += ways
+        better = max(ways, key=lambda one: one.worth(stated))
+        if better.worth(stated) <= best.worth(stated):
+            break
+        best = better
+    return tried
+
+
+def _stated(evidence: Evidence) -> Hypothesis:
+    """The log as it is."""
+    explain = Explainer(evidence)
+    score = sum(explain(k, evidence.torque[:, k])[0] for k in range(evidence.n))
+    here = tuple(range(evidence.n))
+    return Hypothesis((1,) * evidence.n, here, (1,) * evidence.n, here, score)
+
+
+def _moves(one: Hypothesis) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Positions with one more sign turned, or one more pair exchanged."""
+    n = len(one.signs)
+    for k in range(n):
+        yield tuple(-s if j == k else s for j, s in enumerate(one.signs)), one.order
+    for i, k in combinations(range(n), 2):
+        order = list(one.order)
+        order[i], order[k] = order[k], order[i]
+        yield one.signs, tuple(order)
+
+
+def _assigned(
+    evidence: Evidence, stated: Hypothesis, signs: tuple[int, ...], order: tuple[int, ...]
+) -> Hypothesis:
+    """The efforts' best signs and order for these positions; efforts that stay, or go with the positions, cost nothing."""
+    n = evidence.n
+    explain = Explainer(evidence.turned(np.array(signs, dtype=np.float64), order))
+    shares = np.array([[explain(k, evidence.torque[:, i]) for i in range(n)] for k in range(n)])
+    stays = np.eye(n, dtype=bool) | (np.array(order)[:, None] == np.arange(n))
+    moving = np.where(stays, 0.0, 0.5 * PRICE)
+    turning = (np.array([0.0, PRICE]), np.zeros(2), np.array([np.inf, 0.0]))
+    found = [_chosen(shares, moving, costs) for costs in turning]
+    ways = [Hypothesis(signs, order, *one) for one in found]
+    return max(ways, key=lambda one: one.worth(stated))
+
+
+def _chosen(shares: Array, moving: Array, turning: Array) -> tuple[tuple[int, ...], tuple[int, ...], float]:
+    """Per joint the sign and the column that explain most, at what turning and moving cost; and the share explained."""
+    worth = shares - turning
+    turned = np.argmax(worth, axis=2)
+    joints, columns = linear_sum_assignment(np.max(worth, axis=2) - moving, maximize=True)
+    sides = turned[joints, columns]
+    score = float(shares[joints, columns, sides].sum())
+    return tuple(-1 if side else 1 for side in sides), tuple(int(i) for i in columns), score

@@ -1,0 +1,145 @@
+"""From a robot to its MODEL: the derivation from top to bottom."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.derivation.certify import certificate
+from psdmc.derivation.expand import Progress, expand, precision_for
+from psdmc.derivation.link_by_link import EFFECT
+from psdmc.derivation.memory import refuse_long
+from psdmc.derivation.reduce import PIVOT_TOLERANCE, Reduction
+from psdmc.derivation.rounding import merged
+from psdmc.derivation.sampled import reduction_of
+from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
+from psdmc.errors import DerivationError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
+from psdmc.robot.small import times
+
+Array = NDArray[np.float64]
+
+EQUATION_NOISE = 3e-14
+"""Relative uncertainty of a coefficient of B: rounding, magnified by the back substitution."""
+
+LARGEST_CHAIN = 200
+"""Joints; beyond, base parameters alone take more than a minute and 2 GiB."""
+
+SIZES = (1e-12, 1e12)
+"""m; a robot's longest step lies between these, or squares of its lengths leave double precision behind."""
+
+LAST_DIGIT = 4e-16
+"""The same where B was found in extended precision."""
+
+
+def derive_model(
+    chain: Chain,
+    *,
+    expand: bool = True,
+    progress: Progress | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    memory: int | None = None,
+) -> DynamicsModel:
+    """The chain's dynamics as E, P and theta_b, certified.
+
+    expand      False leaves E and P out: base parameters alone, for chains of any length
+    progress    called with the name of each step as it begins
+    provenance  plain JSON values to keep with the model; the tolerances used are added
+    memory      bytes that the expansion may take; default: most of what the machine has free
+    Raises DerivationError where the expansion would take too much memory or time, the chain is longer than
+    LARGEST_CHAIN, its numbers are beyond double precision, or no parameter has any effect.
+    """
+    tell = progress or _silent
+    _refuse_absurd(chain)
+    if expand:
+        refuse_long(0, [joint.kind for joint in chain.joints])
+    robot = scaled(chain)
+    tell("base parameters")
+    reduction = reduction_of(robot)
+    if not len(reduction.pivots):
+        raise DerivationError(
+            f"'{chain.name}': no inertial parameter has any effect on any joint",
+            "give masses and inertias, or assume fewer of them zero",
+        )
+    expansion = _expanded(robot, reduction, tell, memory) if expand else None
+    B = base_map(robot, reduction)
+    model = DynamicsModel(
+        E=expansion.E if expansion else None,
+        P=expansion.P if expansion else None,
+        theta_b=base_parameters(B, chain),
+        B=B,
+        chain=chain,
+        certificate=np.zeros(len(chain)),
+        provenance=_plain(dict(provenance or {}) | {"tolerances": tolerances(robot, reduction)}),
+    )
+    tell("certificate")
+    return replace(model, certificate=certificate(model))
+
+
+_expanded = expand
+
+
+def _refuse_absurd(chain: Chain) -> None:
+    if len(chain) > LARGEST_CHAIN:
+        raise DerivationError(
+            f"'{chain.name}': {len(chain)} joints, psdmc derives chains of up to {LARGEST_CHAIN}",
+            "cut the chain with --base and --tip",
+        )
+    unit = length_unit(chain)
+    if not SIZES[0] < unit < SIZES[1]:
+        raise DerivationError(
+            f"'{chain.name}': its longest step from joint to joint is about {unit:.1g} m, expected "
+            f"{SIZES[0]:g} to {SIZES[1]:g}",
+            "check the units of lengths: they are metres",
+        )
+
+
+def _silent(step: str) -> None:
+    """Nobody listens."""
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """As a model file will give them back: tuples become lists."""
+    plain: dict[str, Any] = json.loads(json.dumps(values))
+    return plain
+
+
+def tolerances(robot: Scaled, reduction: Reduction) -> dict[str, float]:
+    """The numbers that decided."""
+    precision = precision_for(robot, reduction)
+    return {
+        "coefficient": precision.zero,
+        "value_noise": precision.noise,
+        "pivot": PIVOT_TOLERANCE if reduction.is_clear else EFFECT,
+        "equation_noise": _equation_noise(reduction),
+    }
+
+
+def _equation_noise(reduction: Reduction) -> float:
+    return EQUATION_NOISE if reduction.is_clear else LAST_DIGIT
+
+
+def base_map(robot: Scaled, reduction: Reduction) -> Array:
+    """B (l, 11 n) in SI: base parameters from standard parameters, which the span's leading rows are."""
+    units = parameter_units(robot.kinds, robot.unit)[robot.leads]
+    echelon = reduction.echelon * units[reduction.pivots][:, None] / units
+    B = np.zeros((len(reduction.pivots), PARAMETERS_PER_LINK * len(robot.kinds)))
+    noise = _equation_noise(reduction) * np.abs(echelon.reshape(-1))
+    B[:, robot.leads] = merged(echelon.reshape(-1), noise).reshape(echelon.shape)
+    return B
+
+
+def base_parameters(B: Array, chain: Chain) -> Array | None:
+    """theta_b = B x; None where a parameter that counts is unknown."""
+    x = chain.parameters.reshape(-1)
+    unknown = np.isnan(x)
+    if B[:, unknown].any():
+        return None
+    theta: Array = times(B, np.where(unknown, 0.0, x))
+    return theta

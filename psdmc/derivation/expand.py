@@ -1,0 +1,137 @@
+"""From a chain to E, P and the base parameters' equations, in coefficient space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from psdmc.derivation.extended import extended, has_small_entries
+from psdmc.derivation.functions import Functions
+from psdmc.derivation.gravity import gravity_terms
+from psdmc.derivation.inertia import mass_matrix_terms
+from psdmc.derivation.memory import (
+    available_memory,
+    grid_bytes,
+    largest_function_count,
+    refuse_beyond,
+    refuse_long,
+    velocity_bytes,
+)
+from psdmc.derivation.reduce import Reduction
+from psdmc.derivation.rounding import merged
+from psdmc.derivation.terms import Terms, joined, times_matrix
+from psdmc.derivation.units import Scaled, function_units, parameter_units, torque_units
+from psdmc.derivation.velocity import acceleration_terms, velocity_terms
+from psdmc.dynamics.scalar import Vector
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+COEFFICIENT_TOLERANCE = 1e-12
+"""Coefficients below this are zero, lengths in the robot's unit (units.py). Six joints with oblique axes have
+the same p for every tolerance from 3e-14 to 1e-9; the smallest true coefficient met is 1e-8 (seven such
+joints)."""
+
+VALUE_NOISE = 1e-14
+"""Uncertainty of a coefficient of size one, from rounding; relative for larger ones. Equal coefficients
+differ by up to 2e-15 (KR6, LBR7), different ones by more than 1e-4 there."""
+
+
+class Precision(NamedTuple):
+    """What rounding leaves of an exact zero, and of a coefficient of size one (relative for larger ones), lengths in the
+    robot's unit."""
+
+    zero: float
+    noise: float
+
+
+IN_DOUBLE = Precision(COEFFICIENT_TOLERANCE, VALUE_NOISE)
+EXTENDED = Precision(1e-15, 1e-16)
+"""Where columns are nearly dependent: coefficients of size tilt^2 count. Rounding leaves less than 1e-17 there."""
+
+
+class Expansion(NamedTuple):
+    """E (5n, p) and P (n of (p, l)) in SI."""
+
+    E: NDArray[np.uint8]
+    P: tuple[sparse.csr_array, ...]
+
+
+def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int | None = None) -> Expansion:
+    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of
+    what is free)."""
+    kinds, precision = scaled.kinds, precision_for(scaled, reduction)
+    if precision is EXTENDED:
+        scaled = extended(scaled)
+    functions = Functions(kinds)
+    available = available_memory() if memory is None else memory
+    refuse_beyond(grid_bytes(kinds), available, largest_function_count(kinds), len(kinds))
+    progress("mass matrix")
+    chosen = scaled.span[:, reduction.pivots]
+    mass = _mass_matrix(scaled, chosen, functions, precision.zero)
+    progress("gravity")
+    gravity = _gravity(scaled, chosen, functions, precision.zero)
+    progress("velocity terms")
+    count, needed = velocity_bytes(mass, functions)
+    refuse_long(count, kinds)
+    refuse_beyond(needed, available, min(count, largest_function_count(kinds)), len(kinds))
+    velocity = velocity_terms(mass, functions, precision.zero)
+    progress("reduction matrices")
+    terms = joined([gravity, acceleration_terms(mass, functions), velocity])
+    units = parameter_units(kinds, scaled.unit)[scaled.leads[reduction.pivots]]
+    return Expansion(*assembled(terms, functions, units, scaled.unit, precision.noise))
+
+
+def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
+    """Double where every coefficient is either rounding or far from it."""
+    return IN_DOUBLE if reduction.is_clear and not has_small_entries(scaled) else EXTENDED
+
+
+def _mass_matrix(
+    scaled: Scaled, chosen: Array, functions: Functions, zero: float
+) -> dict[tuple[int, int], Terms]:
+    """In the chosen columns of the span; row 0 throughout."""
+    found = mass_matrix_terms(scaled.frames, scaled.link_frames, functions, zero)
+    return {
+        pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, zero)
+        for pair, terms in found.items()
+    }
+
+
+def _gravity(scaled: Scaled, chosen: Array, functions: Functions, zero: float) -> Terms:
+    up: Vector = scaled.up
+    terms = gravity_terms(scaled.frames, scaled.link_frames, up, functions, zero)
+    return times_matrix(terms, chosen, zero)
+
+
+def assembled(
+    terms: Terms,
+    functions: Functions,
+    units: Sequence[float] | Array,
+    unit: float,
+    value_noise: float = VALUE_NOISE,
+) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
+    """E and P in SI from torque terms (function: key, column: base parameter) in the robot's unit of length.
+
+    units        (l,) one unit of each base parameter in SI
+    value_noise  uncertainty of a coefficient of size one, relative for larger ones
+    """
+    keys, place = np.unique(terms.function, return_inverse=True)
+    exponents = functions.exponents(keys)
+    kinds = functions.kinds
+    shape = (len(keys), len(units))
+    to_si = torque_units(kinds, unit)[terms.row]
+    to_si /= function_units(exponents, kinds, unit)[place] * np.asarray(units)[terms.column]
+    noise = value_noise * np.maximum(1.0, np.abs(terms.value)) * to_si
+    values = merged((terms.value * to_si).astype(np.float64), noise.astype(np.float64))
+    matrices = []
+    for joint in range(functions.n):
+        own = np.flatnonzero(terms.row == joint)
+        matrix = sparse.csr_array((values[own], (place[own], terms.column[own])), shape=shape)
+        matrix.sort_indices()
+        matrices.append(matrix)
+    return exponents, tuple(matrices)

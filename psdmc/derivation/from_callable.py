@@ -1,0 +1,200 @@
+"""E, P and B of a user's own torque function, by sampling alone: the general path of PSDM-2021.
+
+Nothing is known of the function but that its torques are inverse dynamics of a serial chain, linear in its
+parameters: gravity of first order in every joint, acceleration and velocity terms of second. Each term is
+sampled on the tensor grid of all joints and interpolated axis by axis, so the cost grows as 5^n: for a few
+joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from psdmc.derivation.expand import COEFFICIENT_TOLERANCE, assembled
+from psdmc.derivation.functions import Functions
+from psdmc.derivation.interpolate import QUADRATIC_SIZE, along_axes, interpolation, nodes
+from psdmc.derivation.memory import available_memory, largest_function_count, refuse_beyond
+from psdmc.derivation.reduce import Reduction, reduced, row_space
+from psdmc.derivation.terms import Terms, joined, restricted
+from psdmc.errors import InputError
+from psdmc.robot.chain import JointKind
+
+Array = NDArray[np.float64]
+TorqueFunction = Callable[[Array, Array, Array, Array, float], Array]
+
+PROBE_SEED = 1_907
+PROBE_TOLERANCE = 1e-9
+"""Relative error up to which the finished model must reproduce the function at random states."""
+
+PROBES = 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SampledModel:
+    """A torque function as functions times constants: tau[i] = y(state) @ P[i] @ B @ X.
+
+    E            (5n, p) uint8   as in DynamicsModel; functions without rates carry gravity_scale
+    P            n x (p, l)      reduction matrices
+    B            (l, k)          base parameters from the function's own parameters
+    parameters   k               their names
+    pivots       (l,)            the parameter that each base parameter leads with
+    certificate  (n,)            largest error against the function at fresh states, relative to the joint's
+    largest
+    """
+
+    E: NDArray[np.uint8]
+    P: tuple[sparse.csr_array, ...]
+    B: Array
+    parameters: tuple[str, ...]
+    pivots: tuple[int, ...]
+    certificate: Array
+
+    def torques(self, q: Array, qd: Array, qdd: Array, X: Array, gravity_scale: float = 1.0) -> Array:
+        """tau (states, n) from (states, n) arrays and parameters (k,)."""
+        n = len(self.P)
+        rows = np.concatenate([q.T, np.sin(q).T, np.cos(q).T, qd.T, qdd.T])
+        strength = np.where(self.E[3 * n :].any(axis=0), 1.0, gravity_scale)
+        values = strength[:, None] * np.prod(rows[:, None, :] ** self.E[:, :, None], axis=0)
+        theta = self.B @ X
+        return np.stack([(matrix @ theta) @ values for matrix in self.P], axis=1)
+
+
+def derive_from_callable(
+    f: TorqueFunction,
+    kinds: Sequence[JointKind],
+    parameter_names: Sequence[str],
+    *,
+    vectorised: bool = False,
+    length: float = 1.0,
+    memory: int | None = None,
+) -> SampledModel:
+    """E, P and B of tau = f(q, qd, qdd, X, gravity_scale).
+
+    f                q, qd, qdd (n,), X (k,) parameters, which enter linearly; gravity_scale multiplies
+    gravity,
+                     1 being its full strength; returns (n,). With `vectorised`, states (m, n) to torques (m,
+                     n).
+    kinds            of the n joints, base to tip
+    parameter_names  k, in the order of X, which is also the order in which pivots are chosen
+    length           m, the robot's size: prismatic joints are sampled at -length, 0 and length
+    memory           bytes that the grids may take; default: most of what the machine has free
+    Raises InputError where f returns something else or is no such function, DerivationError where it does not
+    fit.
+    """
+    functions = Functions(tuple(kinds))
+    names = tuple(parameter_names)
+    cells = int(np.prod([QUADRATIC_SIZE[kind] for kind in kinds], dtype=np.int64))
+    needed = cells * functions.n * len(names) * 8 * 6
+    refuse_beyond(
+        needed, available_memory() if memory is None else memory, largest_function_count(kinds), functions.n
+    )
+    sample = _Sampler(f, functions, len(names), vectorised, length)
+    terms = joined(list(_all_terms(sample)))
+    reduction = reduced(row_space([terms], len(names)))
+    pivots = restricted(terms, reduction.pivots)
+    E, P = assembled(pivots, functions, np.ones(len(reduction.pivots)), 1.0)
+    return _certified(E, P, reduction, names, sample)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sampler:
+    f: TorqueFunction
+    functions: Functions
+    parameters: int
+    vectorised: bool
+    length: float
+
+    def grid(self) -> Array:
+        """(cells, n) tensor grid of joint positions, the first joint slowest."""
+        axes = [nodes(kind) * (self.length if kind == "prismatic" else 1.0) for kind in self.functions.kinds]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, self.functions.n)
+
+    def torques(self, q: Array, qd: Array, qdd: Array, X: Array, gravity_scale: float) -> Array:
+        """(m, n) from (m, n) states, whether or not f is vectorised."""
+        if self.vectorised:
+            values = np.asarray(self.f(q, qd, qdd, X, gravity_scale), dtype=np.float64)
+        else:
+            each = [self.f(*state, X, gravity_scale) for state in zip(q, qd, qdd, strict=True)]
+            values = np.array(each, dtype=np.float64)
+        if values.shape != q.shape or not np.isfinite(values).all():
+            raise InputError(
+                f"the torque function returned shape {values.shape}, expected {q.shape} of finite numbers",
+                "f(q, qd, qdd, X, gravity_scale) returns one torque per joint",
+            )
+        return values
+
+    def per_parameter(self, qd: Array, qdd: Array, gravity_scale: float) -> Array:
+        """(parameters, n, cells) torques on the grid at fixed rates, for each parameter alone."""
+        q = self.grid()
+        speeds, accelerations = np.broadcast_to(qd, q.shape), np.broadcast_to(qdd, q.shape)
+        return np.stack(
+            [
+                self.torques(q, speeds, accelerations, unit, gravity_scale).T
+                for unit in np.eye(self.parameters)
+            ]
+        )
+
+    def terms(self, values: Array, rate: int) -> Terms:
+        """Torque terms from per-parameter values on the grid."""
+        kinds = self.functions.kinds
+        sizes = [QUADRATIC_SIZE[kind] for kind in kinds]
+        batch = values.reshape(-1, values.shape[-1])
+        flat = along_axes([interpolation(kind) for kind in kinds], np.ascontiguousarray(batch.T))
+        found: Array = flat.reshape(values.shape)
+        largest = np.abs(found).max(initial=0.0)
+        column, row, place = np.nonzero(np.abs(found) > COEFFICIENT_TOLERANCE * max(1.0, largest))
+        codes = self.functions.tensor_codes(0, sizes)[place] + rate * self.functions.codes
+        in_metres = np.ones(found.shape[-1])
+        for joint, kind in enumerate(kinds):
+            if kind == "prismatic":
+                digits = self.functions.digit(self.functions.tensor_codes(0, sizes), joint)
+                in_metres /= self.length**digits
+        return Terms(row, codes, column, found[column, row, place] * in_metres[place])
+
+
+def _all_terms(sample: _Sampler) -> Iterator[Terms]:
+    """Gravity, then accelerations, squares of rates, products of rates."""
+    n, functions = sample.functions.n, sample.functions
+    rest, units = np.zeros(n), np.eye(n)
+    yield sample.terms(sample.per_parameter(rest, rest, 1.0), 0)
+    for j in range(n):
+        yield sample.terms(sample.per_parameter(rest, units[j], 0.0), functions.acceleration_rate(j))
+    squares = [sample.per_parameter(units[j], rest, 0.0) for j in range(n)]
+    for j in range(n):
+        yield sample.terms(squares[j], functions.velocity_rate(j, j))
+    for j in range(n):
+        for k in range(j + 1, n):
+            both = sample.per_parameter(units[j] + units[k], rest, 0.0)
+            yield sample.terms(both - squares[j] - squares[k], functions.velocity_rate(j, k))
+
+
+def _certified(
+    E: NDArray[np.uint8],
+    P: tuple[sparse.csr_array, ...],
+    reduction: Reduction,
+    names: tuple[str, ...],
+    sample: _Sampler,
+) -> SampledModel:
+    """The model, after it reproduced the function at random states and parameters."""
+    pivots = tuple(int(pivot) for pivot in reduction.pivots)
+    model = SampledModel(E, P, reduction.echelon, names, pivots, np.zeros(len(P)))
+    rng = np.random.default_rng(PROBE_SEED)
+    q, qd, qdd = rng.uniform(-2.0, 2.0, size=(3, PROBES, len(P)))
+    X = rng.normal(size=len(names))
+    expected = sample.torques(q, qd, qdd, X, 1.0)
+    largest = np.abs(expected).max(axis=0)
+    errors = np.abs(model.torques(q, qd, qdd, X) - expected).max(axis=0)
+    errors = errors / np.where(largest > 0, largest, 1.0)
+    worst = int(np.argmax(errors))
+    if not errors[worst] <= PROBE_TOLERANCE:
+        raise InputError(
+            f"torque {worst + 1} of the function is no rigid-body torque: its model is off by "
+            f"{errors[worst]:.2g} of its largest",
+            "it must be linear in X, quadratic in qd, linear in qdd, and leave friction and motors out",
+        )
+    return SampledModel(E, P, reduction.echelon, names, pivots, errors)

@@ -1,0 +1,60 @@
+"""Gravity terms: the derivative of a potential that is of first order in every joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from psdmc.derivation.functions import Functions
+from psdmc.derivation.inertia import Moving, coefficients, column, expanded, moving
+from psdmc.derivation.interpolate import LINEAR_SIZE
+from psdmc.derivation.terms import Array, Terms, joined, summed
+from psdmc.derivation.velocity import derivative
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.regressor import Placed, carried, twist_in
+from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
+from psdmc.robot.chain import PARAMETERS_PER_LINK
+
+
+def gravity_terms(
+    frames: Sequence[Frame],
+    link_frames: Sequence[Placed],
+    up: Vector,
+    functions: Functions,
+    tolerance: float,
+) -> Terms:
+    """Torque terms per unit of |g|; `up` is the unit vector against gravity in the base frame.
+
+    The potential of a unit mass at r in a link's frame is direction . r + height; both are carried outward
+    from joint to joint. Its coefficient for a link's mass is the height, for mx, my, mz the direction.
+    """
+    parts: list[Terms] = []
+    direction: Vector = (np.array([up[0]]), np.array([up[1]]), np.array([up[2]]))
+    height: Array = np.zeros(1)
+    for k, frame in enumerate(frames):
+        direction, height = _carried(moving(frame), direction, height)
+        potential = _link_potential(link_frames[k], direction, height, k, functions, tolerance)
+        for i in range(k + 1):
+            slope = derivative(potential, functions, i)
+            parts.append(Terms(np.full_like(slope.row, i), slope.function, slope.column, slope.value))
+    return summed(joined(parts), tolerance)
+
+
+def _carried(joint: Moving, direction: Vector, height: Array) -> tuple[Vector, Array]:
+    before, count = column(direction), len(height)
+    raised: Scalar = height[:, None] + dot(before, joint.state.offset)
+    turned, _ = carried(joint.frame, joint.state, (before, ZERO))
+    return expanded(turned, count, joint.kind), coefficients(raised, count, joint.kind)
+
+
+def _link_potential(
+    place: Placed, direction: Vector, height: Array, k: int, functions: Functions, tolerance: float
+) -> Terms:
+    x, y, z = place.translation.tolist()
+    about_link, _ = twist_in(place, (direction, ZERO))
+    values = np.stack([height + dot(direction, (x, y, z)), *about_link])
+    parameter, position = np.nonzero(np.abs(values) > tolerance)
+    codes = functions.tensor_codes(0, [LINEAR_SIZE[kind] for kind in functions.kinds[: k + 1]])
+    columns = PARAMETERS_PER_LINK * k + parameter
+    return Terms(np.full(len(columns), k), codes[position], columns, values[parameter, position])

@@ -1,0 +1,125 @@
+"""Base parameters link by link, in extended precision: for long chains, and for axes that are nearly parallel.
+
+Link k's parameters leave the torque of joint k at zero in every motion exactly where its Lagrangian depends on neither
+q_k nor its rate. Then link k might as well be fixed to link k-1, and its parameters, moved there, belong to that link.
+So with C_k the rows that joint k's torque has in the parameters of its own link, and T_k those parameters moved to link
+k-1 at q_k = 0, the torques of all joints depend on the parameters through
+
+    C_k z_k,    z_k = x_k + T_(k+1) z_(k+1)
+
+and on nothing else: each C_k is 11 columns of a few samples, whatever the length of the chain, and every decision about
+rank is made there, joint by joint, against that joint's own torque.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from psdmc.derivation.extended import Long, extended
+from psdmc.derivation.reduce import Reduction
+from psdmc.derivation.units import Scaled
+from psdmc.dynamics.motion import PLAIN, LinkMotion, sweep_outward
+from psdmc.dynamics.parameters import BODY_PARAMETERS, moving_map
+from psdmc.dynamics.regressor import DRIVE, unit_wrench
+from psdmc.robot.chain import PARAMETERS_PER_LINK
+from psdmc.robot.graded import graded_pivots, halving_shares, lengths
+from psdmc.robot.small import times
+
+SEED = 20_210_157
+STATES = 48
+"""Sampled motions, the same for all joints; each joint's torque has at most 11 columns to tell apart."""
+
+EFFECT = 1e-15
+"""What a parameter must add to a joint's torque beyond what others do, lengths in the robot's unit and the most that any
+parameter of the link does there being one. Rounding leaves 1e-18; evaluating the torque in double leaves as much as this."""
+
+EXACT = 1e-16
+"""Smaller coefficients of the echelon form are zero, lengths in the robot's unit: they add less than the last digit. It
+also tells columns that assumed zeros make dependent from the others, as a share of the longest: that of a long chain is a
+thousand long, and so is its rounding."""
+
+
+def reduction_link_by_link(robot: Scaled) -> Reduction:
+    """The base parameters within the span's columns, by graded passes over rows that hold nothing but rank."""
+    rows = torque_rows(extended(robot))
+    return _reduced(np.asarray((sparse.csr_array(robot.span.T) @ rows.T).T))
+
+
+def torque_rows(robot: Scaled) -> Long:
+    """(r, 11 n) rows that span what any torque depends on, joint by joint, each joint's of length one at most.
+
+    r is the number of base parameters of a chain whose parameters are all free. `robot` in extended precision.
+    """
+    n = len(robot.kinds)
+    own = [echelon_rows(samples) for samples in _own_torques(robot)]
+    rows = np.zeros((sum(len(part) for part in own), PARAMETERS_PER_LINK * n), np.longdouble)
+    carried = np.zeros((0, BODY_PARAMETERS), np.longdouble)
+    for k, (frame, place, part) in enumerate(zip(robot.frames, robot.link_frames, own, strict=True)):
+        turned = np.array(frame.rotation, dtype=np.longdouble)
+        fixed = moving_map(turned, np.array(frame.translation, dtype=np.longdouble))
+        before, first = len(carried), PARAMETERS_PER_LINK * k
+        carried = np.vstack([times(carried, fixed), part[:, :BODY_PARAMETERS]])
+        about_link = moving_map(place.rotation, place.translation)
+        rows[: len(carried), first : first + BODY_PARAMETERS] = times(carried, about_link)
+        rows[before : len(carried), first + DRIVE] = part[:, DRIVE]
+    return rows
+
+
+def _own_torques(robot: Scaled) -> list[Long]:
+    """n of (STATES, 11): each joint's torque from its own link's parameters about its own frame, at random motions."""
+    n = len(robot.kinds)
+    drawn = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, n, STATES)).astype(np.longdouble)
+    q, qd, qdd = (list(vector) for vector in drawn)
+    motions = sweep_outward(robot.frames, q, qd, qd, qdd, robot.up, PLAIN).motions
+    return [
+        _own_torque(frame.kind == "revolute", motion, acceleration)
+        for frame, motion, acceleration in zip(robot.frames, motions, qdd, strict=True)
+    ]
+
+
+def _own_torque(turns: bool, motion: LinkMotion, acceleration: Long) -> Long:
+    columns: list[Any] = [unit_wrench(name, motion)[1 if turns else 0][2] for name in range(DRIVE)]
+    samples = [np.broadcast_to(column, (STATES,)) for column in (*columns, acceleration)]
+    return np.stack(samples, axis=1).astype(np.longdouble)
+
+
+def echelon_rows(samples: Long) -> Long:
+    """(rank, k) rows with the row space of (m, k) samples, but for directions below EFFECT; the longest column of length
+    one."""
+    longest = lengths(samples).max(initial=0.0)
+    if not longest:
+        return samples[:0]
+    work = samples / longest
+    work[:, lengths(work) <= EFFECT] = 0.0
+    pivots, _, _ = graded_pivots(work, np.ones(work.shape[1]), halving_shares(EFFECT))
+    return np.asarray(work[: len(pivots)])
+
+
+def _reduced(rows: Long) -> Reduction:
+    """A small column is no pivot before its time: its torque would be a large parameter times small numbers, which
+    double precision knows to fewer digits. So residuals are compared as they are, not with their columns."""
+    work = np.array(rows, order="C")
+    last = EXACT * max(1.0, float(lengths(work).max(initial=0.0)))
+    found, _, _ = graded_pivots(work, np.ones(work.shape[1]), halving_shares(last))
+    pivots = np.array(found, dtype=np.int64)
+    others = np.setdiff1d(np.arange(work.shape[1]), pivots)
+    shares = _solved(work[: len(pivots), pivots], work[: len(pivots), others])
+    echelon = np.zeros((len(pivots), work.shape[1]))
+    echelon[:, pivots] = np.eye(len(pivots))
+    echelon[:, others] = np.where(np.abs(shares) < EXACT, 0.0, shares)
+    order = np.argsort(pivots)
+    return Reduction(pivots[order], echelon[order], False)
+
+
+def _solved(triangle: Long, right: Long) -> Long:
+    """The solution x of triangle @ x = right, triangle (l, l) but for what rounding left below its diagonal: that is
+    nothing in a row of length one, but much in a row of 1e-13."""
+    solution = right.copy()
+    for r in reversed(range(len(triangle))):
+        solution[r] /= triangle[r, r]
+        above = np.flatnonzero(triangle[:r, r])
+        solution[above] -= triangle[above, r, None] * solution[r]
+    return solution

@@ -1,0 +1,125 @@
+"""What an expansion will need, known before it is made."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.derivation.functions import Functions
+from psdmc.derivation.interpolate import LINEAR_SIZE, QUADRATIC_SIZE
+from psdmc.derivation.terms import Terms
+from psdmc.derivation.velocity import slope_count
+from psdmc.errors import DerivationError
+from psdmc.robot.chain import JointKind
+
+WITHOUT = "base parameters, regressor and generated code then come without E and P"
+
+BYTES_PER_TERM = 280
+"""Peak of the whole expansion per velocity term: 123 to collect, sort and sum it, some 200 with the matrices
+made of them (measured on six and seven joints with oblique axes; 225 in double, 255 in extended precision)."""
+
+_GRID_COPIES = 5
+"""Grids of ten features held at once: twists, products, two steps of the interpolation, magnitudes. A first,
+optimistic check: with oblique axes the mass matrix keeps up to six times the largest grid (measured on seven
+joints), and only then is the number of velocity terms known."""
+
+
+LARGEST_EXPANSION = 25_000_000
+"""Velocity terms beyond which an expansion is refused, whatever the memory: at some 1.6 us each, certificate included, these
+take well under a minute (measured on six, seven and eight joints with oblique axes)."""
+
+LARGEST_GRID = 5**8
+"""Grid points of the mass matrix beyond which an expansion is refused: nine revolute joints, a few seconds each way."""
+
+HEADROOM = 0.75
+"""Part of the free memory that an expansion may plan for: the estimate is one, and others run on the machine, too."""
+
+
+def largest_function_count(kinds: Sequence[JointKind]) -> int:
+    """The p of a chain of these joints with axes in general position; no such chain has more.
+
+    M_0j has degree one in q_1 ... q_j and two in what follows; every rate product qd_j qd_k (k >= j) has at
+    most that.
+    """
+    n = len(kinds)
+    linear = [LINEAR_SIZE[kind] for kind in kinds]
+    quadratic = [QUADRATIC_SIZE[kind] for kind in kinds]
+    total, gravity = 0, 1
+    for size in linear:
+        gravity *= size
+    for j in range(n):
+        product = 1
+        for size in linear[1 : j + 1] + quadratic[j + 1 :]:
+            product *= size
+        total += (1 + n - j) * product
+    return total + gravity - 1
+
+
+def grid_bytes(kinds: Sequence[JointKind]) -> int:
+    """Largest grid of mass-matrix features."""
+    size = 10 * 8 * _GRID_COPIES
+    for kind in kinds[1:]:
+        size *= QUADRATIC_SIZE[kind]
+    return size
+
+
+def velocity_bytes(mass_matrix: Mapping[tuple[int, int], Terms], functions: Functions) -> tuple[int, int]:
+    """(terms, bytes) of the velocity terms before equal ones are summed."""
+    count = 0
+    for (a, b), terms in mass_matrix.items():
+        slopes = sum(slope_count(terms, functions, d) for d in range(a + 1, functions.n))
+        count += slopes * (2 if a == b else 3)
+    return count, count * BYTES_PER_TERM
+
+
+def refuse_beyond(needed: int, available: int, functions: int, n: int) -> None:
+    """DerivationError naming p and the memory where more is needed than there is."""
+    if needed <= available:
+        return
+    raise DerivationError(
+        f"expanding this {n}-joint robot takes up to {functions:,} functions and about "
+        f"{needed / 2**30:.1f} GiB of memory, but no more than {available / 2**30:.1f} GiB should be taken here",
+        "derive with --no-expand: " + WITHOUT,
+    )
+
+
+def refuse_long(terms: int, kinds: Sequence[JointKind]) -> None:
+    """DerivationError where an expansion would take more than about a minute: too many velocity terms, or, while these
+    are unknown (0), too large a grid."""
+    grid = int(np.prod([QUADRATIC_SIZE[kind] for kind in kinds[1:]], dtype=float))
+    if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:
+        return
+    what = f"{terms:,} velocity terms (limit {LARGEST_EXPANSION:,})"
+    if not terms:
+        what = f"a grid of {grid:,} points for the mass matrix alone (limit {LARGEST_GRID:,})"
+    raise DerivationError(
+        f"expanding this {len(kinds)}-joint robot takes {what}: minutes",
+        "derive with --no-expand: " + WITHOUT,
+    )
+
+
+def available_memory() -> int:
+    """Bytes that an expansion may plan for: most of what the machine has free, or its control group's rest."""
+    return int(HEADROOM * min(_machine_memory(), _group_memory()))
+
+
+def _machine_memory() -> int:
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) * 1024
+    except (OSError, ValueError):
+        pass
+    return int(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+
+
+def _group_memory() -> int:
+    group = Path("/sys/fs/cgroup")
+    try:
+        limit = int((group / "memory.max").read_text(encoding="ascii"))
+        return limit - int((group / "memory.current").read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return 2**63 - 1

@@ -1,0 +1,112 @@
+"""Base parameters: the reduced row echelon form of the coefficients, pivots in the parameters' own order.
+
+Velocity terms are derivatives of the mass matrix in coefficient space, so their coefficients are combinations
+of its: mass matrix and gravity alone span the row space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from psdmc.derivation.terms import Terms
+from psdmc.robot.graded import graded_pivots, halving_shares
+
+Array = NDArray[np.float64]
+
+PIVOT_TOLERANCE = 1e-10
+"""A column of sampled or summed doubles whose share left by earlier pivots is below this depends on them; one below
+this share of the longest column has no effect. Rounding leaves some 1e-14."""
+
+CLEAR = 0.5**10
+"""Share that a pivot of a well-conditioned robot leaves at least."""
+
+NOISE = 1e-13
+"""Share that rounding alone can leave, in double. What lies between this and CLEAR is a nearly dependent column."""
+
+FAIR_ENTRY = 1e4
+"""Entries of the echelon form, lengths in the robot's unit, of a well-conditioned robot are smaller. A column that is small
+as a whole can be independent by all of itself, and others are then large multiples of it."""
+
+ECHELON_TOLERANCE = 1e-12
+"""Smaller entries of the echelon form are zero, lengths in the robot's unit. Rounding leaves less than
+1e-13."""
+
+
+_BLOCK_ROWS = 8192
+"""Rows reduced at once, so that the stack is never held dense as a whole."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reduction:
+    """Which columns are base parameters, and what they stand for.
+
+    pivots   (l,)     column indices, ascending
+    echelon  (l, k)   base parameters = echelon @ columns' parameters; a unit vector at each pivot
+    is_clear          no column was nearly dependent: double precision has decided, and well
+    """
+
+    pivots: NDArray[np.int64]
+    echelon: Array
+    is_clear: bool = True
+
+
+def row_space(blocks: Iterable[Terms], columns: int) -> Array:
+    """(k, k) triangular factor R of all rows (row, function) of the blocks: R^T R = A^T A, found by blocked
+    QR."""
+    factor: Array = np.zeros((0, columns))
+    for block in blocks:
+        for rows in _dense_rows(block, columns):
+            factor = triangular(np.vstack([factor, rows]))
+    return factor
+
+
+def triangular(rows: Array) -> Array:
+    """The factor R of rows = Q R."""
+    factor: Array = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+    return factor
+
+
+def _dense_rows(terms: Terms, columns: int) -> Iterable[Array]:
+    if not len(terms.value):
+        return
+    key = terms.row * (int(terms.function.max()) + 1) + terms.function
+    _, place = np.unique(key, return_inverse=True)
+    order = np.argsort(place, kind="stable")
+    place, column, value = place[order], terms.column[order], terms.value[order]
+    for start in range(0, int(place[-1]) + 1, _BLOCK_ROWS):
+        first, last = np.searchsorted(place, [start, start + _BLOCK_ROWS])
+        rows = np.zeros((int(place[last - 1]) + 1 - start, columns))
+        np.add.at(rows, (place[first:last] - start, column[first:last]), value[first:last])
+        yield rows
+
+
+def reduced(rows: Array) -> Reduction:
+    """Reduced row echelon form of rows (m, k), the next column in order a pivot where its residual says so.
+
+    Never "the largest first": between equal residuals rounding would choose.
+    """
+    work = np.array(rows, order="C")
+    norms = np.linalg.norm(work, axis=0)
+    small = norms <= PIVOT_TOLERANCE * norms.max(initial=0.0)
+    dropped = norms[small].max(initial=0.0) / (norms.max(initial=0.0) or 1.0)
+    work[:, small] = 0.0
+    pivots, taken, left = graded_pivots(work, norms, halving_shares(PIVOT_TOLERANCE))
+    is_clear = taken >= CLEAR and max(left, dropped) <= NOISE
+    return _back_substituted(work[: len(pivots)], np.array(pivots, dtype=np.int64), is_clear)
+
+
+def _back_substituted(rows: Array, pivots: NDArray[np.int64], is_clear: bool) -> Reduction:
+    echelon = np.zeros(rows.shape)
+    if len(pivots):
+        echelon[:] = solve_triangular(rows[:, pivots], rows)
+    largest = np.abs(echelon).max(axis=1, keepdims=True, initial=0.0)
+    echelon[np.abs(echelon) < ECHELON_TOLERANCE * largest] = 0.0
+    echelon[:, pivots] = np.eye(len(pivots))
+    order = np.argsort(pivots)
+    is_fair = bool(np.abs(echelon).max(initial=0.0) <= FAIR_ENTRY)
+    return Reduction(pivots[order], echelon[order], is_clear and is_fair)

@@ -1,0 +1,57 @@
+"""Base parameters without E and P: the echelon form of the regressor at sampled states, for chains of any
+length."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from psdmc.derivation.link_by_link import reduction_link_by_link
+from psdmc.derivation.reduce import Reduction, reduced
+from psdmc.derivation.units import Scaled
+from psdmc.dynamics.regressor import regressor
+from psdmc.robot.chain import PARAMETERS_PER_LINK
+
+Array = NDArray[np.float64]
+
+SEED = 20_210_156
+"""Of the sampled states: any seed gives the same pivots, this one gives the same bytes."""
+
+STATES_PER_JOINT = 24
+"""Sampled states for each joint; n rows each. Eleven would do for the rank, more condition it."""
+
+
+SAMPLED_JOINTS = 10
+"""Longest chain that is sampled as a whole; its rows grow as n^3."""
+
+
+def reduction_of(scaled: Scaled) -> Reduction:
+    """The base parameters: from sampled rows of doubles where these are few and no column is nearly dependent, else
+    link by link in extended precision."""
+    if len(scaled.kinds) <= SAMPLED_JOINTS:
+        reduction = sampled_reduction(scaled)
+        if reduction.is_clear:
+            return reduction
+    return reduction_link_by_link(scaled)
+
+
+def sampled_reduction(scaled: Scaled) -> Reduction:
+    """The same base parameters as the expanded path finds, within the span's columns."""
+    n = len(scaled.kinds)
+    rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
+    return reduced((sparse.csr_array(scaled.span.T) @ rows.T).T)
+
+
+def sampled_regressor(scaled: Scaled, count: int) -> Array:
+    """(count, n, 11 n) regressor at random states, in the robot's unit; gravity of strength one."""
+    n = len(scaled.kinds)
+    states = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, n, count))
+    wanted = frozenset(range(PARAMETERS_PER_LINK * n))
+    q, qd, qdd = (list(vector) for vector in states)
+    rows = regressor(scaled.frames, scaled.link_frames, wanted, q, qd, qdd, scaled.up)
+    values = np.zeros((count, n, PARAMETERS_PER_LINK * n))
+    for i, row in enumerate(rows):
+        for column, entry in row.items():
+            values[:, i, column] = entry
+    return values

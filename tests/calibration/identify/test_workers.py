@@ -1,0 +1,77 @@
+"""Jobs in other processes: in order, and ended by Ctrl-C without a word."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from psdmc.calibration.identify.workers import in_processes
+
+
+def process_of(job: int) -> tuple[int, int]:
+    if job < 0:
+        raise ZeroDivisionError(str(job))
+    return job, os.getpid()
+
+
+def test_results_come_in_order_from_other_processes():
+    results = list(in_processes(process_of, range(5), 2))
+    assert [job for job, _ in results] == list(range(5))
+    assert os.getpid() not in {process for _, process in results}
+
+
+@pytest.mark.parametrize(("jobs", "workers"), [((1, 2), 1), ((1,), 4), ((), 4)])
+def test_one_worker_or_one_job_needs_no_process(jobs: tuple[int, ...], workers: int):
+    assert list(in_processes(process_of, jobs, workers)) == [(job, os.getpid()) for job in jobs]
+
+
+def test_an_error_of_a_job_is_the_callers():
+    with pytest.raises(ZeroDivisionError, match="-1"):
+        list(in_processes(process_of, [1, -1, 2], 2))
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+HANGING = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, {here!r})
+from psdmc.calibration.identify.workers import in_processes
+from psdmc.cli.interrupt import Interrupted, as_error
+from test_workers import hang
+
+if __name__ == "__main__":
+    try:
+        with as_error():
+            list(in_processes(hang, [{marker!r}] * 2, 2))
+    except Interrupted:
+        print("interrupted")
+"""
+
+
+def hang(marker: str) -> None:
+    Path(marker).touch()
+    time.sleep(120)
+
+
+def test_ctrl_c_ends_the_workers_without_a_word(tmp_path: Path):
+    marker = tmp_path / "started"
+    (tmp_path / "main.py").write_text(HANGING.format(here=str(Path(__file__).parent), marker=str(marker)))
+    process = subprocess.Popen(
+        [sys.executable, str(tmp_path / "main.py")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while not marker.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+
+    assert process.communicate(timeout=30) == ("interrupted\n", "")

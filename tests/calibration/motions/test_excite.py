@@ -1,0 +1,107 @@
+"""Exciting motions: better than random, within limits everywhere, the same for the same seed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from psdmc.calibration.campaign import bounded
+from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.motions.excite import ExciteOptions, excite
+from psdmc.calibration.motions.trajectory import limit_faults
+from psdmc.derivation.derive import derive_model
+from psdmc.errors import InputError
+from psdmc.robot.chain import Limits
+from psdmc.robot.load import load_robot
+
+OPTIONS = ExciteOptions(duration=5.0, samples=50, evaluations=2000, population=20, random=200, seconds=60.0)
+
+
+def test_it_beats_random_motions_and_keeps_limits_between_samples(arm):
+    found = excite(arm.model.chain, arm.regressor, OPTIONS)
+
+    fine = found.motion.sampled(arm.model.joint_names, OPTIONS.duration / (10 * OPTIONS.samples))
+    assert found.gain > 1.2
+    assert limit_faults(fine, arm.model.chain) == []
+    # and the limits are used: some joint reaches at least 90 % of one of its own
+    reach = [
+        np.abs(fine.qd).max(axis=0) / [joint.limits.speed for joint in arm.model.chain.joints],
+        np.abs(fine.qdd).max(axis=0) / [joint.limits.acceleration for joint in arm.model.chain.joints],
+        np.abs(fine.q).max(axis=0) / [joint.limits.upper for joint in arm.model.chain.joints],
+    ]
+    assert np.max(reach) > 0.9
+
+
+def test_the_reported_condition_is_that_of_the_stacked_regressor(arm):
+    found = excite(arm.model.chain, arm.regressor, replace(OPTIONS, evaluations=100))
+
+    motion = found.motion.sampled(arm.model.joint_names, OPTIONS.duration / OPTIONS.samples)
+    stack = arm.regressor.regressor(motion.q[:-1], motion.qd[:-1], motion.qdd[:-1]).reshape(-1, arm.model.l)
+    assert found.condition == pytest.approx(np.linalg.cond(stack / np.linalg.norm(stack, axis=0)), rel=1e-9)
+
+
+def test_the_same_seed_gives_the_same_motion(arm):
+    short = replace(OPTIONS, evaluations=200)
+
+    first, second = (excite(arm.model.chain, arm.regressor, short) for _ in range(2))
+
+    assert np.array_equal(first.motion.sine, second.motion.sine)
+    assert first.condition == second.condition
+
+
+def test_log_det_is_an_objective_too(arm):
+    by_condition = excite(arm.model.chain, arm.regressor, replace(OPTIONS, evaluations=400))
+    by_volume = excite(arm.model.chain, arm.regressor, replace(OPTIONS, evaluations=400, objective="log_det"))
+
+    assert volume(arm, by_volume) > volume(arm, by_condition)
+
+
+def volume(arm, found) -> float:
+    motion = found.motion.sampled(arm.model.joint_names, OPTIONS.duration / OPTIONS.samples)
+    stack = arm.regressor.regressor(motion.q[:-1], motion.qd[:-1], motion.qdd[:-1]).reshape(-1, arm.model.l)
+    return float(np.linalg.slogdet(stack.T @ stack)[1])
+
+
+def test_a_joint_without_limits_is_named(arm):
+    chain = arm.model.chain
+    free = replace(chain, joints=(replace(chain.joints[0], limits=Limits()), chain.joints[1]))
+
+    with pytest.raises(
+        InputError, match=r"limits to move within: shoulder \(position, speed, acceleration\)"
+    ):
+        excite(free, arm.regressor, OPTIONS)
+
+
+def test_an_acceleration_can_be_given_for_robots_whose_file_has_none(arm):
+    chain = arm.model.chain
+    free = Limits(speed=2.0)
+    turning = replace(chain, joints=(replace(chain.joints[0], limits=free), chain.joints[1]))
+
+    found = bounded(turning, 9.0).joints
+
+    assert found[0].limits == Limits(-np.pi, np.pi, 2.0, 9.0)
+    assert found[1].limits == chain.joints[1].limits
+    with pytest.raises(InputError, match=r"shoulder \(acceleration\)") as raised:
+        bounded(turning, None)
+    assert "--acceleration" in str(raised.value.hint)
+
+
+@pytest.mark.slow
+def test_the_denso_reaches_twice_the_best_of_a_thousand_random_motions():
+    from pathlib import Path
+
+    from psdmc.calibration.identify.gravity import gravity_split
+
+    file = Path(__file__).resolve().parents[3] / "examples" / "robots" / "denso_wall.toml"
+    model = derive_model(load_robot(file, drive_inertia=True).chain)
+    regressor = ChainRegressor(model)
+    columns = tuple(int(k) for k in gravity_split(model.chain, regressor, model.l).rest)
+
+    found = excite(model.chain, regressor, ExciteOptions(columns=columns))
+
+    fine = found.motion.sampled(model.joint_names, 10.0 / 1000)
+    assert found.seconds < 60
+    assert found.gain > 2
+    assert limit_faults(fine, model.chain) == []

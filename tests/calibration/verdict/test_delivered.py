@@ -1,0 +1,204 @@
+"""Every printed figure is the written file's: read back, it predicts the logs as well as JSON and console say."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shared_data import UR10_LOG
+from test_four_steps import with_logs
+from test_ur10 import model as ur10_model  # noqa: F401  a fixture
+
+from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_campaign
+from psdmc.calibration.campaign_file import read_campaign
+from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.identify.steps import InertialRun
+from psdmc.calibration.logs.filter import filtered, smoothed_rows, thinned
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.verdict.delivered import delivered_quality
+from psdmc.calibration.verdict.record import Calibration
+from psdmc.cli import main
+from psdmc.cli.show import print_accuracy
+from psdmc.compiler import emit_c
+from psdmc.errors import InputError
+from psdmc.model.mass_check import check_mass_matrix
+from psdmc.model.store import load, save
+from psdmc.report.calibrate_report import write_report
+from psdmc.toolchain.build_package import build_package
+
+
+def written_log(log: Log, path: Path) -> Path:
+    columns = {"time_s": log.time}
+    for k, name in enumerate(log.joint_names):
+        columns[f"position_rad.{name}"] = log.position[:, k]
+        columns[f"motor_torque_nm.{name}"] = log.effort[:, k]
+    np.savez(path, **columns)
+    return path
+
+
+def require_delivered(record: Calibration, source, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """File, JSON and console agree; the mass matrix is positive definite."""
+    save(record.model, folder / "calibrated.npz")
+    _, numbers = write_report(record, folder / "page.html")
+    file = load(folder / "calibrated.npz")
+    said = json.loads(numbers.read_text(encoding="utf-8"))["quality"]
+    capsys.readouterr()
+    print_accuracy(record)
+    console = capsys.readouterr().out
+
+    steps = delivered_quality(file, source)
+
+    assert {step.step for step in steps} == set(said)
+    for step in steps:
+        assert step.joints.keys() == said[step.step].keys()
+        for name, both in step.joints.items():
+            for part in ("fit", "held_out"):
+                found, told = getattr(both, part), said[step.step][name][part]
+                assert found.r2 == pytest.approx(told["r2"], abs=1e-9, nan_ok=True)
+                assert found.rmse == pytest.approx(told["rmse"], rel=1e-9)
+            assert f"{both.held_out.r2:.4f}" in console
+    assert file.provenance["calibration"]["quality"] == said
+    mass = check_mass_matrix(file)
+    assert mass is not None
+    assert mass.passed
+
+
+def require_package(record: Calibration, folder: Path) -> None:
+    emit_c(record.model, folder / "c")
+    assert "forward_dynamics" in build_package(folder / "c")
+
+
+def test_one_log(arm, log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    path = written_log(log, tmp_path / "log.npz")
+
+    record = calibrate(arm.model, path, regressor=arm.regressor)
+
+    require_delivered(record, [read_log(path)], tmp_path, capsys)
+    require_package(record, tmp_path)
+
+
+@pytest.mark.parametrize("variant", ["noisy", "harness"])
+def test_a_campaign(arm, campaign: Path, variant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    folder = with_logs(arm, campaign, f"delivered_{variant}", harness=variant == "harness")
+
+    record = calibrate(arm.unknown, folder, regressor=arm.regressor)
+
+    require_delivered(record, read_campaign(folder), tmp_path, capsys)
+    require_package(record, tmp_path)
+
+
+@pytest.mark.skipif(not UR10_LOG.exists(), reason="the UR10 log is not part of the project")
+def test_the_ur10(ur10_model, tmp_path: Path, capsys: pytest.CaptureFixture[str]):  # noqa: F811
+    path = UR10_LOG / "exciting_trajectory.csv"
+
+    record = calibrate(ur10_model, path, regressor=ChainRegressor(ur10_model))
+
+    require_delivered(record, [read_log(path)], tmp_path, capsys)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not UR10_LOG.exists(), reason="the UR10 log is not part of the project")
+def test_the_ur10s_package_builds(ur10_model, tmp_path: Path):  # noqa: F811
+    path = UR10_LOG / "exciting_trajectory.csv"
+
+    require_package(calibrate(ur10_model, path, regressor=ChainRegressor(ur10_model)), tmp_path)
+
+
+def test_a_model_that_was_not_calibrated_is_said(arm, log: Log):
+    with pytest.raises(InputError, match="holds no calibration"):
+        delivered_quality(arm.model, [log])
+
+
+def test_blocks_give_what_the_whole_log_gives(arm, log: Log, monkeypatch: pytest.MonkeyPatch):
+    options = LinearOptions()
+    states = filtered(log, options.filter)
+    at = thinned(states, options.filter)
+    values = arm.regressor.regressor(states.q, states.qd, states.qdd)
+    whole = states.low_pass(values)[at]
+
+    monkeypatch.setattr(sys.modules["psdmc.calibration.logs.filter"], "BLOCK_ROWS", 500)
+    blocks = smoothed_rows(states, at, lambda rows: values[rows])
+
+    assert len(log) > 5 * 500
+    assert np.abs(blocks - whole).max() < 1e-12 * np.abs(whole).max()
+
+
+def test_without_a_solver_the_remedy_is_said(arm, log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        sys.modules["psdmc.calibration.identify.physical"],
+        "find_spec",
+        lambda name: None if name == "clarabel" else found(name),
+    )
+    path = written_log(log, tmp_path / "log.npz")
+
+    with pytest.raises(InputError, match="physical consistency needs clarabel, not installed") as caught:
+        calibrate(arm.unknown, path, regressor=arm.regressor)
+    assert "pip install 'psdmc[calibrate]'" in str(caught.value.hint)
+    assert "--no-physical" in str(caught.value.hint)
+    calibrate(arm.unknown, path, CalibrateOptions(physical=False), regressor=arm.regressor)
+
+
+def test_physical_is_the_default_of_the_command(
+    arm, log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """The elbow's torques say that its friction drives it: bare, its Coulomb friction is negative."""
+    pushed = replace(log, effort=log.effort - 1.2 * np.tanh(np.gradient(log.position, 0.004, axis=0) / 0.03))
+    path = written_log(pushed, tmp_path / "log.npz")
+    save(arm.unknown, tmp_path / "model.npz")
+
+    def coulomb(*options: str) -> list[float]:
+        with pytest.raises(SystemExit) as left:
+            main(
+                [
+                    "calibrate",
+                    str(tmp_path / "model.npz"),
+                    str(path),
+                    "-o",
+                    str(tmp_path / "out.npz"),
+                    *options,
+                ]
+            )
+        assert left.value.code in (0, None)
+        rows = load(tmp_path / "out.npz").provenance["calibration"]["friction"]
+        return [row["value"] for row in rows if row["name"] == "coulomb"]
+
+    assert min(coulomb("--no-physical")) < 0
+    capsys.readouterr()
+    assert min(coulomb()) >= 0
+    assert "physical consistency moved the parameters" in capsys.readouterr().out
+    assert min(coulomb("--physical")) >= 0
+    assert "note: --physical is the default now" in capsys.readouterr().out
+
+
+def test_a_campaign_that_shows_little_keeps_the_files_values(
+    arm, campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """The fast run moves the shoulder alone: what only the elbow's acceleration shows stays at the file's value."""
+    folder = with_logs(arm, campaign, "delivered_noisy")
+    runs = read_campaign(folder)
+    poor = replace(runs, inertial=[InertialRun(runs.friction[0].log)])
+    plain = CalibrateOptions()
+    lugre = replace(plain.campaign.lugre, law="coulomb_viscous")
+    options = replace(plain, campaign=replace(plain.campaign, passes=1, lugre=lugre))
+    wrong = arm.model.theta_b + 0.05 * (np.arange(arm.model.l) == 6)
+
+    model = replace(arm.model, theta_b=wrong)
+    record = calibrate_campaign(model, poor, options, arm.regressor, None, lambda step: None)
+
+    elbow_drive = record.parameters[6]
+    assert elbow_drive.equation == "Im2"
+    assert elbow_drive.value == pytest.approx(wrong[6], rel=1e-3)
+    assert elbow_drive.visibility.startswith("not visible: kept at")
+    assert "the file's value" in elbow_drive.visibility
+    assert np.isinf(elbow_drive.std)
+    assert record.parameters[2].identifiable
+    assert any("theta_7: not visible" in warning for warning in record.warnings)
+    require_delivered(record, poor, tmp_path, capsys)
