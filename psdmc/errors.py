@@ -4,6 +4,11 @@ Every error a user can cause carries what and where in its message and, where th
 The command line prints both on one line each and ends with `exit_status`; only `--debug` shows a traceback.
 """
 
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
 
 class PsdmcError(Exception):
     """Something outside psdmc is not as it should be; `hint` says what would help."""
@@ -36,3 +41,13 @@ class ToolchainError(PsdmcError):
 
 class InternalError(Exception):
     """A broken invariant inside psdmc; never the input's fault."""
+
+
+def exit_status_of(action: Callable[[], int | None]) -> int:
+    """Run `action`, for `python -m` modules; its status (None: 0), or that of its PsdmcError, whose message and hint
+    are printed to standard error, a line each."""
+    try:
+        return action() or 0
+    except PsdmcError as error:
+        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
+        return error.exit_status

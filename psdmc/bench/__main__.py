@@ -13,7 +13,7 @@ from psdmc.bench.rivals import EVERYONE
 from psdmc.bench.run import ROUNDS, Settings, run
 from psdmc.bench.scaling import scaling_cases
 from psdmc.bench.table import as_text
-from psdmc.errors import PsdmcError
+from psdmc.errors import exit_status_of
 
 START = time.perf_counter()
 
@@ -28,19 +28,20 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="no instruction counts, no threads, no scaling")
     parser.add_argument("--json", type=Path, help="write everything measured there")
     options = parser.parse_args()
+    return exit_status_of(lambda: _measure(options))
+
+
+def _measure(options: argparse.Namespace) -> int:
+    """Measure, print the table and write the JSON; 1 where a contestant's results are wrong."""
     rivals = tuple(options.rivals) if options.rivals else None
     full = not options.quick
     settings = Settings(rounds=options.rounds, rivals=rivals, count=full, threads=full)
-    try:
-        cases = list(standard_cases(options.names or None, progress=_tell))
-        scaling = list(scaling_cases(progress=_tell)) if full and not options.names else []
-        result = run(cases, settings, _tell, scaling)
-        print(as_text(result))
-        if options.json:
-            write_whole(options.json, result.to_json())
-    except PsdmcError as error:
-        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
-        return error.exit_status
+    cases = list(standard_cases(options.names or None, progress=_tell))
+    scaling = list(scaling_cases(progress=_tell)) if full and not options.names else []
+    result = run(cases, settings, _tell, scaling)
+    print(as_text(result))
+    if options.json:
+        write_whole(options.json, result.to_json())
     return 1 if result.wrong else 0
 
 

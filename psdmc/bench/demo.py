@@ -14,7 +14,7 @@ from psdmc.bench.agree import relative_error
 from psdmc.bench.case import Case
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import Settings, run
-from psdmc.errors import PsdmcError
+from psdmc.errors import exit_status_of
 from psdmc.model.check import source_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import load
@@ -102,12 +102,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench.demo", description=__doc__)
     parser.add_argument("model", type=Path, help="model file made by psdmc derive (.npz)")
     options = parser.parse_args()
-    try:
-        print(demo(load(options.model), _tell))
-    except PsdmcError as error:
-        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
-        return error.exit_status
-    return 0
+    return exit_status_of(lambda: print(demo(load(options.model), _tell)))
 
 
 def _tell(step: str) -> None:

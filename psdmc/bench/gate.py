@@ -15,7 +15,7 @@ from pathlib import Path
 from psdmc.atomic import make_folder, write_whole
 from psdmc.bench.cases import standard_cases
 from psdmc.bench.counts import Baseline, count
-from psdmc.errors import PsdmcError
+from psdmc.errors import exit_status_of
 
 BASELINE = Path("benchmarks") / "baseline.json"
 
@@ -94,11 +94,9 @@ def main() -> int:
     parser.add_argument("names", nargs="*", help="standard robots; all where none is named")
     parser.add_argument("--baseline", type=Path, default=BASELINE, help="default %(default)s")
     options = parser.parse_args()
-    try:
-        return _save(options.baseline, options.names) if options.action == "save" else _compare(options)
-    except PsdmcError as error:
-        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
-        return error.exit_status
+    if options.action == "save":
+        return exit_status_of(lambda: _save(options.baseline, options.names))
+    return exit_status_of(lambda: _compare(options))
 
 
 def _compare(options: argparse.Namespace) -> int:

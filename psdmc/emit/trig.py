@@ -67,7 +67,7 @@ class TrigPreamble:
 
 @dataclass(frozen=True, slots=True)
 class ScalarTrig:
-    """View of sincos_scalar.jinja: vec is the real type itself, ivec an unsigned integer of its size."""
+    """View of sincos_scalar.jinja: vec is the real type itself, ivec an unsigned integer of its size (vectors: signed)."""
 
     macro: str
     symbol: str
@@ -87,28 +87,13 @@ class ScalarTrig:
 
 
 @dataclass(frozen=True, slots=True)
-class VectorTrig:
+class VectorTrig(ScalarTrig):
     """View of sincos_vector.jinja and types.jinja: vec is lanes x real, ivec lanes x integer (signed)."""
 
-    macro: str
-    symbol: str
     near_symbol: str
     far_symbol: str
     any_symbol: str
-    about: str
     about_near: str
-    real: Real
-    integer: str
-    vec: str
-    ivec: str
-    to_bits: str
-    to_real: str
-    keep: str
-    sign: str
-    limit: str
-    odd: str
-    uses_libm: bool
-    constants: Constants
     lanes: int
     bytes: int
     any_sign: AnySign

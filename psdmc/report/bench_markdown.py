@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psdmc.bench.results import BenchResult, CaseResult
-from psdmc.errors import PsdmcError
+from psdmc.errors import exit_status_of
 from psdmc.report.bench_page import read_result
 from psdmc.report.bench_view import OURS, PINOCCHIO
 
@@ -71,12 +71,7 @@ def main() -> int:
     parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
     parser.add_argument("--command", default="make bench", help="what is said to have made it")
     options = parser.parse_args()
-    try:
-        print(markdown(read_result(options.result), options.command), end="")
-    except PsdmcError as error:
-        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
-        return error.exit_status
-    return 0
+    return exit_status_of(lambda: print(markdown(read_result(options.result), options.command), end=""))
 
 
 if __name__ == "__main__":

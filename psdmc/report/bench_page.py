@@ -12,7 +12,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from psdmc.atomic import write_whole
 from psdmc.bench.results import BenchResult
-from psdmc.errors import InputError, PsdmcError
+from psdmc.errors import InputError, exit_status_of
 from psdmc.report import bench_plots
 from psdmc.report.bench_view import (
     FunctionTable,
@@ -113,12 +113,7 @@ def main() -> int:
     parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
     parser.add_argument("page", type=Path, help="HTML to write")
     options = parser.parse_args()
-    try:
-        write_page(read_result(options.result), options.page)
-    except PsdmcError as error:
-        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
-        return error.exit_status
-    return 0
+    return exit_status_of(lambda: write_page(read_result(options.result), options.page))
 
 
 if __name__ == "__main__":

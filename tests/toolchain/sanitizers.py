@@ -11,25 +11,13 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from c_warnings import EXTRA, STRICT
 from direct import write_sources
 from stress import RUNTIME, stress_program
 
 from psdmc.emit.package import PackageView
 
-WARNINGS = [
-    "-std=c99",
-    "-Wall",
-    "-Wextra",
-    "-Wpedantic",
-    "-Wconversion",
-    "-Wshadow",
-    "-Wdouble-promotion",
-    "-Wcast-align",
-    "-Wstrict-prototypes",
-    "-Wmissing-prototypes",
-    "-Wvla",
-    "-Wundef",
-]
+WARNINGS = [flag for flag in STRICT if flag != "-Werror"] + EXTRA
 UNDEFINED = "-fsanitize=undefined,float-cast-overflow -fno-sanitize-recover=all"
 SECONDS = 1500
 

@@ -8,22 +8,12 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from c_warnings import EXTRA, STRICT
 from direct import write_sources
 from traced import arm_package
 
 from psdmc.emit.options import EmitOptions
 
-STRICT = [
-    "-std=c99",
-    "-Wall",
-    "-Wextra",
-    "-Wpedantic",
-    "-Wconversion",
-    "-Wshadow",
-    "-Wdouble-promotion",
-    "-Werror",
-]
-EXTRA = ["-Wcast-align", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wundef", "-Wvla"]
 COMPILERS = ["gcc", "clang"]
 NAMES = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian"]
 """One of each kind: torques with parameters, pivots, a matrix with and one without parameters."""
