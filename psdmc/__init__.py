@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.model.dynamics_model import DynamicsModel
-    from psdmc.model.store import load
+    from psdmc.model.load import load
+    from psdmc.model.store import save
 
 __all__ = [
     "DerivationError",
@@ -24,6 +25,7 @@ __all__ = [
     "derive",
     "emit_c",
     "load",
+    "save",
 ]
 
 _MODULES = {name: "psdmc.errors" for name in __all__ if name.endswith("Error")}
@@ -31,7 +33,8 @@ _MODULES |= dict.fromkeys(("compile", "derive", "emit_c"), "psdmc.compiler")
 _MODULES |= {
     "calibrate": "psdmc.calibration.api",
     "DynamicsModel": "psdmc.model.dynamics_model",
-    "load": "psdmc.model.store",
+    "load": "psdmc.model.load",
+    "save": "psdmc.model.store",
 }
 """Where each name is: loaded when it is first used, so that the command line's first words cost nothing."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -16,6 +16,7 @@ MAY_IMPORT = {
     "dynamics": {"robot"},
     "model": {"robot", "dynamics"},
     "derivation": {"robot", "dynamics", "model"},
+    "verification": {"robot", "dynamics", "model"},
     "program": set(),
     "lower": {"robot", "dynamics", "model", "program"},
     "emit": {"program", "model"},
@@ -35,6 +36,7 @@ OUTSIDE = {
     "dynamics": {"numpy"},
     "model": {"numpy", "scipy"},
     "derivation": {"numpy", "scipy"},
+    "verification": {"numpy"},
     "program": {"numpy"},
     "lower": {"numpy", "scipy"},
     "emit": {"jinja2", "numpy"},
@@ -105,6 +107,60 @@ def test_imports_run_one_way(stage: str, path: Path):
             assert head in OUTSIDE.get(stage, set()), (
                 f"{path.relative_to(PACKAGE)} imports {head}, which {stage} does not own"
             )
+
+
+def test_no_circle_of_files():
+    """Also where a name is imported inside a function, or for its type only."""
+    names = {module_name(path): path for path in PACKAGE.rglob("*.py")}
+    imports = {name: sorted(inside(path, names) - {name}) for name, path in names.items()}
+    assert circle(imports) == []
+
+
+def module_name(path: Path) -> str:
+    parts = ("psdmc", *path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def inside(path: Path, names: Collection[str]) -> set[str]:
+    """The files of psdmc that a file imports; `from package import module` is an import of the module."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names if alias.name in names}
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                found |= {whole if whole in names else str(node.module)} & set(names)
+    return found
+
+
+def circle(imports: Mapping[str, Sequence[str]]) -> list[str]:
+    """Files that import each other in turn, the first one found; none where there is no circle."""
+    done: set[str] = set()
+
+    def search(name: str, above: list[str]) -> list[str]:
+        if name in above:
+            return [*above[above.index(name) :], name]
+        if name in done:
+            return []
+        for other in imports[name]:
+            if found := search(other, [*above, name]):
+                return found
+        done.add(name)
+        return []
+
+    return next((found for name in sorted(imports) if (found := search(name, []))), [])
+
+
+@pytest.mark.parametrize(
+    ("imports", "expected"),
+    [
+        ({"a": ["b", "c"], "b": ["c"], "c": []}, []),
+        ({"a": ["b"], "b": ["c"], "c": ["b"]}, ["b", "c", "b"]),
+    ],
+)
+def test_circles_are_found(imports: dict[str, list[str]], expected: list[str]):
+    assert circle(imports) == expected
 
 
 def rooms() -> Iterator[tuple[str, str, Path]]:

@@ -15,12 +15,12 @@ from psdmc.bench.case import Case
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import Settings, run
 from psdmc.errors import exit_status_of
-from psdmc.model.check import source_of
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.store import load
+from psdmc.model.load import load
 from psdmc.robot.chain import Array
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
+from psdmc.verification.check import source_of
 
 FUNCTIONS = ("inverse_dynamics", "forward_dynamics", "mass_matrix", "nonlinear_effects", "gravity")
 OURS, THEIRS = "psdmc factored", "Pinocchio"

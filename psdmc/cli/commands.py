@@ -14,13 +14,13 @@ from psdmc.cli.show import megabytes, print_check, print_cost, print_mass_check,
 from psdmc.errors import InputError
 from psdmc.lower.admitted import run_time_only
 from psdmc.lower.kernels import Lowering
-from psdmc.model.check import check_model
+from psdmc.model.load import load
 from psdmc.model.mass_check import check_mass_matrix
-from psdmc.model.store import load
 from psdmc.robot.load import load_robot
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.build_package import build_package
 from psdmc.toolchain.cache_room import cache_contents, clear_cache
+from psdmc.verification.check import check_model
 from psdmc.version import psdmc_version
 
 app = typer.Typer(

@@ -24,7 +24,7 @@ from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
 from psdmc.cli.show import print_accuracy, print_verdict
 from psdmc.errors import InputError
-from psdmc.model.store import load
+from psdmc.model.load import load
 from psdmc.report.bench_page import write_page
 from psdmc.report.calibrate_commands import calibrate_command, excite_command, simulate_command
 

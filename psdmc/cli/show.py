@@ -13,12 +13,12 @@ from rich.table import Table
 from psdmc.cli.one_line import one_line
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
-from psdmc.model.check import CheckRow, readers
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import MassCheck
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
 from psdmc.robot.chain import Joint
+from psdmc.verification.check import CheckRow, readers
 
 if TYPE_CHECKING:
     from psdmc.calibration.verdict.record import Calibration

@@ -10,7 +10,6 @@ from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor
 from psdmc.errors import DerivationError, InternalError
-from psdmc.model import evaluate
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import Chain
 
@@ -52,7 +51,7 @@ def certificate(model: DynamicsModel) -> Array:
             frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), *states, base_acceleration(chain)
         )
         reference = np.stack([np.broadcast_to(torque, (SAMPLES,)) for torque in expected], axis=1)
-        errors = relative_errors(evaluate.torques_for(model, theta, q, qd, qdd), reference)
+        errors = relative_errors(model.torques_for(theta, q, qd, qdd), reference)
         if not np.all(errors <= WORST_ALLOWED):
             raise _failure(chain, x, states, reference, errors)
     return errors

@@ -70,8 +70,7 @@ def derive_model(
     expansion = _expanded(robot, reduction, tell, memory) if expand else None
     B = base_map(robot, reduction)
     model = DynamicsModel(
-        E=expansion.E if expansion else None,
-        P=expansion.P if expansion else None,
+        expansion=expansion,
         theta_b=base_parameters(B, chain),
         B=B,
         chain=chain,

@@ -27,6 +27,7 @@ from psdmc.derivation.terms import Terms, joined, times_matrix
 from psdmc.derivation.units import Scaled, function_units, parameter_units, torque_units
 from psdmc.derivation.velocity import acceleration_terms, velocity_terms
 from psdmc.dynamics.scalar import Vector
+from psdmc.model.expansion import Expansion
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -54,13 +55,6 @@ EXTENDED = Precision(1e-15, 1e-16)
 """Where columns are nearly dependent: coefficients of size tilt^2 count. Rounding leaves less than 1e-17 there."""
 
 
-class Expansion(NamedTuple):
-    """E (5n, p) and P (n of (p, l)) in SI."""
-
-    E: NDArray[np.uint8]
-    P: tuple[sparse.csr_array, ...]
-
-
 def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int | None = None) -> Expansion:
     """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of
     what is free)."""
@@ -83,7 +77,7 @@ def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int
     progress("reduction matrices")
     terms = joined([gravity, acceleration_terms(mass, functions), velocity])
     units = parameter_units(kinds, scaled.unit)[scaled.leads[reduction.pivots]]
-    return Expansion(*assembled(terms, functions, units, scaled.unit, precision.noise))
+    return Expansion.of(*assembled(terms, functions, units, scaled.unit, precision.noise))
 
 
 def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:

@@ -79,12 +79,12 @@ def regressor_terms(model: DynamicsModel) -> Terms:
 
 
 def _expanded(model: DynamicsModel) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
-    if model.E is None or model.P is None:
+    if model.expansion is None:
         raise InputError(
             f"{model.chain.name}: the expanded lowering needs E and P, and this model has none",
             "derive it without --no-expand, or choose --lowering factored",
         )
-    return model.E, model.P
+    return model.expansion.E, model.expansion.P
 
 
 def known_parameters(model: DynamicsModel) -> Array:

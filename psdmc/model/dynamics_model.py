@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
-from psdmc.model import equations, evaluate, payload
+from psdmc.errors import InputError
+from psdmc.model import equations, evaluate, payload, recursive, store
+from psdmc.model.expansion import Expansion
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement, frozen_array
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 Array = NDArray[np.float64]
 
@@ -23,21 +27,16 @@ class DynamicsModel:
 
     n joints, p functions, l base parameters.
 
-    E            (5n, p) uint8   exponents; row blocks q, sin q, cos q, qd, qdd; None where derived with
-    --no-expand
-    P            n x (p, l)      sparse reduction matrices (csr), one per joint; None with E
+    expansion    E and P; None where derived with --no-expand
     theta_b      (l,) float      base parameters, SI, units per entry; None while unknown
     B            (l, 11n) float  theta_b = B @ x for standard parameters x within the chain's parameter_span
     chain        the robot: joints, link frames, gravity, limits, standard parameters
     certificate  (n,)            largest torque error against Newton-Euler on fresh samples, per joint,
-    relative to that
-                                 joint's largest torque there
-    provenance   plain JSON values: source text, its hash and format, options, snapping and its effect,
-    tolerances
+                                 relative to that joint's largest torque there
+    provenance   plain JSON values: source text, its hash and format, options, snapping and its effect, tolerances
     """
 
-    E: NDArray[np.uint8] | None
-    P: tuple[sparse.csr_array, ...] | None
+    expansion: Expansion | None
     theta_b: Array | None
     B: Array
     chain: Chain
@@ -50,18 +49,11 @@ class DynamicsModel:
         object.__setattr__(self, "certificate", frozen_array(self.certificate, (n,), "certificate"))
         if self.theta_b is not None:
             object.__setattr__(self, "theta_b", frozen_array(self.theta_b, (l,), "theta_b"))
-        if (self.E is None) != (self.P is None):
-            raise ValueError("E and P are given together or not at all")
-        if self.E is None or self.P is None:
-            return
-        exponents = np.array(self.E, dtype=np.uint8)
-        if exponents.ndim != 2 or exponents.shape[0] != 5 * n:
-            raise ValueError(f"E has shape {exponents.shape}, expected ({5 * n}, p)")
-        exponents.setflags(write=False)
-        object.__setattr__(self, "E", exponents)
-        expected = (exponents.shape[1], l)
-        if len(self.P) != n or any(matrix.shape != expected for matrix in self.P):
-            raise ValueError(f"P has {len(self.P)} matrices, expected {n} of shape {expected}")
+        if self.expansion is not None and (self.expansion.n, self.expansion.l) != (n, l):
+            raise ValueError(
+                f"E and P are for {self.expansion.n} joints and {self.expansion.l} base parameters, "
+                f"expected {n} and {l}"
+            )
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -78,9 +70,19 @@ class DynamicsModel:
         return int(self.B.shape[0])
 
     @property
+    def E(self) -> NDArray[np.uint8] | None:
+        """(5n, p) exponents of the functions; None where they were not expanded."""
+        return None if self.expansion is None else self.expansion.E
+
+    @property
+    def P(self) -> tuple[sparse.csr_array, ...] | None:
+        """n sparse reduction matrices (p, l), one per joint; None with E."""
+        return None if self.expansion is None else self.expansion.P
+
+    @property
     def p(self) -> int | None:
         """Number of functions; None where they were not expanded."""
-        return None if self.E is None else int(self.E.shape[1])
+        return None if self.expansion is None else self.expansion.p
 
     @property
     def pivots(self) -> tuple[int, ...]:
@@ -104,43 +106,79 @@ class DynamicsModel:
             "representative",
         )
 
+    def expanded(self) -> Expansion:
+        """E and P; InputError where the model has none."""
+        if self.expansion is None:
+            raise InputError("this model was derived without E and P", "derive it again without --no-expand")
+        return self.expansion
+
+    def known_theta_b(self) -> Array:
+        """theta_b; InputError while it is unknown."""
+        if self.theta_b is None:
+            raise InputError(
+                f"the base parameters of '{self.chain.name}' are unknown", "calibrate, or give all inertias"
+            )
+        return self.theta_b
+
+    def standard_parameters(self) -> Array:
+        """(11n,) standard parameters that have the model's theta_b: `representative @ theta_b`, one choice of many."""
+        found: Array = self.representative @ self.known_theta_b()
+        return found
+
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """tau (..., n), N m or N, straight from E, P and theta_b: slow and obvious, the reference."""
-        return evaluate.inverse_dynamics(self, q, qd, qdd)
+        """tau (..., n), N m or N, straight from E, P and theta_b: slow and obvious, the reference. Without E and P
+        by Newton-Euler on the same base parameters."""
+        return self.torques_for(self.known_theta_b(), q, qd, qdd)
+
+    def torques_for(self, theta_b: Array, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Inverse dynamics with base parameters (l,) that are not the model's own."""
+        shape, arrays = evaluate.states(self.chain, q=q, qd=qd, qdd=qdd)
+        if self.expansion is None:
+            found = recursive.torques(self.chain, self.representative @ theta_b, arrays)
+        else:
+            found = evaluate.torques(self.expansion, self.chain, theta_b, arrays)
+        return found.reshape(*shape, self.n)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Y (..., n, l) with tau = Y theta_b."""
-        return evaluate.regressor(self, q, qd, qdd)
+        shape, arrays = evaluate.states(self.chain, q=q, qd=qd, qdd=qdd)
+        if self.expansion is None:
+            found = recursive.regressor(self.chain, self.representative, arrays)
+        else:
+            found = evaluate.regressor(self.expansion, self.chain, arrays)
+        return found.reshape(*shape, self.n, self.l)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q), (..., n, n)."""
-        return evaluate.mass_matrix(self, q)
+        theta = self.known_theta_b()
+        shape, (angles,) = evaluate.states(self.chain, q=q)
+        if self.expansion is None:
+            found = recursive.mass_matrix(self.chain, self.standard_parameters(), angles)
+        else:
+            found = evaluate.mass_matrix(self.expansion, self.chain, theta, angles)
+        return found.reshape(*shape, self.n, self.n)
 
     def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """h(q, qd) = C(q, qd) qd + g(q), (..., n)."""
-        return evaluate.nonlinear_effects(self, q, qd)
+        return self.inverse_dynamics(q, qd, np.zeros(self.n))
 
     def gravity(self, q: ArrayLike) -> Array:
         """g(q), (..., n)."""
-        return evaluate.gravity(self, q)
+        return self.inverse_dynamics(q, np.zeros(self.n), np.zeros(self.n))
 
     @property
     def base_parameters(self) -> tuple[equations.BaseParameter, ...]:
         """Equation, unit and value of each entry of theta_b."""
-        return equations.base_parameters(self)
+        return equations.base_parameters(self.chain, self.B, self.pivots, self.theta_b)
 
     @property
     def content_hash(self) -> str:
-        """SHA-256 of everything that a model file holds."""
-        from psdmc.model.store import content_hash  # the store builds models: it cannot be imported first
-
-        return content_hash(self)
+        """SHA-256 of everything that a model file holds, as hexadecimal digits."""
+        return store.content_hash(self)
 
     def save(self, path: str | Path) -> None:
-        """Write a model file; see psdmc.model.store."""
-        from psdmc.model.store import save
-
-        save(self, path)
+        """Write a model file, as `psdmc.save(model, path)` does."""
+        store.save(self, path)
 
     def with_payload(
         self,
@@ -149,5 +187,21 @@ class DynamicsModel:
         inertia: ArrayLike | None = None,
         frame: Placement | str | None = None,
     ) -> DynamicsModel:
-        """The model with a rigid load on its last link; see psdmc.model.payload."""
-        return payload.with_payload(self, mass, com, inertia, frame)
+        """The model with a rigid load fixed to its last link.
+
+        mass      kg
+        com       (3,) m, centre of mass in `frame`
+        inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
+        frame     where the load's numbers are given: a Placement in the tip frame, or the tip's name; None: the tip
+
+        InputError where the numbers are no rigid body's, beyond the ranges of robot files, or the model's assumptions
+        do not admit the load.
+        """
+        load = payload.load_parameters(self.chain, mass, com, inertia, frame)
+        chain = payload.loaded(self.chain, load, float(mass))
+        if self.theta_b is None:
+            raise InputError(
+                f"the base parameters of '{self.chain.name}' are unknown", "calibrate before adding a load"
+            )
+        index = payload.last_link(self.chain)
+        return replace(self, theta_b=self.theta_b + self.B[:, index] @ load, chain=chain)

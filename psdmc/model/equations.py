@@ -7,17 +7,13 @@ product or quotient of two, or one of these upside down, is written so; every ot
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.robot.chain import PARAMETER_NAMES, PARAMETERS_PER_LINK, Chain, Joint
-
-if TYPE_CHECKING:
-    from psdmc.model.dynamics_model import DynamicsModel
 
 Array = NDArray[np.float64]
 
@@ -55,13 +51,20 @@ class _Known:
     after: str
 
 
-def base_parameters(model: DynamicsModel) -> tuple[BaseParameter, ...]:
-    """Equation, unit and value of each entry of theta_b."""
-    known = list(_known_numbers(dh_lengths(model.chain)))
-    values = [None] * model.l if model.theta_b is None else model.theta_b.tolist()
+def base_parameters(
+    chain: Chain, B: Array, pivots: Sequence[int], theta_b: Array | None
+) -> tuple[BaseParameter, ...]:
+    """Equation, unit and value of each entry of theta_b.
+
+    B        (l, 11n)  theta_b = B @ x
+    pivots   l, the standard parameter (index into x) that stands first in each equation
+    theta_b  (l,) or None while unknown
+    """
+    known = list(_known_numbers(dh_lengths(chain)))
+    values = [None] * len(B) if theta_b is None else theta_b.tolist()
     return tuple(
-        BaseParameter(_equation(row, pivot, model.chain, known), _unit(pivot, model.chain), value)
-        for row, pivot, value in zip(model.B, model.pivots, values, strict=True)
+        BaseParameter(_equation(row, pivot, chain, known), _unit(pivot, chain), value)
+        for row, pivot, value in zip(B, pivots, values, strict=True)
     )
 
 

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from psdmc.model import json_values as json
 from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.expansion import Entries, Expansion
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
 from psdmc.robot.load_options import LoadOptions
 
@@ -48,8 +47,7 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
     certificate = json.part(manifest, "certificate", "the manifest")
     _check_base_parameters(arrays, chain, l, is_known)
     return DynamicsModel(
-        E=_exponents(arrays["E"], n) if is_expanded else None,
-        P=_matrices(arrays, n, (arrays["E"].shape[1], l)) if is_expanded else None,
+        expansion=_expansion(arrays, n, l) if is_expanded else None,
         theta_b=arrays["theta_b"] if is_known else None,
         B=arrays["B"],
         chain=chain,
@@ -88,7 +86,8 @@ def _exponents(E: NDArray[Any], n: int) -> NDArray[np.uint8]:
     return E
 
 
-def _matrices(arrays: Arrays, n: int, shape: tuple[int, int]) -> tuple[sparse.csr_array, ...]:
+def _expansion(arrays: Arrays, n: int, l: int) -> Expansion:
+    shape = (arrays["E"].shape[1], l)
     ranges = {"P_joint": n, "P_row": shape[0], "P_col": shape[1]}
     values = arrays["P_value"]
     for name, count in ranges.items():
@@ -98,13 +97,10 @@ def _matrices(arrays: Arrays, n: int, shape: tuple[int, int]) -> tuple[sparse.cs
             raise ValueError(f"{name} has entries outside 0 to {count - 1}")
     if not np.isfinite(values).all():
         raise ValueError("P is not finite")
-    starts = np.searchsorted(arrays["P_joint"], np.arange(n + 1))
     if (np.diff(arrays["P_joint"]) < 0).any():
         raise ValueError("P_joint is not in order")
-    return tuple(
-        sparse.csr_array((values[a:b], (arrays["P_row"][a:b], arrays["P_col"][a:b])), shape=shape)
-        for a, b in pairwise(starts)
-    )
+    entries = Entries(arrays["P_joint"], arrays["P_row"], arrays["P_col"], values)
+    return Expansion(_exponents(arrays["E"], n), entries, l)
 
 
 def _provenance(value: object, n: int) -> dict[str, Any]:

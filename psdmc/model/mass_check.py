@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.model import evaluate
+from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import Joint
 
@@ -65,7 +65,7 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
         return None
     low, high = (np.array(bound) for bound in zip(*map(_range, model.chain.joints), strict=True))
     poses = np.random.default_rng(SEED).uniform(low, high, size=(POSES, model.n))
-    values, vectors = np.linalg.eigh(evaluate.composite_mass_matrix(model, poses))
+    values, vectors = np.linalg.eigh(recursive.mass_matrix(model.chain, model.standard_parameters(), poses))
     failing = ~(values[:, 0] > ROUNDING * np.abs(values).max(axis=1))
     worst = int(np.argmin(values[:, 0]))
     joint = model.joint_names[int(np.argmax(np.abs(vectors[worst, :, 0])))]

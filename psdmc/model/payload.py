@@ -1,9 +1,8 @@
-"""A rigid load on the tip: new base parameters from the same E, P and B, because theta_b = B x."""
+"""A rigid load on the tip, as standard parameters of the last link: theta_b = B x then follows, E, P and B stay."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,11 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.dynamics.parameters import BODY_PARAMETERS, moved, standard_parameters
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement
 from psdmc.robot.inertia import physical_fault, six_of
-
-if TYPE_CHECKING:
-    from psdmc.model.dynamics_model import DynamicsModel
 
 Array = NDArray[np.float64]
 
@@ -26,60 +22,47 @@ SPAN_TOLERANCE = 1e-9
 """Share of the load by which it may miss the parameters that the model admits: rounding only."""
 
 
-def with_payload(
-    model: DynamicsModel,
-    mass: float,
-    com: ArrayLike,
-    inertia: ArrayLike | None = None,
-    frame: Placement | str | None = None,
-) -> DynamicsModel:
-    """The model with a rigid load fixed to its last link.
+def loaded(chain: Chain, load: Array, mass: float) -> Chain:
+    """The chain with the load on its last link; InputError where the chain's assumptions do not admit it.
 
-    mass      kg
-    com       (3,) m, centre of mass in `frame`
-    inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
-    frame     where the load's numbers are given: a Placement in the tip frame, or the tip's name; None: the tip
-
-    InputError where the numbers are no rigid body's, beyond the ranges of robot files, or the model's assumptions do
-    not admit the load.
+    load  (10,) standard parameters of `load_parameters`
+    mass  kg, for the note
     """
-    load = load_parameters(model, mass, com, inertia, frame)
-    index = PARAMETERS_PER_LINK * (model.n - 1) + np.arange(BODY_PARAMETERS)
-    _check_admitted(model, load, index)
-    if model.theta_b is None:
-        raise InputError(
-            f"the base parameters of '{model.chain.name}' are unknown", "calibrate before adding a load"
-        )
-    parameters = model.chain.parameters.copy()
+    _check_admitted(chain, load)
+    parameters = chain.parameters.copy()
     parameters[-1, :BODY_PARAMETERS] += load
-    note = f"payload of {mass:g} kg on link '{model.chain.joints[-1].link_name}'"
-    chain = replace(model.chain, parameters=parameters, notes=(*model.chain.notes, note))
-    return replace(model, theta_b=model.theta_b + model.B[:, index] @ load, chain=chain)
+    note = f"payload of {mass:g} kg on link '{chain.joints[-1].link_name}'"
+    return replace(chain, parameters=parameters, notes=(*chain.notes, note))
+
+
+def last_link(chain: Chain) -> NDArray[np.int64]:
+    """(10,) where the last link's body parameters are in x."""
+    return PARAMETERS_PER_LINK * (len(chain) - 1) + np.arange(BODY_PARAMETERS)
 
 
 def load_parameters(
-    model: DynamicsModel,
+    chain: Chain,
     mass: float,
     com: ArrayLike,
     inertia: ArrayLike | None = None,
     frame: Placement | str | None = None,
 ) -> Array:
-    """(10,) the load's standard parameters about the last link's frame."""
+    """(10,) the load's standard parameters about the last link's frame; see DynamicsModel.with_payload."""
     centre, about_com = _checked(mass, com, inertia)
     kilograms = float(mass)
     about_frame = about_com + kilograms * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     own = standard_parameters(kilograms, kilograms * centre, about_frame)
-    in_tip = model.chain.tip @ _frame(model, frame)
-    return moved(own, model.chain.joints[-1].link_frame.inverse() @ in_tip)
+    in_tip = chain.tip @ _frame(chain, frame)
+    return moved(own, chain.joints[-1].link_frame.inverse() @ in_tip)
 
 
-def _frame(model: DynamicsModel, frame: Placement | str | None) -> Placement:
+def _frame(chain: Chain, frame: Placement | str | None) -> Placement:
     if isinstance(frame, Placement):
         return _checked_frame(frame)
-    if frame is None or frame == model.chain.tip_name:
+    if frame is None or frame == chain.tip_name:
         return Placement.identity()
     raise InputError(
-        f"payload frame {limits.shown(frame)} is not the tip {limits.shown(model.chain.tip_name)}",
+        f"payload frame {limits.shown(frame)} is not the tip {limits.shown(chain.tip_name)}",
         "give the tip's name, or a Placement in the tip frame",
     )
 
@@ -142,15 +125,15 @@ def array_of(values: ArrayLike) -> Array | None:
 _SHAPES = {(): "a finite number", (3,): "three finite numbers", (3, 3): "3 x 3 finite numbers"}
 
 
-def _check_admitted(model: DynamicsModel, load: Array, index: NDArray[np.int64]) -> None:
+def _check_admitted(chain: Chain, load: Array) -> None:
     """The load must lie in the span: a link whose mx is assumed zero cannot carry one off its axis."""
-    x = np.zeros(PARAMETERS_PER_LINK * model.n)
-    x[index] = load
-    span = model.chain.parameter_span
+    x = np.zeros(PARAMETERS_PER_LINK * len(chain))
+    x[last_link(chain)] = load
+    span = chain.parameter_span
     leads = np.argmax(span != 0.0, axis=0)
     missed = np.abs(x - span @ x[leads]).max()
     if missed > SPAN_TOLERANCE * np.abs(x).max(initial=0.0):
-        link = model.chain.joints[-1].link_name
+        link = chain.joints[-1].link_name
         raise InputError(
             f"link '{link}' cannot carry this load: the model assumes some of its parameters zero",
             "derive the model again without those assumptions",

@@ -19,8 +19,8 @@ from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector
-from psdmc.model.check import random_parameters
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_parameters import random_parameters
 from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ def reference_states(model: DynamicsModel, count: int = COUNT) -> ReferenceState
 
 
 def _other_parameters(model: DynamicsModel) -> Array:
-    other: Array = times(model.B, random_parameters(model))
+    other: Array = times(model.B, random_parameters(model.chain))
     return other if model.theta_b is None else model.theta_b + LOAD * other
 
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
-from psdmc.model.evaluate import expanded
 from psdmc.robot.chain import Joint
 
 
@@ -64,8 +63,8 @@ def summary(model: DynamicsModel) -> Summary:
         joints=chain.joints,
         p=model.p,
         l=model.l,
-        sizes=None if model.E is None else sizes_of(model.E),
-        entries=None if model.P is None else sum(int(matrix.nnz) for matrix in model.P),
+        sizes=None if model.expansion is None else sizes_of(model.expansion.E),
+        entries=None if model.expansion is None else len(model.expansion.entries.value),
         base_parameters=model.base_parameters,
         certificate=tuple(model.certificate.tolist()),
         notes=chain.notes,
@@ -91,7 +90,7 @@ def sizes_of(E: NDArray[np.uint8]) -> Sizes:
 
 def term_texts(model: DynamicsModel) -> Iterator[str]:
     """Every function of y as text, in the order of E: 'g s2 c3', 'qdd1 c2^2', 'qd1 qd2 s2 c2'."""
-    exponents, _ = expanded(model)
+    exponents = model.expanded().E
     n = model.n
     names = [f"{symbol}{j + 1}" for symbol in ("q", "s", "c", "qd", "qdd") for j in range(n)]
     order = [*range(4 * n, 5 * n), *range(3 * n, 4 * n), *range(3 * n)]

@@ -23,7 +23,8 @@ from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.store import load, save
+from psdmc.model.load import load
+from psdmc.model.store import save
 from psdmc.report.calibrate_plots import excitation_figure
 from psdmc.report.calibrate_report import write_report
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-import psdmc
 from psdmc.errors import InternalError, ToolchainError
 from psdmc.program.kernel import Kernel
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
@@ -45,6 +44,6 @@ def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -
 @cache
 def sources_digests() -> tuple[str, ...]:
     """NumPy's version and the digests of the sources that lowering runs: an edited psdmc lowers anew."""
-    root = Path(psdmc.__file__).parent
+    root = Path(__file__).parent.parent
     files = [path for folder in DECIDES for path in sorted((root / folder).rglob("*.py"))]
     return (np.__version__, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in files))

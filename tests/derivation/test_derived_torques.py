@@ -14,6 +14,7 @@ from random_chains import Oracle, random_chain, relative_error, states
 from psdmc.derivation.certify import certificate
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InternalError
+from psdmc.model.expansion import Expansion
 from psdmc.robot.chain import Chain
 from psdmc.robot.reference import reference
 
@@ -139,7 +140,7 @@ def test_the_certificate_refuses_a_wrong_model() -> None:
     matrices = [matrix.copy() for matrix in model.P]
     matrices[1].data[0] *= 1 + 1e-6
     with pytest.raises(InternalError, match=r"joint '.*': the derived model is off Newton-Euler"):
-        certificate(replace(model, P=tuple(matrices)))
+        certificate(replace(model, expansion=Expansion.of(model.E, matrices)))
 
 
 def test_representative_lifts_base_parameters_into_the_span() -> None:

@@ -24,7 +24,7 @@ from killable import run
 from psdmc.atomic import whole_file
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_columns, write_log
-from psdmc.model.store import load
+from psdmc.model.load import load
 
 FEW = {"derive": 4, "emit-c": 3, "build": 1, "calibrate": 3, "excite": 1}
 MANY = os.environ.get("PSDMC_KILLS")

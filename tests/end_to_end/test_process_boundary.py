@@ -361,7 +361,7 @@ socket.create_connection = socket.getaddrinfo = Refused
 
 import numpy as np
 import psdmc
-from psdmc.model.check import check_model
+from psdmc.verification.check import check_model
 
 model = psdmc.derive(sys.argv[1])
 model.save("m.npz")

@@ -11,7 +11,7 @@ from pathlib import Path
 from command_line import files_in
 
 import psdmc
-from psdmc.model.store import load
+from psdmc.model.load import load
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "generated" / "two_link"

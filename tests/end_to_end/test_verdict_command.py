@@ -13,7 +13,8 @@ from command_line import status, typed
 
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
-from psdmc.model.store import load, save
+from psdmc.model.load import load
+from psdmc.model.store import save
 from psdmc.robot.reference import reference
 
 ROBOT = "two_link_full"

@@ -11,8 +11,9 @@ import numpy as np
 from psdmc import compiler
 from psdmc.cli.show import print_model
 from psdmc.emit.package import package_files
-from psdmc.model.check import check_model
-from psdmc.model.store import file_bytes, load
+from psdmc.model.load import load
+from psdmc.model.store import file_bytes
+from psdmc.verification.check import check_model
 
 
 def model(data: bytes, folder: Path, deep: bool) -> None:

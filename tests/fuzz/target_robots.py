@@ -10,9 +10,9 @@ from outcome import BrokenRule
 from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
-from psdmc.model.check import check_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import LoadedRobot, SourceFormat, load_robot, load_robot_text
+from psdmc.verification.check import check_model
 
 MOST_EXPANDED = 4
 """joints; beyond, E and P are left out: they take seconds"""
@@ -41,7 +41,7 @@ def _derived(loaded: LoadedRobot, source_format: SourceFormat) -> None:
     model = _model(loaded)
     failed = [f"{row.name}: {row.error:.2g}" for row in check_model(model) if not row.passed]
     if failed:
-        raise BrokenRule("CheckFails", "psdmc/model/check.py", "; ".join(failed))
+        raise BrokenRule("CheckFails", "psdmc/verification/check.py", "; ".join(failed))
     if loaded.snap_report:
         loaded = load_robot_text(loaded.source_text, source_format, snap=0.0)
         model = _model(loaded)

@@ -28,7 +28,7 @@ from worker import gist_of, scratch
 
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError, InputError, InternalError
-from psdmc.model.store import load
+from psdmc.model.load import load
 from psdmc.robot.load import load_robot_text
 
 QUICK = 50_000

@@ -17,7 +17,6 @@ from random_chains import Oracle, random_chain, relative_error, states
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.lower.expanded import SUPPORTED, lower_expanded
-from psdmc.model import evaluate
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.functions import BY_NAME
@@ -56,13 +55,13 @@ def test_programs_compute_what_the_model_says(robot: str, name: str, theta: bool
     model = bundled(robot)
     n = model.n
     q, qd, qdd = states(n, 200)
-    tau, h = evaluate.inverse_dynamics(model, q, qd, qdd), evaluate.nonlinear_effects(model, q, qd)
+    tau, h = model.inverse_dynamics(q, qd, qdd), model.nonlinear_effects(q, qd)
     expected = {
         "inverse_dynamics": tau,
         "nonlinear_effects": h,
-        "gravity": evaluate.gravity(model, q),
-        "mass_matrix": evaluate.mass_matrix(model, q),
-        "regressor": evaluate.regressor(model, q, qd, qdd),
+        "gravity": model.gravity(q),
+        "mass_matrix": model.mass_matrix(q),
+        "regressor": model.regressor(q, qd, qdd),
         "forward_dynamics": qdd,
     }[name]
 
@@ -85,7 +84,7 @@ def test_inverse_dynamics_of_any_chain_is_as_good_as_its_model(seed: int, kinds:
 
     found = run(program, model, "inverse_dynamics", q=q, qd=qd, qdd=qdd)
 
-    assert relative_error(found, evaluate.inverse_dynamics(model, q, qd, qdd)) < 1e-12
+    assert relative_error(found, model.inverse_dynamics(q, qd, qdd)) < 1e-12
     assert relative_error(found, Oracle(chain).rnea(q, qd, qdd)) < 1e-12 + 2.0 * model.certificate.max()
 
 
@@ -164,7 +163,7 @@ def test_parameters_that_are_unknown_cannot_be_baked():
 
 
 def test_a_model_without_functions_cannot_be_expanded():
-    model = dataclasses.replace(bundled("two_link"), E=None, P=None)
+    model = dataclasses.replace(bundled("two_link"), expansion=None)
 
     with pytest.raises(InputError, match="needs E and P") as caught:
         lower_expanded(model, "gravity", False)

@@ -81,8 +81,7 @@ def test_unknown_base_parameters() -> None:
     assert model.regressor(np.zeros(4), np.zeros(4), np.zeros(4)).shape == (4, 8)
 
 
-def test_function_values_need_E() -> None:
-    model = replace(bundled_model("scara"), E=None, P=None)
-    state = np.zeros((1, 4))
+def test_a_model_without_E_and_P_says_so() -> None:
+    model = replace(bundled_model("scara"), expansion=None)
     with pytest.raises(InputError, match="without E and P"):
-        evaluate.function_values(model, state, state, state)
+        model.expanded()

@@ -19,8 +19,8 @@ from psdmc.cli import main
 from psdmc.errors import InputError
 from psdmc.model import store
 from psdmc.model.chain_json import MOST_JOINTS
-from psdmc.model.check import check_model
-from psdmc.model.store import load
+from psdmc.model.load import load
+from psdmc.verification.check import check_model
 
 MEMORY = 100 << 20
 """Bytes that reading a small file may take."""
@@ -44,7 +44,7 @@ def forged(original: Path, path: Path, change: Callable[[Manifest, Arrays], None
     change(manifest, arrays)
     plain = {name: np.zeros(1) if array.dtype == object else array for name, array in arrays.items()}
     try:
-        manifest["content_hash"] = store._hash(plain, manifest)
+        manifest["content_hash"] = store.hash_of(plain, manifest)
     except (KeyError, ValueError):
         manifest["content_hash"] = "0" * 64
     np.savez_compressed(path, manifest=np.array(json.dumps(manifest)), **arrays)

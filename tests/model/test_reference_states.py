@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
 
-from psdmc.model.check import random_parameters
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_parameters import random_parameters
 from psdmc.model.reference_states import COUNT, LOAD, ReferenceStates, reference_states
 from psdmc.program.functions import BY_NAME
 from psdmc.robot.reference import Reference, reference
@@ -24,7 +24,7 @@ def _error(found: np.ndarray, expected: np.ndarray) -> float:
 
 def _others(model: DynamicsModel) -> tuple[np.ndarray, np.ndarray]:
     """Standard parameters of the run-time theta_b: the robot's and a share of others."""
-    x = model.chain.parameters.ravel() + LOAD * random_parameters(model)
+    x = model.chain.parameters.ravel() + LOAD * random_parameters(model.chain)
     return x.reshape(model.n, -1), model.B @ x
 
 

@@ -12,10 +12,12 @@ import pytest
 from bundled import bundled_model
 from random_chains import random_chain
 
+import psdmc
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.store import file_bytes, load, save
+from psdmc.model.load import load
+from psdmc.model.store import file_bytes, save
 
 
 def assert_same(a: DynamicsModel, b: DynamicsModel) -> None:
@@ -45,6 +47,12 @@ def test_a_model_comes_back_exactly(name: str, tmp_path: Path) -> None:
     model = bundled_model(name)
     model.save(tmp_path / "model.npz")
     assert_same(load(tmp_path / "model.npz"), model)
+
+
+def test_the_packages_save_mirrors_its_load(tmp_path: Path) -> None:
+    model = bundled_model("scara")
+    psdmc.save(model, tmp_path / "model.npz")
+    assert_same(psdmc.load(tmp_path / "model.npz"), model)
 
 
 def test_unknown_and_unexpanded_models_come_back(tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.calibration.simulate_campaign import SimulateOptions
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
-from psdmc.model.store import load, save
+from psdmc.model.load import load
+from psdmc.model.store import save
 from psdmc.report.calibrate_commands import (
     calibrate_command,
     excite_command,

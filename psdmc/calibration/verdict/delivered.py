@@ -29,9 +29,10 @@ from psdmc.calibration.logs.filter import States, filtered, held_out, smoothed_r
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.errors import InputError
-from psdmc.model import evaluate
+from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.store import load, save
+from psdmc.model.load import load
+from psdmc.model.store import save
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +49,7 @@ class Delivered:
 
     @property
     def theta_b(self) -> Array:
-        return evaluate.known(self.model)
+        return self.model.known_theta_b()
 
     @property
     def motors(self) -> Motors:
@@ -118,7 +119,7 @@ def _log_parts(
 def _torque(found: Delivered, states: States, rows: slice) -> Array:
     """(rows, n) motor torque before the filter: rigid bodies and friction."""
     q, qd, qdd = states.q[rows], states.qd[rows], states.qdd[rows]
-    rigid = evaluate.newton_euler_torques(found.model, found.theta_b, [q, qd, qdd])
+    rigid = recursive.torques(found.model.chain, found.model.standard_parameters(), [q, qd, qdd])
     law = found.prediction
     terms = friction_terms(qd, law.sign_speed, law.exponents, law.offset)
     names = friction_names(law.exponents, law.offset)

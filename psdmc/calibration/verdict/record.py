@@ -25,7 +25,6 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.verdict import Verdict
 from psdmc.errors import InternalError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.equations import base_parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,7 +298,7 @@ def _parameter_rows(
             identifiable=seen.words[k] == IDENTIFIED,
             visibility=seen.words[k],
         )
-        for k, parameter in enumerate(base_parameters(model))
+        for k, parameter in enumerate(model.base_parameters)
     )
 
 

@@ -21,7 +21,8 @@ from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campai
 from psdmc.calibration.truth import compare
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
-from psdmc.model.store import load, save
+from psdmc.model.load import load
+from psdmc.model.store import save
 
 
 def with_logs(arm, campaign: Path, name: str, **variant: bool) -> Path:

@@ -17,8 +17,9 @@ from psdmc.calibration.logs.log import Log
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.load import load
 from psdmc.model.mass_check import check_mass_matrix
-from psdmc.model.store import load, save
+from psdmc.model.store import save
 from psdmc.robot.load import load_robot
 
 ROBOTS = Path(__file__).resolve().parents[3] / "examples" / "robots"

@@ -28,8 +28,9 @@ from psdmc.cli import main
 from psdmc.cli.show import print_accuracy
 from psdmc.compiler import emit_c
 from psdmc.errors import InputError
+from psdmc.model.load import load
 from psdmc.model.mass_check import check_mass_matrix
-from psdmc.model.store import load, save
+from psdmc.model.store import save
 from psdmc.report.calibrate_report import write_report
 from psdmc.toolchain.build_package import build_package
 

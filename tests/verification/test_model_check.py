@@ -12,10 +12,11 @@ from random_chains import random_chain
 from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
-from psdmc.model.check import check_model
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.expansion import Expansion
 from psdmc.model.summary import summary, term_texts
 from psdmc.robot.load import load_robot_text
+from psdmc.verification.check import check_model
 
 
 @pytest.mark.parametrize("name", ["two_link", "scara", "denso_floor", "kr6", "rounded_arm"])
@@ -74,13 +75,13 @@ def wrong_theta(model: DynamicsModel) -> DynamicsModel:
 def wrong_P(model: DynamicsModel) -> DynamicsModel:
     matrices = [matrix.copy() for matrix in model.P]
     matrices[0].data[7] += 1e-5
-    return replace(model, P=tuple(matrices))
+    return replace(model, expansion=Expansion.of(model.E, matrices))
 
 
 def wrong_E(model: DynamicsModel) -> DynamicsModel:
     exponents = model.E.copy()
     exponents[[model.n + 1, 2 * model.n + 1]] = exponents[[2 * model.n + 1, model.n + 1]]
-    return replace(model, E=exponents)
+    return replace(model, expansion=replace(model.expansion, E=exponents))
 
 
 @pytest.mark.parametrize("spoil", [wrong_theta, wrong_P, wrong_E])

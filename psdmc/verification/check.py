@@ -14,16 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.parameters import BODY_PARAMETERS, inertia_of, standard_parameters
 from psdmc.errors import InputError
-from psdmc.model import evaluate
-from psdmc.model.check_placements import chain_poses, gravity_error, placement_errors, reach_of
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_parameters import random_parameters
 from psdmc.robot.chain import PARAMETERS_PER_LINK
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
 from psdmc.robot.reference import Reference, pinocchio_version, reference
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
+from psdmc.verification.placements import chain_poses, gravity_error, placement_errors, reach_of
 
 Array = NDArray[np.float64]
 
@@ -134,7 +133,7 @@ def _parameters(model: DynamicsModel, loaded: LoadedRobot) -> tuple[Array, Array
         for known in (loaded.chain.parameters, model.chain.parameters):
             if _gives(theta, model.B, known):
                 return theta, None if known is loaded.chain.parameters else known
-    x = random_parameters(model)
+    x = random_parameters(model.chain)
     return model.B @ x, x.reshape(model.n, PARAMETERS_PER_LINK)
 
 
@@ -143,22 +142,6 @@ def _gives(theta: Array, B: Array, parameters: Array) -> bool:
     if np.isnan(parameters).any():
         return False
     return bool(np.allclose(B @ parameters.reshape(-1), theta, rtol=1e-9, atol=1e-12))
-
-
-def random_parameters(model: DynamicsModel) -> Array:
-    """(11 n,) standard parameters of physical bodies, as far as the model's assumptions admit them."""
-    rng = np.random.default_rng(SEED)
-    x = np.zeros((model.n, PARAMETERS_PER_LINK))
-    for link in x:
-        mass, centre = rng.uniform(1.0, 5.0), rng.uniform(-0.1, 0.1, size=3)
-        shape = rng.normal(scale=0.1, size=(3, 3))
-        second = mass * (shape @ shape.T + np.outer(centre, centre))
-        link[:BODY_PARAMETERS] = standard_parameters(mass, mass * centre, inertia_of(second))
-        link[BODY_PARAMETERS] = rng.uniform(0.1, 0.5)
-    span = model.chain.parameter_span
-    leads = np.argmax(span != 0.0, axis=0)
-    admitted: Array = span @ x.reshape(-1)[leads]
-    return admitted
 
 
 def _states(n: int) -> tuple[Array, Array, Array]:
@@ -171,13 +154,11 @@ def _states(n: int) -> tuple[Array, Array, Array]:
 def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[CheckRow, ...]:
     q, qd, qdd = _states(model.n)
     rest = np.zeros_like(q)
-    tau = evaluate.torques_for(model, theta, q, qd, qdd)
-    mass = np.stack(
-        [evaluate.torques_for(model, theta, q, rest, rest + unit) for unit in np.eye(model.n)], axis=-1
-    )
-    gravity = evaluate.torques_for(model, theta, q, rest, rest)
+    tau = model.torques_for(theta, q, qd, qdd)
+    mass = np.stack([model.torques_for(theta, q, rest, rest + unit) for unit in np.eye(model.n)], axis=-1)
+    gravity = model.torques_for(theta, q, rest, rest)
     mass = mass - gravity[..., None]
-    rows = evaluate.regressor(model, q, qd, qdd)
+    rows = model.regressor(q, qd, qdd)
     pairs = (
         ("inverse dynamics", "rnea", tau, robot.inverse_dynamics(q, qd, qdd)),
         ("regressor times theta_b", "rnea", rows @ theta, robot.inverse_dynamics(q, qd, qdd)),
@@ -185,7 +166,7 @@ def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[Che
         (
             "nonlinear effects",
             "nonLinearEffects",
-            evaluate.torques_for(model, theta, q, qd, rest),
+            model.torques_for(theta, q, qd, rest),
             robot.nonlinear_effects(q, qd),
         ),
         ("gravity", "computeGeneralizedGravity", gravity, robot.gravity(q)),
@@ -230,7 +211,7 @@ def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Ar
     states = _states(model.n)
     expected = written.inverse_dynamics(*states)
     bound = torque_bound(written, angles, *states)
-    error, limit = _worst(evaluate.torques_for(model, theta, *states), expected, bound)
+    error, limit = _worst(model.torques_for(theta, *states), expected, bound)
     return CheckRow(
         "effect of snapped rotations", "rnea", error, limit, "the limit is what the angles can do"
     )
@@ -243,7 +224,7 @@ def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) ->
         expected = mujoco_torques(loaded, *states)
     except NotCompared as reason:
         return CheckRow("inverse dynamics", MUJOCO, np.nan, None, f"not compared: {reason}")
-    tau = evaluate.torques_for(model, model.B @ loaded.chain.parameters.reshape(-1), *states)
+    tau = model.torques_for(model.B @ loaded.chain.parameters.reshape(-1), *states)
     bound = np.full(model.n, MUJOCO_ROUNDING * float(np.abs(expected).max(initial=0.0)))
     if not angles.any():
         return CheckRow("inverse dynamics", MUJOCO, *_worst(tau, expected, bound, MUJOCO_LIMIT))

@@ -11,12 +11,12 @@ from bundled import ROBOTS
 
 from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
-from psdmc.model.check import MUJOCO, CheckRow, check_model, readers
 from psdmc.robot import dh_chain, urdf_chain
 from psdmc.robot.chain import Placement
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.snap import snap_axis
 from psdmc.robot.urdf_bodies import placement_of
+from psdmc.verification.check import MUJOCO, CheckRow, check_model, readers
 
 BODY = (
     '<inertial><origin xyz="0.1 -0.05 0.2" rpy="0.3 -0.2 0.5"/><mass value="1.5"/>'

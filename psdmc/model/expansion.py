@@ -1,0 +1,108 @@
+"""The functions of a model and what each contributes: E and P, which only come together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+
+class Entries(NamedTuple):
+    """The entries of n sparse matrices P: joint by joint, row by row.
+
+    joint   (k,) int32    which matrix, 0 to n - 1
+    row     (k,) int32    function, 0 to p - 1
+    column  (k,) int32    base parameter, 0 to l - 1
+    value   (k,) float64
+    """
+
+    joint: NDArray[Any]
+    row: NDArray[Any]
+    column: NDArray[Any]
+    value: NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Expansion:
+    """tau[i] = y @ P[i] @ theta_b: n joints, p functions y, l base parameters.
+
+    E        (5n, p) uint8   exponents; row blocks q, sin q, cos q, qd, qdd
+    entries  of P
+    l        columns of each P
+    """
+
+    E: NDArray[np.uint8]
+    entries: Entries
+    l: int
+    _matrices: list[sparse.csr_array] = field(default_factory=list, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        exponents = np.array(self.E, dtype=np.uint8, order="C")
+        if exponents.ndim != 2 or exponents.shape[0] % 5:
+            raise ValueError(f"E has shape {exponents.shape}, expected (5n, p)")
+        exponents.setflags(write=False)
+        object.__setattr__(self, "E", exponents)
+        joint, row, column = (np.array(part, np.int32) for part in self.entries[:3])
+        kept = Entries(joint, row, column, np.array(self.entries.value, np.float64))
+        bounds = (self.n, self.p, self.l)
+        if any(part.shape != kept.value.shape or part.ndim != 1 for part in kept):
+            raise ValueError("the entries of P have parts of different lengths")
+        for part, bound in zip(kept[:3], bounds, strict=True):
+            if part.size and not 0 <= part.min() <= part.max() < bound:
+                raise ValueError(f"P has entries outside its {self.n} matrices of shape {bounds[1:]}")
+        if (np.diff(kept.joint) < 0).any():
+            raise ValueError("the entries of P are not joint by joint")
+        for part in kept:
+            part.setflags(write=False)
+        object.__setattr__(self, "entries", kept)
+
+    @staticmethod
+    def of(E: NDArray[Any], P: Sequence[sparse.csr_array]) -> Expansion:
+        """From E and n matrices (p, l); ValueError where their shapes differ."""
+        from scipy import sparse
+
+        shapes = {matrix.shape for matrix in P}
+        if len(shapes) != 1 or 5 * len(P) != E.shape[0] or next(iter(shapes))[0] != E.shape[1]:
+            raise ValueError(f"P has shapes {sorted(shapes)}, E {E.shape}")
+        blocks = [sparse.coo_array(matrix) for matrix in P]
+        entries = Entries(
+            np.concatenate([np.full(block.nnz, i) for i, block in enumerate(blocks)]),
+            np.concatenate([block.coords[0] for block in blocks]),
+            np.concatenate([block.coords[1] for block in blocks]),
+            np.concatenate([block.data for block in blocks]),
+        )
+        return Expansion(E, entries, int(P[0].shape[1]))
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.E.shape[0]) // 5
+
+    @property
+    def p(self) -> int:
+        """Number of functions."""
+        return int(self.E.shape[1])
+
+    @property
+    def P(self) -> tuple[sparse.csr_array, ...]:
+        """n sparse matrices (p, l), one per joint; made when first asked for, as SciPy is slow to import."""
+        if not self._matrices:
+            self._matrices.extend(self._made())
+        return tuple(self._matrices)
+
+    def _made(self) -> list[sparse.csr_array]:
+        from scipy import sparse
+
+        joint, row, column, value = self.entries
+        starts = np.searchsorted(joint, np.arange(self.n + 1)).tolist()
+        return [
+            sparse.csr_array((value[a:b], (row[a:b], column[a:b])), shape=(self.p, self.l))
+            for a, b in pairwise(starts)
+        ]

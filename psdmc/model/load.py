@@ -1,0 +1,109 @@
+"""Read a model file: what store.py writes, or anything that somebody calls so."""
+
+from __future__ import annotations
+
+import json
+import reprlib
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from psdmc.errors import InputError
+from psdmc.model.archive import LARGEST, BrokenArchiveError, opened, read_arrays
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.from_parts import model_from
+from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
+
+_MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+"""By schema: what makes its manifest one of the next schema. Empty while there is only one."""
+
+LARGEST_MANIFEST = 64 << 20
+"""Bytes of the manifest's text, at four a letter; a nine-joint arm's has 0.1 MB beside its source."""
+
+
+def load(path: str | Path) -> DynamicsModel:
+    """Read a model file; InputError where it is missing, damaged, forged, foreign or of a newer psdmc."""
+    source = Path(path)
+    try:
+        arrays, manifest = _read(source)
+        if manifest.get("content_hash") != hash_of(arrays, manifest):
+            raise BrokenArchiveError("its content does not match its hash")
+        return model_from(arrays, _migrated(manifest))
+    except BrokenArchiveError as error:
+        raise _damaged(source, str(error)) from error
+    except (ValueError, RecursionError) as error:
+        raise _damaged(source, f"its parts do not fit together ({error})") from error
+
+
+def _read(source: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Arrays and manifest, the manifest known to be psdmc's and of no newer schema."""
+    data = _bytes_of(source)
+    try:
+        archive = opened(data)
+        manifest = json.loads(_manifest_text(archive, len(data)))
+    except BrokenArchiveError as error:
+        raise _damaged(source, "it is truncated or altered") from error
+    except (ValueError, RecursionError) as error:
+        raise _foreign(source) from error
+    _check_schema(source, manifest)
+    try:
+        return read_arrays(archive, ARRAYS, len(data)), manifest
+    except BrokenArchiveError as error:
+        raise _damaged(source, "it is truncated or altered") from error
+
+
+def _bytes_of(source: Path) -> bytes:
+    try:
+        if source.stat().st_size > LARGEST:
+            raise InputError(
+                f"{source}: larger than any model file ({LARGEST >> 30} GiB)",
+                "give a file that psdmc derive wrote",
+            )
+        return source.read_bytes()
+    except FileNotFoundError as error:
+        raise InputError(f"{source}: no such file", "psdmc derive ROBOT -o MODEL.npz makes one") from error
+    except OSError as error:
+        raise InputError(
+            f"{source}: cannot be read: {error.strerror or error}", "give a model file (.npz)"
+        ) from error
+
+
+def _manifest_text(archive: zipfile.ZipFile, size: int) -> str:
+    array = read_arrays(archive, ["manifest"], size)["manifest"]
+    if array.ndim or array.dtype.kind != "U" or array.itemsize > LARGEST_MANIFEST:
+        raise ValueError("the manifest is no text")
+    try:
+        letters = array.astype(array.dtype.newbyteorder("<")).tobytes()
+        return letters.decode("utf-32-le").rstrip("\0")
+    except UnicodeDecodeError as error:
+        raise BrokenArchiveError(str(error)) from error
+
+
+def _check_schema(source: Path, manifest: Any) -> None:
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        raise _foreign(source)
+    schema = manifest.get("schema")
+    if not isinstance(schema, int) or isinstance(schema, bool) or schema < 1:
+        raise _damaged(source, f"its schema is {reprlib.repr(schema)}, expected 1 to {SCHEMA}")
+    if schema > SCHEMA:
+        raise InputError(
+            f"{source}: model schema {reprlib.repr(schema)}, this psdmc reads up to {SCHEMA}",
+            f"install psdmc {reprlib.repr(manifest.get('psdmc', ''))} or newer, or derive the model again",
+        )
+
+
+def _migrated(manifest: dict[str, Any]) -> dict[str, Any]:
+    while manifest["schema"] < SCHEMA:
+        manifest = _MIGRATIONS[manifest["schema"]](manifest)
+    return manifest
+
+
+def _damaged(source: Path, why: str) -> InputError:
+    return InputError(f"{source}: damaged model file: {why}", "derive the model again")
+
+
+def _foreign(source: Path) -> InputError:
+    return InputError(f"{source}: not a psdmc model file", "psdmc derive ROBOT -o MODEL.npz makes one")

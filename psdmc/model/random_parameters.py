@@ -1,0 +1,29 @@
+"""Parameters of another robot of the same shape: what stands in where a robot's own are unknown."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.dynamics.parameters import BODY_PARAMETERS, inertia_of, standard_parameters
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
+
+Array = NDArray[np.float64]
+
+SEED = 14_630
+
+
+def random_parameters(chain: Chain) -> Array:
+    """(11 n,) standard parameters of physical bodies, as far as the chain's assumptions admit them."""
+    rng = np.random.default_rng(SEED)
+    x = np.zeros((len(chain), PARAMETERS_PER_LINK))
+    for link in x:
+        mass, centre = rng.uniform(1.0, 5.0), rng.uniform(-0.1, 0.1, size=3)
+        shape = rng.normal(scale=0.1, size=(3, 3))
+        second = mass * (shape @ shape.T + np.outer(centre, centre))
+        link[:BODY_PARAMETERS] = standard_parameters(mass, mass * centre, inertia_of(second))
+        link[BODY_PARAMETERS] = rng.uniform(0.1, 0.5)
+    span = chain.parameter_span
+    leads = np.argmax(span != 0.0, axis=0)
+    admitted: Array = span @ x.reshape(-1)[leads]
+    return admitted

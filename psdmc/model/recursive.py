@@ -1,0 +1,54 @@
+"""The model's functions by the recursions of psdmc.dynamics: quick for any p, E and P are not used."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.dynamics.composite_body import mass_matrix as composite_bodies
+from psdmc.dynamics.frames import base_acceleration, frames_of
+from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
+from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
+from psdmc.dynamics.regressor import regressor as standard_regressor
+from psdmc.dynamics.scalar import Scalar
+from psdmc.robot.chain import Chain
+
+Array = NDArray[np.float64]
+
+
+def torques(chain: Chain, x: Array, arrays: list[Array]) -> Array:
+    """tau (states, n), N m or N, of standard parameters (11n,) along q, qd, qdd (states, n)."""
+    q, qd, qdd = (list(array.T) for array in arrays)
+    bodies, drives = bodies_of(chain, x), drive_inertia_of(x)
+    found = newton_euler(frames_of(chain), bodies, drives, q, qd, qdd, base_acceleration(chain))
+    return _columns(found, len(arrays[0]))
+
+
+def mass_matrix(chain: Chain, x: Array, q: Array) -> Array:
+    """M(q) (states, n, n) from (states, n) by composite bodies of standard parameters (11n,)."""
+    rows = composite_bodies(frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), list(q.T))
+    return np.stack([_columns(row, len(q)) for row in rows], axis=1)
+
+
+def regressor(chain: Chain, representative: Array, arrays: list[Array]) -> Array:
+    """Y (states, n, l) along q, qd, qdd (states, n).
+
+    representative  (11n, l)  base parameters to standard ones
+    """
+    wanted = np.flatnonzero(representative.any(axis=1)).tolist()
+    q, qd, qdd = (list(array.T) for array in arrays)
+    placements = [joint.link_frame for joint in chain.joints]
+    rows = standard_regressor(
+        frames_of(chain), placements, frozenset(wanted), q, qd, qdd, base_acceleration(chain)
+    )
+    count = len(arrays[0])
+    full = np.stack([_columns([row.get(c, 0.0) for c in wanted], count) for row in rows], axis=1)
+    result: Array = full @ representative[wanted]
+    return result
+
+
+def _columns(values: Sequence[Scalar], count: int) -> Array:
+    """(count, len(values)) from scalars or (count,) arrays."""
+    return np.stack([np.broadcast_to(np.asarray(v, dtype=np.float64), (count,)) for v in values], axis=1)
