@@ -5,10 +5,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from psdmc.derivation.derive import derive_model
-from psdmc.derivation.snap_effect import snap_effect
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions, Real, Trig
 from psdmc.emit.package import PackageView, package_files, package_view
@@ -18,11 +16,13 @@ from psdmc.lower.admitted import require_forward_dynamics
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.reference_states import reference_states
-from psdmc.robot.load import LoadedRobot, load_robot
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
 from psdmc.toolchain.kept_kernels import lowered_once
+
+if TYPE_CHECKING:
+    from psdmc.robot.load import LoadedRobot
 
 Progress = Callable[[str], None]
 
@@ -52,6 +52,11 @@ def derive(
     expand         False leaves E and P out, for chains whose functions would not fit
     Raises InputError for a wrong file or option, DerivationError where the model does not fit.
     """
+    from psdmc.derivation.derive import (
+        derive_model,
+    )  # here: Pinocchio and SciPy load slowly, emission needs neither
+    from psdmc.robot.load import load_robot
+
     progress("reading the robot")
     loaded = load_robot(
         robot,
@@ -67,6 +72,8 @@ def derive(
 
 def provenance(loaded: LoadedRobot) -> dict[str, Any]:
     """Where a model comes from, as plain JSON values: enough to read the source again."""
+    from psdmc.derivation.snap_effect import snap_effect
+
     effect = snap_effect(loaded.chain, loaded.unsnapped().chain) if loaded.snap_report else None
     return {
         "source_text": loaded.source_text,

@@ -1,27 +1,20 @@
-"""The commands and their arguments."""
+"""The commands and their arguments. What a command does is imported when it runs: `--version` and `--help` wait for none."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc import compiler
 from psdmc.cli.output import check_output
 from psdmc.cli.progress import steps
-from psdmc.cli.show import megabytes, print_check, print_cost, print_mass_check, print_model, print_terms
 from psdmc.errors import InputError
-from psdmc.lower.admitted import run_time_only
-from psdmc.lower.kernels import Lowering
-from psdmc.model.load import load
-from psdmc.model.mass_check import check_mass_matrix
-from psdmc.robot.load import load_robot
 from psdmc.robot.load_options import DEFAULT_SNAP
-from psdmc.toolchain.build_package import build_package
-from psdmc.toolchain.cache_room import cache_contents, clear_cache
-from psdmc.verification.check import check_model
 from psdmc.version import psdmc_version
+
+if TYPE_CHECKING:
+    from psdmc.lower.kernels import Lowering
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -82,6 +75,8 @@ def derive(
     ] = True,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
+    from psdmc import compiler
+
     target = output or Path(robot.stem + ".npz")
     check_output(target, robot)
     with steps() as progress:
@@ -123,6 +118,9 @@ def show(
     cost: Annotated[bool, typer.Option("--cost", help="operations per function and lowering")] = False,
 ) -> None:
     """Print a model: joints, sizes, base parameters with equations, values and units, certificate."""
+    from psdmc.cli.show import print_cost, print_model, print_terms
+    from psdmc.model.load import load
+
     found = load(model)
     if terms:
         print_terms(found)
@@ -146,6 +144,12 @@ def check(
 ) -> None:
     """Check a model again, independently, against Pinocchio's (and MuJoCo's) own reading of its source, and its mass
     matrix."""
+    from psdmc.cli.show import print_check, print_mass_check
+    from psdmc.model.load import load
+    from psdmc.model.mass_check import check_mass_matrix
+    from psdmc.robot.load import load_robot
+    from psdmc.verification.check import check_model
+
     found = load(model)
     source = None
     if robot is not None:
@@ -174,6 +178,10 @@ def emit_c(
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
 ) -> None:
     """Write a model's C package: header, sources, build files, self-test."""
+    from psdmc import compiler
+    from psdmc.lower.admitted import run_time_only
+    from psdmc.model.load import load
+
     found = load(model)
     wanted = [word.strip() for word in functions.split(",") if word.strip()] or None
     with steps() as progress:
@@ -201,6 +209,8 @@ def build(
     ] = False,
 ) -> None:
     """Build an emitted package through its own build files and run its self-test."""
+    from psdmc.toolchain.build_package import build_package
+
     with steps() as progress:
         progress("building")
         build_package(directory, edited)
@@ -212,6 +222,9 @@ def cache(
     clear: Annotated[bool, typer.Option("--clear", help="remove every entry")] = False,
 ) -> None:
     """Show where compiled libraries are kept and how many, or remove them."""
+    from psdmc.cli.show import megabytes
+    from psdmc.toolchain.cache_room import cache_contents, clear_cache
+
     if clear:
         print(f"{clear_cache()} entries removed")
     found = cache_contents()

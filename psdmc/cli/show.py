@@ -18,11 +18,11 @@ from psdmc.model.mass_check import MassCheck
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
 from psdmc.robot.chain import Joint
-from psdmc.verification.check import CheckRow, readers
 
 if TYPE_CHECKING:
     from psdmc.calibration.verdict.record import Calibration
     from psdmc.calibration.verdict.verdict import Verdict
+    from psdmc.verification.check import CheckRow
 
 WIDTH = 160
 """Columns of a table where the output is no terminal, so that nothing is cut."""
@@ -137,6 +137,8 @@ def megabytes(size: int) -> str:
 
 def print_check(rows: Sequence[CheckRow]) -> None:
     """Each comparison and its verdict, and with which readers of the source."""
+    from psdmc.verification.check import readers
+
     table = Table("quantity", "against", "relative error", "limit", "", "")
     for row in rows:
         limit = "" if row.limit is None else f"{row.limit:.0e}"

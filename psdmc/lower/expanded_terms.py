@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.expansion import Entries, Expansion
 from psdmc.robot.chain import Chain
 
 Array = NDArray[np.float64]
@@ -58,7 +57,8 @@ class Terms:
 
 def torque_terms(model: DynamicsModel) -> Terms:
     """tau[0..n-1] over rows of E and theta_b; InputError where the model was not expanded."""
-    terms, parameter = _stacked(*_expanded(model))
+    expansion = _expanded(model)
+    terms, parameter = _stacked(expansion.E, expansion.entries, model.l)
     one_hot = (np.arange(model.l)[:, None] == parameter).astype(np.uint8)
     exponents = np.concatenate([terms.exponents, one_hot])
     return Terms(terms.output, exponents, terms.coefficient, terms.uncertainty)
@@ -66,25 +66,30 @@ def torque_terms(model: DynamicsModel) -> Terms:
 
 def baked_torque_terms(model: DynamicsModel) -> Terms:
     """tau[0..n-1] over rows of E, theta_b in the coefficients; InputError where it is unknown."""
-    E, P = _expanded(model)
-    theta_b = known_parameters(model)
-    return _stacked(E, [sparse.coo_array((matrix @ theta_b).reshape(-1, 1)) for matrix in P])[0]
+    expansion, theta_b = _expanded(model), known_parameters(model)
+    n, p = expansion.n, expansion.p
+    joint, row, column, value = expansion.entries
+    weights = np.bincount(joint * np.int64(p) + row, value * theta_b[column], n * p).reshape(n, p)
+    joints, functions = np.nonzero(weights)
+    entries = Entries(joints, functions, np.zeros_like(joints), weights[joints, functions])
+    return _stacked(expansion.E, entries, 1)[0]
 
 
 def regressor_terms(model: DynamicsModel) -> Terms:
     """Y[i, k] as output i * l + k, over rows of E."""
-    terms, parameter = _stacked(*_expanded(model))
+    expansion = _expanded(model)
+    terms, parameter = _stacked(expansion.E, expansion.entries, model.l)
     output = terms.output * model.l + parameter
     return Terms(output, terms.exponents, terms.coefficient, terms.uncertainty)
 
 
-def _expanded(model: DynamicsModel) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
+def _expanded(model: DynamicsModel) -> Expansion:
     if model.expansion is None:
         raise InputError(
             f"{model.chain.name}: the expanded lowering needs E and P, and this model has none",
             "derive it without --no-expand, or choose --lowering factored",
         )
-    return model.expansion.E, model.expansion.P
+    return model.expansion
 
 
 def known_parameters(model: DynamicsModel) -> Array:
@@ -97,27 +102,17 @@ def known_parameters(model: DynamicsModel) -> Array:
     return model.theta_b
 
 
-def _stacked(E: NDArray[np.uint8], weights: Sequence[sparse.sparray]) -> tuple[Terms, Integers]:
-    """One term per entry of each joint's (p, columns) weights, and its column; doubt goes by columns."""
-    functions, outputs, columns, values, uncertainties = [], [], [], [], []
-    for joint, weight in enumerate(weights):
-        entries = sparse.coo_array(weight)
-        value, column = entries.data, entries.col
-        largest = np.zeros(weight.shape[1])
-        np.maximum.at(largest, column, np.abs(value))
-        keep = np.abs(value) > COEFFICIENT_NOISE * largest[column]
-        functions.append(entries.row[keep])
-        columns.append(column[keep].astype(np.int64))
-        values.append(value[keep])
-        uncertainties.append(COEFFICIENT_NOISE * largest[column[keep]])
-        outputs.append(np.full(int(keep.sum()), joint, dtype=np.int64))
+def _stacked(E: NDArray[np.uint8], weights: Entries, width: int) -> tuple[Terms, Integers]:
+    """One term per entry of each joint's (p, width) weights, and its column; doubt goes by columns."""
+    place = weights.joint * np.int64(width) + weights.column
+    largest = np.zeros((E.shape[0] // 5) * width)
+    np.maximum.at(largest, place, np.abs(weights.value))
+    doubt = COEFFICIENT_NOISE * largest[place]
+    keep = np.abs(weights.value) > doubt
     terms = Terms(
-        np.concatenate(outputs),
-        E[:, np.concatenate(functions)],
-        np.concatenate(values),
-        np.concatenate(uncertainties),
+        weights.joint[keep].astype(np.int64), E[:, weights.row[keep]], weights.value[keep], doubt[keep]
     )
-    return terms, np.concatenate(columns)
+    return terms, weights.column[keep].astype(np.int64)
 
 
 def mass_matrix_terms(torque: Terms, n: int) -> Terms:

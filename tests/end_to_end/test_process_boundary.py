@@ -17,6 +17,8 @@ from psdmc.toolchain.cache_entry import is_sound
 
 PSDMC = [sys.executable, "-m", "psdmc"]
 SCARA = str(robot_path("scara"))
+TWO_LINK_MODEL = str(Path(__file__).parent.parent / "golden" / "two_link" / "two_link.npz")
+"""A model file of psdmc 0.1: it still loads."""
 
 
 @pytest.fixture(scope="module")
@@ -219,14 +221,17 @@ def test_pictures_are_drawn_without_a_home_and_without_a_word(tmp_path: Path):
     assert (done.stdout, done.stderr) == ("<svg\n", "")
 
 
+BESIDE = ("matplotlib", "psdmc.calibration", "psdmc.bench", "psdmc.report")
+"""What commands beside the pipeline are made of."""
+
+
 @pytest.mark.parametrize(
     ("words", "absent"),
     [
-        (["--version"], ("matplotlib", "scipy.signal", "scipy.stats", "psdmc.calibrate", "psdmc.bench")),
-        (
-            ["derive", SCARA, "-o", "m.npz"],
-            ("matplotlib", "scipy.signal", "scipy.stats", "psdmc.calibrate", "psdmc.bench"),
-        ),
+        (["--version"], ("numpy", "scipy", "pinocchio", "jinja2", "rich", *BESIDE)),
+        (["derive", SCARA, "-o", "m.npz"], ("matplotlib", "scipy.signal", "scipy.stats", *BESIDE)),
+        (["show", TWO_LINK_MODEL], ("scipy", "pinocchio", "jinja2", *BESIDE)),
+        (["emit-c", TWO_LINK_MODEL, "-o", "c"], ("scipy", "pinocchio", "rich", *BESIDE)),
         (["--help"], ("matplotlib",)),
     ],
 )
@@ -236,8 +241,9 @@ def test_a_command_loads_what_it_needs(words: list[str], absent: tuple[str, ...]
         f"try: main({words!r})\nexcept SystemExit: pass\n"
         "print('loaded:', *sys.modules, file=sys.stderr)"
     )
+    own = os.environ | {"PSDMC_CACHE_DIR": str(tmp_path / "cache")}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=True, env=own
     )
     loaded = done.stderr.split("loaded:")[1].split()
     assert not set(absent) & set(loaded)
