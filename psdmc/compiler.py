@@ -28,7 +28,7 @@ Progress = Callable[[str], None]
 
 
 def silent(step: str) -> None:
-    """Nobody listens."""
+    """Progress that is not shown."""
 
 
 def derive(

@@ -1,9 +1,11 @@
 """Shared set-up: test helpers beside this file can be imported by name; hypothesis draws the same examples every time,
-or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it."""
+or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it; Ctrl-C
+is heard by the commands under test also where a shell runs the tests in the background and has it ignored."""
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +14,9 @@ import pytest
 from hypothesis import settings
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("explore", derandomize=False)

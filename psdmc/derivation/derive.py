@@ -100,7 +100,7 @@ def _refuse_absurd(chain: Chain) -> None:
 
 
 def _silent(step: str) -> None:
-    """Nobody listens."""
+    """Progress that is not shown."""
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -32,7 +32,7 @@ Progress = Callable[[str], None]
 
 
 def silent(step: str) -> None:
-    """Nobody listens."""
+    """Progress that is not shown."""
 
 
 def excite_command(

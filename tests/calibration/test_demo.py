@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 
 import pytest
@@ -16,11 +15,8 @@ def test_the_virtual_denso_is_found_again(tmp_path: Path, monkeypatch: pytest.Mo
     from psdmc.report.calibrate_demo import run_demo
 
     monkeypatch.chdir(ROOT)
-    begin = time.monotonic()
-
     found = run_demo(tmp_path, ("ideal", "sensors"), workers=min(2, os.cpu_count() or 1))
 
-    assert time.monotonic() - begin < 2 * 300
     ideal, sensors = found["ideal"], found["sensors"]
     assert ideal.torque_constant < 1e-3
     assert ideal.gravity < 1e-3
