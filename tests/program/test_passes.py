@@ -15,6 +15,7 @@ from psdmc.program.passes.absorb_negations import absorb_negations
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.passes.factor_common import factor_common
 from psdmc.program.passes.fold_constants import fold_constants
+from psdmc.program.passes.fuse_sums import fuse_sums
 from psdmc.program.passes.merge_duplicates import merge_duplicates
 from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.pipeline import optimize
@@ -43,6 +44,15 @@ def test_a_pass_run_twice_changes_nothing(apply: pipeline.Pass, some_program: Pr
     once = apply(some_program)
 
     assert apply(once) == once
+
+
+@pytest.mark.parametrize("apply", [factor_common, fuse_sums, optimize], ids=lambda apply: apply.__name__)
+def test_what_reorders_costs_no_more_when_it_is_run_again(apply: pipeline.Pass, some_program: Program):
+    once = drop_unused(apply(some_program))
+    again = drop_unused(apply(once))
+
+    assert cost(again).total <= cost(once).total
+    assert len(again) <= len(once)
 
 
 def test_what_no_output_needs_is_dropped():
