@@ -30,7 +30,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.passes.fuse_sums import FUSED_LATENCY, LATENCY, fuse_sums
 from psdmc.program.passes.schedule import live_values, schedule
-from psdmc.program.pipeline import LAST_FOR_ONE_STATE, LONGEST, ROUND, Pass, optimize
+from psdmc.program.pipeline import LAST, LAST_FOR_ONE_STATE, LONGEST, ROUND, Pass, optimize
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.trace import Tracer
 from psdmc.robot.chain import Chain
@@ -143,7 +143,7 @@ def optimized_without(left_out: Sequence[Pass], program: Program) -> Program:
         if _weight(shorter) >= _weight(program):
             break
         program = shorter
-    return _applied([one for one in LAST_FOR_ONE_STATE if one not in left_out], program)
+    return _applied([one for one in (*LAST, *LAST_FOR_ONE_STATE) if one not in left_out], program)
 
 
 def _applied(some: Sequence[Pass], program: Program) -> Program:

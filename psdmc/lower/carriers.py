@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import NamedTuple
 
@@ -131,6 +131,7 @@ class CarrierSpace:
     tableau: Tableau
     whole: Array
     careful: Careful | None = None
+    _transfers: dict[tuple[int, ...], Array] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def count(self) -> int:
@@ -163,6 +164,12 @@ class CarrierSpace:
 
         An entry is zero where what it would contribute is rounding beside what its base parameter does.
         """
+        key = tuple(carriers)
+        if key not in self._transfers:
+            self._transfers[key] = self._transfer(key)
+        return self._transfers[key]
+
+    def _transfer(self, carriers: tuple[int, ...]) -> Array:
         raw = self._coordinates(carriers)[:, self.count :]
         contribution = np.abs(raw) * self.lengths[list(carriers), None]
         out = np.where(contribution < EXACT * self.whole, 0.0, raw)

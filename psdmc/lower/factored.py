@@ -19,10 +19,11 @@ from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
 from psdmc.lower.carriers import bodies_from_carriers
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.solve import factorize, solve
+from psdmc.program.cost import Cost
 from psdmc.program.functions import BY_NAME
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
-from psdmc.program.trace import Number, Symbol, Tracer
+from psdmc.program.trace import Number, Outputs, Symbol, Tracer
 from psdmc.robot.chain import Array
 
 
@@ -65,15 +66,25 @@ Values = Sequence[Scalar]
 
 def trace_dynamics(name: str, arrangement: Arrangement, theta_b: Array | None) -> Program:
     """The PROGRAM of one function that needs bodies; theta_b None makes it an input."""
-    tracer, function = Tracer(), BY_NAME[name]
+    tracer = Tracer()
+    return drop_unused(tracer.finish(_recorded(name, arrangement, theta_b, tracer)))
+
+
+def cost_of_dynamics(name: str, arrangement: Arrangement, theta_b: Array | None) -> Cost:
+    """What that PROGRAM costs."""
+    tracer = Tracer()
+    return tracer.cost(_recorded(name, arrangement, theta_b, tracer))
+
+
+def _recorded(name: str, arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> Outputs:
+    function = BY_NAME[name]
     n = arrangement.n
     inputs = {vector: tracer.symbols(vector, n) for vector in function.inputs}
     values = _carrier_values(arrangement, theta_b, tracer)
     scaled = in_unit(arrangement.reframed, arrangement.unit)
     bodies, drives = bodies_from_carriers(n, arrangement.carriers, values, arrangement.unit)
     ingredients = Ingredients(scaled, scaled.base, bodies, drives, arrangement.choices, inputs)
-    outputs = _TRACES[name](ingredients)
-    return drop_unused(tracer.finish(outputs))
+    return _TRACES[name](ingredients)
 
 
 def _carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:

@@ -8,7 +8,7 @@ from typing import Literal
 from psdmc.errors import InputError
 from psdmc.lower.expanded import SUPPORTED, lower_expanded
 from psdmc.lower.factored import Arrangement, trace_jacobian, trace_regressor
-from psdmc.lower.search import BATCH, SINGLE, Search, Spaces, Target, all_feet
+from psdmc.lower.search import BATCH, SINGLE, Search, Spaces, Target
 from psdmc.lower.solve import SingularMassMatrix
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.functions import BY_NAME, FUNCTIONS, Function
@@ -134,7 +134,7 @@ class _Lowered:
     def _traces(self, name: str, theta: bool) -> Iterator[Program]:
         search = self._search(theta)
         if name == "jacobian" or name in REGRESSORS:
-            for feet in all_feet(self.model.chain):
+            for feet in search.feet():
                 reframed, _ = search.space(feet)
                 yield (
                     trace_jacobian(reframed)

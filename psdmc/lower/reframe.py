@@ -56,6 +56,18 @@ class Reframed:
     tip: Placement
     base_axes: Matrix
 
+    def is_same(self, other: Reframed) -> bool:
+        """Whether every number of both is."""
+        return (
+            (self.frames, self.base, self.base_axes) == (other.frames, other.base, other.base_axes)
+            and all(map(_is_same, self.link_frames, other.link_frames))
+            and _is_same(self.tip, other.tip)
+        )
+
+
+def _is_same(a: Placement, b: Placement) -> bool:
+    return np.array_equal(a.rotation, b.rotation) and np.array_equal(a.translation, b.translation)
+
 
 def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
     """The chain in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""

@@ -8,7 +8,7 @@ budget is a number of traced programs, not a time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -16,9 +16,9 @@ import numpy as np
 
 from psdmc.dynamics.motion import Choices
 from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace, carrier_space
-from psdmc.lower.factored import Arrangement, trace_dynamics
+from psdmc.lower.factored import Arrangement, cost_of_dynamics, trace_dynamics
 from psdmc.lower.reframe import Foot, Reframed, reframe
-from psdmc.program.cost import cost
+from psdmc.program.cost import Cost, cost
 from psdmc.program.program import Program
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
 
@@ -48,8 +48,11 @@ class Target:
     angles_per_sincos: int
 
     def score(self, program: Program) -> float:
+        """What `weight` gives of the PROGRAM's cost."""
+        return self.weight(cost(program))
+
+    def weight(self, c: Cost) -> float:
         """Operations, with half the weight off those that fuse, and trigonometry."""
-        c = cost(program)
         calls = math.ceil(c.sincos / self.angles_per_sincos)
         operations = c.total - 0.5 * c.fused + 0.1 * c.neg + 8.0 * c.div
         return operations + SINCOS_COST * calls + ANGLE_COST * c.sincos
@@ -87,14 +90,15 @@ class Search:
     ) -> None:
         self.chain, self.representative, self.theta_b, self.budget = chain, representative, theta_b, budget
         self._spaces: Spaces = {} if spaces is None else spaces
+        self._frames: dict[tuple[Foot, ...], Reframed] = {}
 
     def best(self, name: str, target: Target, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function; `start` is one found for another, whose geometry stays."""
-        descent = _Descent(lambda a: trace_dynamics(name, a, self.theta_b), target, self.budget)
+        descent = _Descent(lambda a: target.weight(cost_of_dynamics(name, a, self.theta_b)), self.budget)
         if start is not None:
             descent.consider(replace(start, choices=choices) for choices in DISTINCT.get(name, CHOICES))
         else:
-            for candidate in all_feet(self.chain):
+            for candidate in self.feet():
                 descent.consider(self.starts(candidate))
             descent.consider(self._units(descent.arrangement))
         while descent.consider(self._exchanges(descent.arrangement)):
@@ -107,13 +111,30 @@ class Search:
         return min(self.rearrangements(name, found), key=target.score)
 
     def rearrangements(self, name: str, found: Arrangement) -> Iterator[Program]:
-        """The PROGRAMs that `rearranged` chooses from."""
-        for choices in DISTINCT.get(name, ALL_CHOICES):
-            yield trace_dynamics(name, replace(found, choices=choices), self.theta_b)
+        """The PROGRAMs that `rearranged` chooses from: the cheapest for each target, the others are only counted."""
+        tried = [replace(found, choices=choices) for choices in _felt(found, DISTINCT.get(name, ALL_CHOICES))]
+        costs = [cost_of_dynamics(name, arrangement, self.theta_b) for arrangement in tried]
+        weights = [[target.weight(each) for each in costs] for target in (SINGLE, BATCH)]
+        for best in sorted({each.index(min(each)) for each in weights}):
+            yield trace_dynamics(name, tried[best], self.theta_b)
+
+    def feet(self) -> Iterator[tuple[Foot, ...]]:
+        """Those of `all_feet` that give different frames: parallel and crossing axes have the same foot either way."""
+        seen: list[Reframed] = []
+        for feet in all_feet(self.chain):
+            reframed = self._reframed(feet)
+            if not any(reframed.is_same(other) for other in seen):
+                seen.append(reframed)
+                yield feet
+
+    def _reframed(self, feet: tuple[Foot, ...]) -> Reframed:
+        if feet not in self._frames:
+            self._frames[feet] = reframe(self.chain, feet)
+        return self._frames[feet]
 
     def space(self, feet: tuple[Foot, ...]) -> tuple[Reframed, CarrierSpace]:
         if feet not in self._spaces:
-            reframed = reframe(self.chain, feet)
+            reframed = self._reframed(feet)
             self._spaces[feet] = reframed, carrier_space(reframed, self.representative)
         return self._spaces[feet]
 
@@ -122,8 +143,9 @@ class Search:
         weights = [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
         carriers = space.lightest(weights)
         transfer = space.transfer(carriers)
-        for choices in CHOICES:
-            yield Arrangement(reframed, 1.0, carriers, transfer, choices)
+        plain = Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0])
+        for choices in _felt(plain, CHOICES):
+            yield replace(plain, choices=choices)
 
     def _units(self, found: Arrangement) -> Iterator[Arrangement]:
         """Each length of the robot as the unit; not with sliding joints, whose variables would need scaling."""
@@ -143,14 +165,19 @@ class Search:
                 yield replace(found, carriers=carriers, transfer=transfer)
 
 
+def _felt(arrangement: Arrangement, choices: Iterable[Choices]) -> Iterator[Choices]:
+    """Those that make a difference: without parallel neighbours no turns are compound."""
+    parallel = any(frame.is_parallel for frame in arrangement.reframed.frames[1:])
+    return (each for each in choices if parallel or not each.compound)
+
+
 class _Descent:
     """The cheapest arrangement so far, and what is left of the budget."""
 
     arrangement: Arrangement
-    program: Program
 
-    def __init__(self, trace: Callable[[Arrangement], Program], target: Target, budget: int) -> None:
-        self._trace, self._target, self._left, self._score = trace, target, budget, math.inf
+    def __init__(self, score: Callable[[Arrangement], float], budget: int) -> None:
+        self._score_of, self._left, self._score = score, budget, math.inf
 
     def consider(self, candidates: Iterator[Arrangement]) -> bool:
         """Try candidates in order, moving to each that is cheaper; whether any was."""
@@ -159,10 +186,9 @@ class _Descent:
             if self._left == 0:
                 return False
             self._left -= 1
-            program = self._trace(candidate)
-            score = self._target.score(program)
+            score = self._score_of(candidate)
             if score < self._score:
-                self.arrangement, self.program, self._score, improved = candidate, program, score, True
+                self.arrangement, self._score, improved = candidate, score, True
         return improved
 
 

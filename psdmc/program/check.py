@@ -5,25 +5,48 @@ from __future__ import annotations
 import math
 
 from psdmc.errors import InternalError
-from psdmc.program.program import ARITY, Op, Program
+from psdmc.program.program import ARITY, Instr, Op, Program
+
+_WITH_TWO = frozenset(op for op, count in ARITY.items() if count == 2)
+_WITH_ONE = frozenset(op for op, count in ARITY.items() if count == 1)
 
 
 def check(program: Program, after: str = "tracing") -> Program:
     """The same program; InternalError where a rule is broken, naming the pass that broke it."""
-    for i, (op, args, slot, value) in enumerate(program.body):
-        if len(args) != ARITY[op]:
-            raise InternalError(f"after {after}: t{i} = {op.value} has {len(args)} arguments")
-        if args and (min(args) < 0 or max(args) >= i):
-            raise InternalError(f"after {after}: t{i} uses a value that is not defined before it")
-        if (op is Op.LOAD) != (slot is not None):
-            raise InternalError(f"after {after}: t{i}: loads, and only loads, have a slot")
-        if (op is Op.CONST) != (value is not None):
-            raise InternalError(f"after {after}: t{i}: constants, and only constants, have a value")
-        if value is not None and not math.isfinite(value):
-            raise InternalError(f"after {after}: t{i} is the constant {value}")
+    for i, instr in enumerate(program.body):
+        if not _is_sound(i, instr):
+            raise InternalError(f"after {after}: {_fault(i, instr)}")
     slots = [slot for slot, _ in program.outputs]
     if len(set(slots)) != len(slots):
         raise InternalError(f"after {after}: an output is stored twice")
     if any(not 0 <= index < len(program.body) for _, index in program.outputs):
         raise InternalError(f"after {after}: an output is not defined")
     return program
+
+
+def _is_sound(i: int, instr: Instr) -> bool:
+    """Whether instruction i obeys the rules: asked of every instruction after every pass."""
+    op, args, slot, value = instr
+    if op is Op.LOAD:
+        return slot is not None and value is None and not args
+    if op is Op.CONST:
+        return value is not None and math.isfinite(value) and slot is None and not args
+    if slot is not None or value is not None:
+        return False
+    if len(args) == 2:
+        return op in _WITH_TWO and 0 <= args[0] < i and 0 <= args[1] < i
+    return len(args) == 1 and op in _WITH_ONE and 0 <= args[0] < i
+
+
+def _fault(i: int, instr: Instr) -> str:
+    """Which rule instruction i breaks."""
+    op, args, slot, value = instr
+    if len(args) != ARITY[op]:
+        return f"t{i} = {op.value} has {len(args)} arguments"
+    if args and (min(args) < 0 or max(args) >= i):
+        return f"t{i} uses a value that is not defined before it"
+    if (op is Op.LOAD) != (slot is not None):
+        return f"t{i}: loads, and only loads, have a slot"
+    if (op is Op.CONST) != (value is not None):
+        return f"t{i}: constants, and only constants, have a value"
+    return f"t{i} is the constant {value}"

@@ -125,7 +125,7 @@ class _Replay:
             self.values.append(self._value(instr))
 
     def load(self, slot: Slot) -> Symbol:
-        return Symbol(self.tracer, self.tracer.record(Instr(Op.LOAD, slot=slot)))
+        return self.tracer.symbol(slot)
 
     def finish(self, derivatives: Sequence[tuple[Slot, Value]]) -> Program:
         kept = [(slot, self.values[index]) for slot, index in self.program.outputs]

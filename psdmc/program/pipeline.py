@@ -27,10 +27,13 @@ ROUND: tuple[Pass, ...] = (
 )
 """Repeated while it saves operations: a bracket taken out of one sum may equal another, or be a factor."""
 
-LAST_FOR_ONE_STATE: tuple[Pass, ...] = (merge_duplicates, drop_unused, fuse_sums, schedule)
+LAST: tuple[Pass, ...] = (merge_duplicates, drop_unused)
+"""Before instructions are put in order, for both."""
+
+LAST_FOR_ONE_STATE: tuple[Pass, ...] = (fuse_sums, schedule)
 """One state waits for its chain of dependent operations: make it short."""
 
-LAST_FOR_LANES: tuple[Pass, ...] = (merge_duplicates, drop_unused, schedule)
+LAST_FOR_LANES: tuple[Pass, ...] = (schedule,)
 """Many states hide each other's waiting; what costs them is values that do not fit the registers."""
 
 CROWDED = 1.08
@@ -62,13 +65,15 @@ def shortened(program: Program) -> Program:
 def ordered(short: Program) -> tuple[Program, Program]:
     """A shortened PROGRAM in the order for one state a call, and in that for one state per SIMD lane: the first again
     where it serves both."""
-    for_one, for_lanes = _applied(LAST_FOR_ONE_STATE, short), _applied(LAST_FOR_LANES, short)
+    last = _applied(LAST, short)
+    for_one, for_lanes = _applied(LAST_FOR_ONE_STATE, last), _applied(LAST_FOR_LANES, last)
     return for_one, for_lanes if live_values(for_one) > CROWDED * live_values(for_lanes) else for_one
 
 
 def _applied(passes: tuple[Pass, ...], program: Program) -> Program:
     for apply in passes:
-        program = check(apply(program), after=apply.__name__)
+        passed = apply(program)
+        program = program if passed is program else check(passed, after=apply.__name__)
     return program
 
 

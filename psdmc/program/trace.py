@@ -3,53 +3,120 @@
 Recorded once however often it is written: values are hash-consed, commutative arguments sorted, and a sign is kept
 beside a value rather than computed, so that a - b and b - a, x * y and x * -y are one instruction each. Exact zeros and
 ones disappear; constants fold and merge along products (which reorders floating point).
+
+A search traces some hundred programs: the arithmetic of symbols is written out in place, on plain tuples, and becomes
+instructions only in `finish`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
+from psdmc.program.cost import Cost
 from psdmc.program.program import Instr, Op, Program, Slot
 
 Number = float | int
 
+Step = tuple[Op, Any, Any]
+"""An instruction while it is recorded: its operation and two arguments; of a load the slot, of a constant the value."""
+
+_ADD, _SUB, _MUL, _DIV, _NEG, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SIN, Op.COS
+_LOAD, _CONST = Op.LOAD, Op.CONST
+
+
+Outputs = Sequence[tuple[Slot, "Symbol | Number"]]
+"""What a trace puts out, in order of storing."""
+
 
 class Tracer:
-    """Collects instructions; `symbols` makes inputs, `finish` makes the PROGRAM."""
+    """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
+
+    __slots__ = ("constants", "known", "steps")
 
     def __init__(self) -> None:
-        self.body: list[Instr] = []
-        self._index: dict[Instr, int] = {}
+        self.steps: list[Step] = []
+        self.known: dict[Step, int] = {}
+        self.constants: dict[int, float] = {}
 
     def symbols(self, vector: str, count: int) -> list[Symbol]:
         """Inputs vector[0] ... vector[count - 1]."""
-        return [Symbol(self, self.record(Instr(Op.LOAD, slot=Slot(vector, i)))) for i in range(count)]
+        return [self.symbol(Slot(vector, i)) for i in range(count)]
 
-    def record(self, instr: Instr) -> int:
-        known = self._index.get(instr)
-        if known is None:
-            known = self._index[instr] = len(self.body)
-            self.body.append(instr)
-        return known
+    def symbol(self, slot: Slot) -> Symbol:
+        """One input."""
+        return Symbol(self, self.record((_LOAD, slot, None)))
+
+    def record(self, step: Step) -> int:
+        """The index of a step's value, recorded now or before."""
+        index = self.known.get(step)
+        if index is None:
+            index = self.known[step] = len(self.steps)
+            self.steps.append(step)
+        return index
 
     def constant(self, value: float) -> Symbol:
         """A constant; its sign is kept beside it."""
-        magnitude = self.record(Instr(Op.CONST, value=abs(float(value))))
-        return Symbol(self, magnitude, value < 0)
+        return Symbol(self, self._constant(abs(float(value))), value < 0)
 
-    def finish(self, outputs: Sequence[tuple[Slot, Symbol | Number]]) -> Program:
+    def _constant(self, value: float) -> int:
+        index = self.record((_CONST, value, None))
+        self.constants[index] = value
+        return index
+
+    def finish(self, outputs: Outputs) -> Program:
         """The PROGRAM that stores the given values; a negative one costs a negation."""
+        stored = self._stored(outputs)
+        return Program(tuple(map(_instruction, self.steps)), tuple(stored))
+
+    def cost(self, outputs: Outputs) -> Cost:
+        """What `finish` would give, without what no output needs: for searches, which only compare."""
+        stored = self._stored(outputs)
+        steps, uses = self.steps, [0] * len(self.steps)
+        for _, index in stored:
+            uses[index] += 1
+        count = dict.fromkeys(Op, 0)
+        sums: list[tuple[int, int]] = []
+        angles: set[int] = set()
+        for index in range(len(steps) - 1, -1, -1):
+            if not uses[index]:
+                continue
+            op, a, b = steps[index]
+            count[op] += 1
+            if b is not None:
+                uses[a] += 1
+                uses[b] += 1
+                if op is _ADD or op is _SUB:
+                    sums.append((a, b))
+            elif op is not _LOAD and op is not _CONST:
+                uses[a] += 1
+                if op is not _NEG:
+                    angles.add(a)
+        fused = sum(
+            (uses[a] == 1 and steps[a][0] is _MUL) or (uses[b] == 1 and steps[b][0] is _MUL) for a, b in sums
+        )
+        return Cost(count[_MUL], len(sums), count[_DIV], count[_NEG], len(angles), fused)
+
+    def _stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
         stored: list[tuple[Slot, int]] = []
         for slot, value in outputs:
-            symbol = value if isinstance(value, Symbol) else None
-            if symbol is None:
-                index = self.record(Instr(Op.CONST, value=float(value) + 0.0))  # type: ignore[arg-type]
-            elif symbol.negative:
-                index = self.record(Instr(Op.NEG, (symbol.index,)))
+            if not isinstance(value, Symbol):
+                index = self._constant(float(value) + 0.0)
+            elif value.negative:
+                index = self.record((_NEG, value.index, None))
             else:
-                index = symbol.index
+                index = value.index
             stored.append((slot, index))
-        return Program(tuple(self.body), tuple(stored))
+        return stored
+
+
+def _instruction(step: Step) -> Instr:
+    op, a, b = step
+    if b is not None:
+        return Instr(op, (a, b))
+    if op is _LOAD:
+        return Instr(op, slot=a)
+    return Instr(op, value=a) if op is _CONST else Instr(op, (a,))
 
 
 class Symbol:
@@ -59,7 +126,9 @@ class Symbol:
     __array_ufunc__ = None
 
     def __init__(self, tracer: Tracer, index: int, negative: bool = False) -> None:
-        self.tracer, self.index, self.negative = tracer, index, negative
+        self.tracer = tracer
+        self.index = index
+        self.negative = negative
 
     def __neg__(self) -> Symbol:
         return Symbol(self.tracer, self.index, not self.negative)
@@ -68,89 +137,92 @@ class Symbol:
         return self
 
     def __add__(self, other: Symbol | Number) -> Symbol | float:
-        return _sum(self.tracer, self, other)
+        if isinstance(other, Symbol):
+            return _sum(self.tracer, self.index, self.negative, other.index, other.negative)
+        return self if other == 0 else self + self.tracer.constant(other)
 
     __radd__ = __add__
 
     def __sub__(self, other: Symbol | Number) -> Symbol | float:
-        return _sum(self.tracer, self, -other)
+        if isinstance(other, Symbol):
+            return _sum(self.tracer, self.index, self.negative, other.index, not other.negative)
+        return self if other == 0 else self + self.tracer.constant(-other)
 
     def __rsub__(self, other: Number) -> Symbol | float:
-        return _sum(self.tracer, -self, other)
+        return -self + other
 
     def __mul__(self, other: Symbol | Number) -> Symbol | float:
-        return _product(self.tracer, self, other)
+        if not isinstance(other, Symbol):
+            if other == 0:
+                return 0.0
+            if other == 1:
+                return self
+            return -self if other == -1 else _scaled(self, other)
+        tracer, a, b = self.tracer, self.index, other.index
+        if b in tracer.constants:
+            return _scaled(self, -tracer.constants[b] if other.negative else tracer.constants[b])
+        step = (_MUL, a, b) if a < b else (_MUL, b, a)
+        index = tracer.known.get(step)
+        if index is None:
+            index = tracer.known[step] = len(tracer.steps)
+            tracer.steps.append(step)
+        return Symbol(tracer, index, self.negative is not other.negative)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Symbol | Number) -> Symbol | float:
         if not isinstance(other, Symbol):
-            return _product(self.tracer, self, 1.0 / other)
+            return self * (1.0 / other)
         divisor = other.constant_value()
-        return _quotient(self.tracer, self, other) if divisor is None else self / divisor
+        return _quotient(self, other) if divisor is None else self / divisor
 
     def __rtruediv__(self, other: Number) -> Symbol | float:
-        return 0.0 if other == 0 else _quotient(self.tracer, self.tracer.constant(float(other)), self)
+        return 0.0 if other == 0 else _quotient(self.tracer.constant(float(other)), self)
 
     def sincos(self) -> tuple[Symbol, Symbol]:
-        sine = self.tracer.record(Instr(Op.SIN, (self.index,)))
-        cosine = self.tracer.record(Instr(Op.COS, (self.index,)))
+        sine = self.tracer.record((_SIN, self.index, None))
+        cosine = self.tracer.record((_COS, self.index, None))
         return Symbol(self.tracer, sine, self.negative), Symbol(self.tracer, cosine)
 
     def constant_value(self) -> float | None:
-        value = self.tracer.body[self.index].value
-        return None if value is None else (-value if self.negative else value)
+        value = self.tracer.constants.get(self.index)
+        return -value if value is not None and self.negative else value
 
 
-def _as_symbol(tracer: Tracer, value: Symbol | Number) -> Symbol:
-    return value if isinstance(value, Symbol) else tracer.constant(float(value))
-
-
-def _sum(tracer: Tracer, a: Symbol, other: Symbol | Number) -> Symbol | float:
-    if not isinstance(other, Symbol) and other == 0:
-        return a
-    b = _as_symbol(tracer, other)
-    if a.index == b.index and a.negative != b.negative:
+def _sum(tracer: Tracer, a: int, a_negative: bool, b: int, b_negative: bool) -> Symbol | float:
+    """The sum of two signed values: an addition with a sign, or a difference of the earlier and the later one."""
+    if a_negative is b_negative:
+        step, negative = ((_ADD, a, b) if a < b else (_ADD, b, a)), a_negative
+    elif a == b:
         return 0.0
-    if a.negative == b.negative:
-        low, high = sorted((a.index, b.index))
-        return Symbol(tracer, tracer.record(Instr(Op.ADD, (low, high))), a.negative)
-    plus, minus = (b, a) if a.negative else (a, b)
-    if plus.index < minus.index:
-        return Symbol(tracer, tracer.record(Instr(Op.SUB, (plus.index, minus.index))))
-    return Symbol(tracer, tracer.record(Instr(Op.SUB, (minus.index, plus.index))), True)
+    elif a < b:
+        step, negative = (_SUB, a, b), a_negative
+    else:
+        step, negative = (_SUB, b, a), b_negative
+    index = tracer.known.get(step)
+    if index is None:
+        index = tracer.known[step] = len(tracer.steps)
+        tracer.steps.append(step)
+    return Symbol(tracer, index, negative)
 
 
-def _product(tracer: Tracer, a: Symbol, other: Symbol | Number) -> Symbol | float:
-    if not isinstance(other, Symbol):
-        if other == 0:
-            return 0.0
-        if abs(other) == 1:
-            return a if other > 0 else -a
-        return _scaled(tracer, a, float(other))
-    value = other.constant_value()
-    if value is not None:
-        return _scaled(tracer, a, value)
-    low, high = sorted((a.index, other.index))
-    return Symbol(tracer, tracer.record(Instr(Op.MUL, (low, high))), a.negative != other.negative)
-
-
-def _scaled(tracer: Tracer, a: Symbol, factor: float) -> Symbol | float:
+def _scaled(a: Symbol, factor: Number) -> Symbol | float:
     """A constant times a value; constants along a product become one."""
     own = a.constant_value()
     if own is not None:
         return own * factor
-    instr = tracer.body[a.index]
-    if instr.op is Op.MUL:
-        for this, rest in (instr.args, instr.args[::-1]):
-            inner = tracer.body[this].value
+    tracer = a.tracer
+    op, left, right = tracer.steps[a.index]
+    if op is _MUL:
+        for this, rest in ((left, right), (right, left)):
+            inner = tracer.constants.get(this)
             if inner is not None:
-                return _product(tracer, Symbol(tracer, rest, a.negative), inner * factor)
+                return Symbol(tracer, rest, a.negative) * (inner * factor)
     constant = tracer.constant(factor)
-    low, high = sorted((a.index, constant.index))
-    return Symbol(tracer, tracer.record(Instr(Op.MUL, (low, high))), a.negative != constant.negative)
+    low, high = (a.index, constant.index) if a.index < constant.index else (constant.index, a.index)
+    return Symbol(tracer, tracer.record((_MUL, low, high)), a.negative is not constant.negative)
 
 
-def _quotient(tracer: Tracer, a: Symbol, b: Symbol) -> Symbol:
-    index = tracer.record(Instr(Op.DIV, (a.index, b.index)))
-    return Symbol(tracer, index, a.negative != b.negative)
+def _quotient(a: Symbol, b: Symbol) -> Symbol:
+    index = a.tracer.record((_DIV, a.index, b.index))
+    return Symbol(a.tracer, index, a.negative is not b.negative)

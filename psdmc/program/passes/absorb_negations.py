@@ -17,7 +17,10 @@ def absorb_negations(program: Program) -> Program:
     Gives:  never more operations than before; every instruction is needed.
     """
     program = drop_unused(program)
-    while (after := _absorbed_once(program)) != program:  # each change leaves fewer uses of negations
+    while any(instr.op is Op.NEG for instr in program.body):
+        after = _absorbed_once(program)
+        if after == program:  # each change leaves fewer uses of negations
+            break
         program = after
     return program
 
@@ -29,13 +32,17 @@ def _absorbed_once(program: Program) -> Program:
 def _into_uses(program: Program) -> Program:
     body: list[Instr] = []
     new_index: list[int] = []
+    negations: set[int] = set()
     for instr in program.body:
-        moved = _absorbed(instr.renumbered(new_index), body)
-        if isinstance(moved, int):
-            new_index.append(moved)
-        else:
-            body.append(moved)
-            new_index.append(len(body) - 1)
+        moved = instr.renumbered(new_index)
+        taken = moved if negations.isdisjoint(moved.args) else _absorbed(moved, body)
+        if isinstance(taken, int):
+            new_index.append(taken)
+            continue
+        if taken.op is Op.NEG:
+            negations.add(len(body))
+        new_index.append(len(body))
+        body.append(taken)
     return Program(tuple(body), tuple((slot, new_index[i]) for slot, i in program.outputs))
 
 

@@ -28,12 +28,18 @@ def fold_constants(program: Program) -> Program:
     """
     body: list[Instr] = []
     new_index: list[int] = []
+    constants: set[int] = set()
     for instr in program.body:
         moved = instr.renumbered(new_index)
-        known = _argument_that_it_equals(moved, body)
+        known = None
+        if not constants.isdisjoint(moved.args):
+            known = _argument_that_it_equals(moved, body)
+            moved = _folded(moved, body)
         if known is None:
-            body.append(_folded(moved, body))
-            known = len(body) - 1
+            known = len(body)
+            body.append(moved)
+            if moved.value is not None:
+                constants.add(known)
         new_index.append(known)
     return Program(tuple(body), tuple((slot, new_index[i]) for slot, i in program.outputs))
 

@@ -94,7 +94,7 @@ class _Fusion:
         """Add the two terms that are done soonest until one is left."""
         parts = [_Part(negative, self._operands(index), self.new_index[index]) for negative, index in terms]
         parts.sort(key=lambda part: part.value)
-        while len(parts) > 1:
+        while len(parts) > 2:
             first = min(range(len(parts)), key=lambda k: (self._done(parts[k]), k))
             second = min(
                 (k for k in range(len(parts)) if k != first),
@@ -104,7 +104,7 @@ class _Fusion:
             total = self._add(parts[low], parts[high])
             parts[low] = total
             del parts[high]
-        return parts[0].value
+        return self._add(*parts).value
 
     def _operands(self, index: int) -> tuple[int, ...]:
         """Factors of a product that an addition may swallow."""

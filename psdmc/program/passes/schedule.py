@@ -24,20 +24,21 @@ def schedule(program: Program) -> Program:
 def live_values(program: Program) -> int:
     """Sum over all instructions of the values alive behind it; loads and constants do not count."""
     last = list(range(len(program.body)))
-    for i, instr in enumerate(program.body):
-        for a in instr.args:
+    for i, (_, args, _, _) in enumerate(program.body):
+        for a in args:
             last[a] = i
-    return sum(last[i] - i for i, instr in enumerate(program.body) if instr.args)
+    return sum(last[i] - i for i, (_, args, _, _) in enumerate(program.body) if args)
 
 
 def _need(program: Program) -> list[int]:
     """Values alive at once while one value is computed, if nothing were shared."""
     need: list[int] = []
-    for instr in program.body:
-        wanted = sorted((need[a] for a in instr.args), reverse=True)
-        need.append(max((n + i for i, n in enumerate(wanted)), default=0) if wanted else 0)
-        if instr.args:
-            need[-1] = max(1, need[-1])
+    for _, args, _, _ in program.body:
+        if len(args) == 2:
+            first, second = need[args[0]], need[args[1]]
+            need.append(max(first, second, 1) if first != second else first + 1)
+        else:
+            need.append(max(need[args[0]], 1) if args else 0)
     return need
 
 
@@ -56,8 +57,10 @@ def _depth_first(program: Program) -> list[int]:
                 order.append(index)
                 continue
             stack.append((index, True))
-            arguments = sorted(program.body[index].args, key=lambda a: (need[a], -a))
-            stack.extend((a, False) for a in arguments)
+            args = program.body[index].args
+            if len(args) == 2 and (need[args[0]], -args[0]) > (need[args[1]], -args[1]):
+                args = args[::-1]
+            stack.extend([(a, False) for a in args if not placed[a]])
     return order
 
 
