@@ -202,12 +202,13 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     columns = samples.astype(np.float64)
     scale = np.linalg.norm(columns, axis=0)
     scale[scale < 1e-12 * np.max(scale)] = 1.0
-    u, sizes, _ = np.linalg.svd(columns / scale, full_matrices=False)
+    triangle = np.linalg.qr(columns / scale, mode="r")  # a small matrix with the same singular values
+    u, sizes, _ = np.linalg.svd(triangle, full_matrices=False)
     rank = int(np.sum(sizes > 1e-12 * sizes[0]))
-    compact = u[:, :rank].T @ columns
+    compact = u[:, :rank].T @ (triangle * scale)
     compact[:, np.linalg.norm(columns, axis=0) < 1e-12 * np.max(scale)] = 0.0
     basis = _lightest(compact, [1.0] * compact.shape[1])
-    target = times(samples, lift)
+    target = _combined(samples, lift)
     whole = np.linalg.norm(target.astype(np.float64), axis=0)
     both = np.hstack([samples, target])
     space = CarrierSpace(compact, Tableau.of(both, basis), whole)
@@ -215,6 +216,14 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     if rank >= len(whole) and _is_fair(space, samples, target, units):
         return space
     return _careful_space(samples, target, units[0])
+
+
+def _combined(columns: Long, weights: Long) -> Long:
+    """columns @ weights, term by term, where few weights are not zero."""
+    total = np.zeros((len(columns), weights.shape[1]), columns.dtype)
+    for row, column in zip(*np.nonzero(weights), strict=True):
+        total[:, column] += columns[:, row] * weights[row, column]
+    return total
 
 
 def _careful_space(samples: Long, target: Long, units: Array) -> CarrierSpace:
@@ -259,19 +268,21 @@ def _units(reframed: Reframed, representative: Array) -> tuple[Array, Array]:
 
 def _lightest(columns: Array, weights: Sequence[float]) -> tuple[int, ...]:
     """The basis of least weight among columns; ties go to the earlier one."""
-    order = sorted(range(columns.shape[1]), key=lambda j: (weights[j], j))
+    size = {j: np.linalg.norm(columns[:, j]) for j in range(columns.shape[1])}
+    order = sorted((j for j in size if size[j] != 0.0), key=lambda j: (weights[j], j))
     chosen: list[int] = []
     rank = columns.shape[0]
     basis = np.zeros((rank, 0))
     for share, j in product(INDEPENDENT, order):
-        column = columns[:, j]
-        length = np.linalg.norm(column)
-        if length == 0.0 or len(chosen) == rank or j in chosen:
+        if len(chosen) == rank:
+            break
+        if j in chosen:
             continue
-        rest = column - basis @ (basis.T @ column)
+        rest = columns[:, j] - basis @ (basis.T @ columns[:, j])
         rest -= basis @ (basis.T @ rest)
-        if np.linalg.norm(rest) > share * length:
-            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+        left = np.linalg.norm(rest)
+        if left > share * size[j]:
+            basis = np.column_stack([basis, rest / left])
             chosen.append(j)
     return tuple(sorted(chosen))
 

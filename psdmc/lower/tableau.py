@@ -31,15 +31,21 @@ class Tableau:
     @staticmethod
     def of(columns: Long, basis: Sequence[int]) -> Tableau:
         """By Gauss-Jordan elimination with row pivots; the basis's columns must be independent."""
-        rest = columns.copy()
+        others = np.setdiff1d(np.arange(columns.shape[1]), basis)
+        rest = columns[:, [*basis, *others]]
         rows: list[int] = []
-        for j in basis:
-            free = np.abs(rest[:, j])
+        for k in range(len(basis)):
+            free = np.abs(rest[:, k])
             free[rows] = -1.0
             row = int(np.argmax(free))
             rows.append(row)
-            _pivot(rest, row, j)
-        return Tableau(tuple(basis), rest[rows])
+            behind = rest[row, k + 1 :] / rest[row, k]
+            rest[:, k + 1 :] -= rest[:, k, None] * behind
+            rest[row, k + 1 :] = behind
+        entries = np.zeros((len(basis), columns.shape[1]), columns.dtype)
+        entries[:, others] = rest[rows, len(basis) :]
+        entries[range(len(basis)), list(basis)] = 1.0
+        return Tableau(tuple(basis), entries)
 
     def within(self, basis: Sequence[int]) -> Tableau:
         """The same columns in another basis, which must be one."""

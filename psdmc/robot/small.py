@@ -16,7 +16,7 @@ def times(a: Array, b: Array) -> Any:
     wide = b.ndim == 2
     total = a[..., 0, None] * b[0] if wide else a[..., 0] * b[0]
     for k in range(1, b.shape[0]):
-        total = total + (a[..., k, None] * b[k] if wide else a[..., k] * b[k])
+        total += a[..., k, None] * b[k] if wide else a[..., k] * b[k]
     return total
 
 
