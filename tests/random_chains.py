@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Placement
+from psdmc.robot.joints import PRISMATIC, REVOLUTE
 
 RIGHT_ANGLES = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 
@@ -23,7 +24,7 @@ def random_chain(
             Joint(
                 f"joint{i + 1}",
                 f"link{i + 1}",
-                "revolute" if kind == "R" else "prismatic",
+                REVOLUTE if kind == "R" else PRISMATIC,
                 placement,
                 Placement(_rotation(rng), rng.uniform(-0.2, 0.2, 3)),
             )
@@ -68,7 +69,7 @@ class Oracle:
         self.chain = chain
         model, parent = pin.Model(), 0
         for i, joint in enumerate(chain.joints):
-            kind = pin.JointModelRZ() if joint.kind == "revolute" else pin.JointModelPZ()
+            kind = {"revolute": pin.JointModelRZ, "prismatic": pin.JointModelPZ}[joint.kind]()
             place = pin.SE3(joint.placement.rotation.copy(), joint.placement.translation.copy())
             parent = model.addJoint(parent, kind, place, joint.name)
             link = pin.SE3(joint.link_frame.rotation.copy(), joint.link_frame.translation.copy())

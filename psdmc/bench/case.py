@@ -82,15 +82,15 @@ def physical_body(rng: np.random.Generator) -> Array:
 def robot_as_numbers(chain: Chain) -> str:
     """The chain as plain text for rivals: exact placements, bodies about the joint frames, no parser in between.
 
-    n and gravity; then per joint its kind, rotation (9, row-major), translation (3), body (10 standard parameters about
-    the joint frame) and drive inertia.
+    n and gravity; then per joint Pinocchio's word for its type, parent (0 the base, else counted from 1), rotation (9,
+    row-major), translation (3), body (10 standard parameters about the joint frame) and drive inertia.
     """
     lines = [f"{len(chain)} {_numbers(chain.gravity)}"]
-    for joint, row in zip(chain.joints, chain.parameters, strict=True):
+    for joint, parent, row in zip(chain.joints, chain.parents, chain.parameters, strict=True):
         body = times(joint_frame_map(joint.link_frame), row[:DRIVE])
         placement = joint.placement
         lines.append(
-            f"{joint.kind} {_numbers(placement.rotation)} {_numbers(placement.translation)} "
+            f"{joint.type.pinocchio} {parent + 1} {_numbers(placement.rotation)} {_numbers(placement.translation)} "
             f"{_numbers(body)} {float(row[DRIVE])!r}"
         )
     return "\n".join(lines)

@@ -12,6 +12,7 @@ from psdmc.bench.case import FLOOR_MOUNT, Case, generic_chain
 from psdmc.bench.fresh import derive_fresh
 from psdmc.errors import InputError
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Placement
+from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.load import load_robot
 from psdmc.robot.small import length
 
@@ -62,7 +63,7 @@ def oblique_chain(n: int, seed: int) -> Chain:
     """n revolute joints about axes that neither meet nor stand parallel or square: nothing to exploit."""
     rng = np.random.default_rng(seed)
     joints = tuple(
-        Joint(f"joint{i + 1}", f"link{i + 1}", "revolute", _anywhere(rng), Placement.identity())
+        Joint(f"joint{i + 1}", f"link{i + 1}", REVOLUTE, _anywhere(rng), Placement.identity())
         for i in range(n)
     )
     return Chain(

@@ -10,7 +10,8 @@ import numpy as np
 from psdmc.bench.case import Case, generic_chain
 from psdmc.bench.cases import bundled_chain, first_joints
 from psdmc.bench.fresh import derive_fresh
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Placement, serial_parents
+from psdmc.robot.joints import REVOLUTE
 
 JOINTS = (2, 3, 4, 5, 6, 7, 8)
 SEED = 8
@@ -35,8 +36,15 @@ def eight_joints(lbr: Chain) -> Chain:
         np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.array([0.0, 0.0, 0.2])
     )
     last = lbr.joints[-1]
-    extra = Joint("joint_extra", "link_extra", "revolute", last.placement, turn)
+    extra = Joint("joint_extra", "link_extra", REVOLUTE, last.placement, turn)
     joints = (*lbr.joints[:-1], extra, replace(last, placement=turn))
     rows = PARAMETERS_PER_LINK * len(joints)
     parameters = np.vstack([lbr.parameters[:-1], lbr.parameters[-1:], lbr.parameters[-1:]])
-    return replace(lbr, joints=joints, parameters=parameters, parameter_span=np.eye(rows))
+    return replace(
+        lbr,
+        joints=joints,
+        parameters=parameters,
+        parameter_span=np.eye(rows),
+        parents=serial_parents(len(joints)),
+        tip_body=len(joints) - 1,
+    )

@@ -16,10 +16,6 @@ from psdmc.robot.chain import Array, Chain
 COUNT = 65_536
 """States per trial: with a thousand the branch predictor learns glibc's sincos by heart."""
 
-REVOLUTE_RANGE = (np.radians(170.0), 3.0, 15.0)
-PRISMATIC_RANGE = (0.3, 0.5, 3.0)
-"""Largest q, qd, qdd drawn: rad, m and their rates. Limits of ordinary arms."""
-
 CACHE_LINE = 64
 """Every contestant's arrays start at one, as a careful user's would; where malloc puts them is luck."""
 
@@ -56,7 +52,7 @@ class States:
     def random(chain: Chain, count: int, seed: int) -> States:
         """Uniform within an ordinary arm's limits."""
         rng = np.random.default_rng(seed)
-        ranges = np.array([REVOLUTE_RANGE if turns else PRISMATIC_RANGE for turns in chain.is_revolute])
+        ranges = np.array([joint.ordinary for joint in chain.types])
         q, qd, qdd = (rng.uniform(-1.0, 1.0, (count, len(chain))) * ranges[:, k] for k in range(3))
         return States(chain, q, qd, qdd)
 

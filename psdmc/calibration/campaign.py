@@ -123,8 +123,8 @@ def bounded(chain: Chain, acceleration: float | None) -> Chain:
     joints = []
     for joint in chain.joints:
         limits = joint.limits
-        if joint.kind == "revolute" and not np.isfinite([limits.lower, limits.upper]).any():
-            limits = replace(limits, lower=-np.pi, upper=np.pi)
+        if joint.type.comes_round and not np.isfinite([limits.lower, limits.upper]).any():
+            limits = replace(limits, lower=-joint.type.free_range, upper=joint.type.free_range)
         if not np.isfinite(limits.acceleration) and acceleration is not None:
             limits = replace(limits, acceleration=acceleration)
         joints.append(replace(joint, limits=limits))

@@ -64,16 +64,16 @@ def _sizes(found: Summary) -> str:
 def _joints(joints: Sequence[Joint], errors: Sequence[float]) -> Table:
     table = Table("joint", "link", "type", "position", "speed", "acceleration", "effort", "error")
     for joint, error in zip(joints, errors, strict=True):
-        unit = "rad" if joint.kind == "revolute" else "m"
+        unit = joint.type.position_unit
         limits = joint.limits
         table.add_row(
             escape(joint.name),
             escape(joint.link_name),
-            joint.kind,
+            joint.type.word,
             _range(limits.lower, limits.upper, unit),
             _limit(limits.speed, f"{unit}/s"),
             _limit(limits.acceleration, f"{unit}/s^2"),
-            _limit(limits.effort, "N m" if joint.kind == "revolute" else "N"),
+            _limit(limits.effort, joint.type.effort_unit),
             f"{error:.1e}",
         )
     return table

@@ -58,7 +58,7 @@ def derive_model(
     tell = progress or _silent
     _refuse_absurd(chain)
     if expand:
-        refuse_long(0, [joint.kind for joint in chain.joints])
+        refuse_long(0, chain.types)
     robot = scaled(chain)
     tell("base parameters")
     reduction = reduction_of(robot)
@@ -126,9 +126,9 @@ def _equation_noise(reduction: Reduction) -> float:
 
 def base_map(robot: Scaled, reduction: Reduction) -> Array:
     """B (l, 11 n) in SI: base parameters from standard parameters, which the span's leading rows are."""
-    units = parameter_units(robot.kinds, robot.unit)[robot.leads]
+    units = parameter_units(robot.types, robot.unit)[robot.leads]
     echelon = reduction.echelon * units[reduction.pivots][:, None] / units
-    B = np.zeros((len(reduction.pivots), PARAMETERS_PER_LINK * len(robot.kinds)))
+    B = np.zeros((len(reduction.pivots), PARAMETERS_PER_LINK * len(robot.types)))
     noise = _equation_noise(reduction) * np.abs(echelon.reshape(-1))
     B[:, robot.leads] = merged(echelon.reshape(-1), noise).reshape(echelon.shape)
     return B

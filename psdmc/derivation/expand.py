@@ -26,6 +26,7 @@ from psdmc.derivation.rounding import merged
 from psdmc.derivation.terms import Terms, joined, times_matrix
 from psdmc.derivation.units import Scaled, function_units, parameter_units, torque_units
 from psdmc.derivation.velocity import acceleration_terms, velocity_terms
+from psdmc.dynamics.kinematics import carried_by
 from psdmc.dynamics.scalar import Vector
 from psdmc.model.expansion import Expansion
 
@@ -58,25 +59,26 @@ EXTENDED = Precision(1e-15, 1e-16)
 def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int | None = None) -> Expansion:
     """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of
     what is free)."""
-    kinds, precision = scaled.kinds, precision_for(scaled, reduction)
+    types, precision = scaled.types, precision_for(scaled, reduction)
     if precision is EXTENDED:
         scaled = extended(scaled)
-    functions = Functions(kinds)
+    functions = Functions(types)
     available = available_memory() if memory is None else memory
-    refuse_beyond(grid_bytes(kinds), available, largest_function_count(kinds), len(kinds))
+    refuse_beyond(grid_bytes(types), available, largest_function_count(types), len(types))
     progress("mass matrix")
     chosen = scaled.span[:, reduction.pivots]
     mass = _mass_matrix(scaled, chosen, functions, precision.zero)
     progress("gravity")
     gravity = _gravity(scaled, chosen, functions, precision.zero)
     progress("velocity terms")
-    count, needed = velocity_bytes(mass, functions)
-    refuse_long(count, kinds)
-    refuse_beyond(needed, available, min(count, largest_function_count(kinds)), len(kinds))
-    velocity = velocity_terms(mass, functions, precision.zero)
+    carried = carried_by(scaled.frames)
+    count, needed = velocity_bytes(mass, functions, carried)
+    refuse_long(count, types)
+    refuse_beyond(needed, available, min(count, largest_function_count(types)), len(types))
+    velocity = velocity_terms(mass, functions, carried, precision.zero)
     progress("reduction matrices")
     terms = joined([gravity, acceleration_terms(mass, functions), velocity])
-    units = parameter_units(kinds, scaled.unit)[scaled.leads[reduction.pivots]]
+    units = parameter_units(types, scaled.unit)[scaled.leads[reduction.pivots]]
     return Expansion.of(*assembled(terms, functions, units, scaled.unit, precision.noise))
 
 
@@ -116,10 +118,10 @@ def assembled(
     """
     keys, place = np.unique(terms.function, return_inverse=True)
     exponents = functions.exponents(keys)
-    kinds = functions.kinds
+    types = functions.types
     shape = (len(keys), len(units))
-    to_si = torque_units(kinds, unit)[terms.row]
-    to_si /= function_units(exponents, kinds, unit)[place] * np.asarray(units)[terms.column]
+    to_si = torque_units(types, unit)[terms.row]
+    to_si /= function_units(exponents, types, unit)[place] * np.asarray(units)[terms.column]
     noise = value_noise * np.maximum(1.0, np.abs(terms.value)) * to_si
     values = merged((terms.value * to_si).astype(np.float64), noise.astype(np.float64))
     matrices = []

@@ -17,12 +17,13 @@ from scipy import sparse
 
 from psdmc.derivation.expand import COEFFICIENT_TOLERANCE, assembled
 from psdmc.derivation.functions import Functions
-from psdmc.derivation.interpolate import QUADRATIC_SIZE, along_axes, interpolation, nodes
+from psdmc.derivation.interpolate import along_axes, interpolation, nodes, quadratic_sizes
 from psdmc.derivation.memory import available_memory, largest_function_count, refuse_beyond
 from psdmc.derivation.reduce import Reduction, reduced, row_space
 from psdmc.derivation.terms import Terms, joined, restricted
 from psdmc.errors import InputError
-from psdmc.robot.chain import JointKind
+from psdmc.robot.joints import JOINT_TYPES, JointType
+from psdmc.robot.limits import shown
 
 Array = NDArray[np.float64]
 TorqueFunction = Callable[[Array, Array, Array, Array, float], Array]
@@ -66,7 +67,7 @@ class SampledModel:
 
 def derive_from_callable(
     f: TorqueFunction,
-    kinds: Sequence[JointKind],
+    kinds: Sequence[str],
     parameter_names: Sequence[str],
     *,
     vectorised: bool = False,
@@ -79,19 +80,20 @@ def derive_from_callable(
     gravity,
                      1 being its full strength; returns (n,). With `vectorised`, states (m, n) to torques (m,
                      n).
-    kinds            of the n joints, base to tip
+    kinds            of the n joints, base to tip: "revolute" or "prismatic"
     parameter_names  k, in the order of X, which is also the order in which pivots are chosen
     length           m, the robot's size: prismatic joints are sampled at -length, 0 and length
     memory           bytes that the grids may take; default: most of what the machine has free
     Raises InputError where f returns something else or is no such function, DerivationError where it does not
     fit.
     """
-    functions = Functions(tuple(kinds))
+    types = _types(kinds)
+    functions = Functions(types)
     names = tuple(parameter_names)
-    cells = int(np.prod([QUADRATIC_SIZE[kind] for kind in kinds], dtype=np.int64))
+    cells = int(np.prod(quadratic_sizes(types), dtype=np.int64))
     needed = cells * functions.n * len(names) * 8 * 6
     refuse_beyond(
-        needed, available_memory() if memory is None else memory, largest_function_count(kinds), functions.n
+        needed, available_memory() if memory is None else memory, largest_function_count(types), functions.n
     )
     sample = _Sampler(f, functions, len(names), vectorised, length)
     terms = joined(list(_all_terms(sample)))
@@ -99,6 +101,13 @@ def derive_from_callable(
     pivots = restricted(terms, reduction.pivots)
     E, P = assembled(pivots, functions, np.ones(len(reduction.pivots)), 1.0)
     return _certified(E, P, reduction, names, sample)
+
+
+def _types(kinds: Sequence[str]) -> tuple[JointType, ...]:
+    unknown = [kind for kind in kinds if kind not in JOINT_TYPES]
+    if unknown:
+        raise InputError(f"joint type {shown(unknown[0])} is not known", f"one of {', '.join(JOINT_TYPES)}")
+    return tuple(JOINT_TYPES[kind] for kind in kinds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +120,7 @@ class _Sampler:
 
     def grid(self) -> Array:
         """(cells, n) tensor grid of joint positions, the first joint slowest."""
-        axes = [nodes(kind) * (self.length if kind == "prismatic" else 1.0) for kind in self.functions.kinds]
+        axes = [nodes(joint) * self.length**joint.length_order for joint in self.functions.types]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, self.functions.n)
 
     def torques(self, q: Array, qd: Array, qdd: Array, X: Array, gravity_scale: float) -> Array:
@@ -141,19 +150,18 @@ class _Sampler:
 
     def terms(self, values: Array, rate: int) -> Terms:
         """Torque terms from per-parameter values on the grid."""
-        kinds = self.functions.kinds
-        sizes = [QUADRATIC_SIZE[kind] for kind in kinds]
+        types = self.functions.types
+        joints, sizes = range(len(types)), quadratic_sizes(types)
         batch = values.reshape(-1, values.shape[-1])
-        flat = along_axes([interpolation(kind) for kind in kinds], np.ascontiguousarray(batch.T))
+        flat = along_axes([interpolation(joint) for joint in types], np.ascontiguousarray(batch.T))
         found: Array = flat.reshape(values.shape)
         largest = np.abs(found).max(initial=0.0)
         column, row, place = np.nonzero(np.abs(found) > COEFFICIENT_TOLERANCE * max(1.0, largest))
-        codes = self.functions.tensor_codes(0, sizes)[place] + rate * self.functions.codes
+        codes = self.functions.tensor_codes(joints, sizes)[place] + rate * self.functions.codes
         in_metres = np.ones(found.shape[-1])
-        for joint, kind in enumerate(kinds):
-            if kind == "prismatic":
-                digits = self.functions.digit(self.functions.tensor_codes(0, sizes), joint)
-                in_metres /= self.length**digits
+        for j, joint in enumerate(types):
+            digits = self.functions.digit(self.functions.tensor_codes(joints, sizes), j)
+            in_metres /= self.length ** (joint.length_order * digits)
         return Terms(row, codes, column, found[column, row, place] * in_metres[place])
 
 

@@ -1,9 +1,9 @@
 """The functions y_j: how they are numbered, in which order they stand, and their exponents E.
 
-A product of joint functions is a code: one digit per joint to base 5, the first joint's digit the highest. A
-revolute joint's digits 0..4 stand for 1, s, c, s c, c^2, a prismatic joint's 0..2 for 1, q, q^2. A function
-is a code times a rate factor: |g|; qdd_j; qd_j^2; qd_j qd_k. Its key is the rate's number times 5^n plus the
-code; E's columns stand in the order of keys: gravity, acceleration, centrifugal, Coriolis; within each by
+A product of joint functions is a code: one digit per joint to base 5, the first joint's digit the highest. What
+a digit stands for is in the basis of the joint's type: 1, s, c, s c, c^2 where it turns, 1, q, q^2 where it
+slides. A function is a code times a rate factor: |g|; qdd_j; qd_j^2; qd_j qd_k. Its key is the rate's number
+times 5^n plus the code; E's columns stand in the order of keys: gravity, acceleration, centrifugal, Coriolis; within each by
 joint (pair), then by code.
 """
 
@@ -15,24 +15,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.robot.chain import JointKind
+from psdmc.robot.joints import JointType
 
 Integers = NDArray[np.int64]
 
 RADIX = 5
-_SINE_COSINE = np.array([(0, 0), (1, 0), (0, 1), (1, 1), (0, 2)], dtype=np.uint8)
-"""Exponents of sine and cosine by a revolute joint's digit."""
+"""No basis has more digits."""
 
 
 @dataclass(frozen=True, slots=True)
 class Functions:
-    """The numbering for a chain of `kinds`."""
+    """The numbering for joints of these types."""
 
-    kinds: tuple[JointKind, ...]
+    types: tuple[JointType, ...]
 
     @property
     def n(self) -> int:
-        return len(self.kinds)
+        return len(self.types)
 
     @property
     def codes(self) -> int:
@@ -47,11 +46,10 @@ class Functions:
         digits: Integers = (codes // self.weight(joint)) % RADIX
         return digits
 
-    def tensor_codes(self, first: int, sizes: Sequence[int]) -> Integers:
-        """Codes of a coefficient tensor, flattened: joints first, first + 1, ... with that many digits
-        each."""
+    def tensor_codes(self, joints: Sequence[int], sizes: Sequence[int]) -> Integers:
+        """Codes of a coefficient tensor, flattened: an axis per joint, with that many digits each."""
         codes = np.zeros(1, dtype=np.int64)
-        for joint, size in enumerate(sizes, start=first):
+        for joint, size in zip(joints, sizes, strict=True):
             codes = (codes[:, None] + self.weight(joint) * np.arange(size)).reshape(-1)
         return codes
 
@@ -82,11 +80,8 @@ class Functions:
         n = self.n
         table = np.zeros((5 * n, len(keys)), dtype=np.uint8)
         rates, codes = np.divmod(keys, self.codes)
-        for j, kind in enumerate(self.kinds):
-            digits = self.digit(codes, j)
-            if kind == "prismatic":
-                table[j] = digits
-            else:
-                table[n + j], table[2 * n + j] = _SINE_COSINE[digits].T
+        for j, joint in enumerate(self.types):
+            powers = np.array(joint.basis.exponents, dtype=np.uint8)
+            table[[j, n + j, 2 * n + j]] = powers[self.digit(codes, j)].T
         table[3 * n :] = self.rate_exponents()[rates].T
         return table

@@ -8,10 +8,11 @@ import numpy as np
 
 from psdmc.derivation.functions import Functions
 from psdmc.derivation.inertia import Moving, coefficients, column, expanded, moving
-from psdmc.derivation.interpolate import LINEAR_SIZE
+from psdmc.derivation.interpolate import linear_sizes
 from psdmc.derivation.terms import Array, Terms, joined, summed
 from psdmc.derivation.velocity import derivative
-from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.frames import BASE, Frame
+from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.regressor import Placed, carried, twist_in
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
 from psdmc.robot.chain import PARAMETERS_PER_LINK
@@ -30,12 +31,17 @@ def gravity_terms(
     from joint to joint. Its coefficient for a link's mass is the height, for mx, my, mz the direction.
     """
     parts: list[Terms] = []
-    direction: Vector = (np.array([up[0]]), np.array([up[1]]), np.array([up[2]]))
-    height: Array = np.zeros(1)
+    at_base: tuple[Vector, Array] = (
+        (np.array([up[0]]), np.array([up[1]]), np.array([up[2]])),
+        np.zeros(1),
+    )
+    found: list[tuple[Vector, Array]] = []
     for k, frame in enumerate(frames):
-        direction, height = _carried(moving(frame), direction, height)
-        potential = _link_potential(link_frames[k], direction, height, k, functions, tolerance)
-        for i in range(k + 1):
+        before = at_base if frame.parent == BASE else found[frame.parent]
+        found.append(_carried(moving(frame), *before))
+        path = path_to(frames, k)
+        potential = _link_potential(link_frames[k], *found[k], path, functions, tolerance)
+        for i in path:
             slope = derivative(potential, functions, i)
             parts.append(Terms(np.full_like(slope.row, i), slope.function, slope.column, slope.value))
     return summed(joined(parts), tolerance)
@@ -45,16 +51,22 @@ def _carried(joint: Moving, direction: Vector, height: Array) -> tuple[Vector, A
     before, count = column(direction), len(height)
     raised: Scalar = height[:, None] + dot(before, joint.state.offset)
     turned, _ = carried(joint.frame, joint.state, (before, ZERO))
-    return expanded(turned, count, joint.kind), coefficients(raised, count, joint.kind)
+    return expanded(turned, count, joint.basis), coefficients(raised, count, joint.basis)
 
 
 def _link_potential(
-    place: Placed, direction: Vector, height: Array, k: int, functions: Functions, tolerance: float
+    place: Placed,
+    direction: Vector,
+    height: Array,
+    path: Sequence[int],
+    functions: Functions,
+    tolerance: float,
 ) -> Terms:
     x, y, z = place.translation.tolist()
     about_link, _ = twist_in(place, (direction, ZERO))
     values = np.stack([height + dot(direction, (x, y, z)), *about_link])
     parameter, position = np.nonzero(np.abs(values) > tolerance)
-    codes = functions.tensor_codes(0, [LINEAR_SIZE[kind] for kind in functions.kinds[: k + 1]])
+    k = path[-1]
+    codes = functions.tensor_codes(path, linear_sizes(functions.types[j] for j in path))
     columns = PARAMETERS_PER_LINK * k + parameter
     return Terms(np.full(len(columns), k), codes[position], columns, values[parameter, position])

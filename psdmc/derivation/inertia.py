@@ -1,57 +1,76 @@
 """Coefficients of the mass matrix, for each standard parameter apart.
 
-The part of M_ij (i <= j) that one parameter of link k >= j makes is a bilinear form in the twists that joints
-i and j give to that link's frame. Joint i's twist is a polynomial of degree one in each of q_{i+1} ... q_k,
-so the product has degree one in q_{i+1} ... q_j, where joint j's twist is constant, and degree two in q_{j+1}
-... q_k: only the latter need a grid.
+The part of M_ij that one parameter of link k makes, i and then j on the path from the base to that link, is a
+bilinear form in the twists that the two joints give to that link's frame. Joint i's twist is a polynomial of
+degree one in the q of each joint after i on the path, so the product has degree one in those up to j, where
+joint j's twist is constant, and degree two in those after j: only the latter need a grid.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.derivation.functions import Functions
-from psdmc.derivation.interpolate import LINEAR_SIZE, QUADRATIC_SIZE, along_axes, evaluation, interpolation
+from psdmc.derivation.interpolate import (
+    along_axes,
+    evaluation,
+    interpolation,
+    linear_sizes,
+    quadratic_sizes,
+)
 from psdmc.derivation.terms import Terms, joined
-from psdmc.dynamics.frames import Frame, joint_angle, joint_offset
+from psdmc.dynamics.frames import BASE, Frame, joint_angle, joint_offset
+from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.motion import JointState
 from psdmc.dynamics.regressor import DRIVE, Placed, Twist, carried, own_twist, twist_in
 from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
-from psdmc.robot.chain import PARAMETERS_PER_LINK, JointKind
+from psdmc.robot.chain import PARAMETERS_PER_LINK
+from psdmc.robot.joints import JointType
+from psdmc.robot.joints.basis import Basis
 
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class FormalAngle:
-    """A revolute joint's q at three formal points (s, c) = (0, 0), (1, 0), (0, 1), from which the
-    coefficients of 1, s and c follow by exact differences. It enters the dynamics as their abstract
-    scalar."""
+    """An angle at formal points: it enters the dynamics as their abstract scalar, and has only sine and cosine."""
+
+    sine: Array
+    cosine: Array
 
     def sincos(self) -> tuple[Array, Array]:
-        return np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+        return self.sine, self.cosine
 
 
 class Moving(NamedTuple):
     """One joint at its formal points."""
 
-    kind: JointKind
+    basis: Basis
     frame: Frame
     state: JointState
 
 
 def moving(frame: Frame) -> Moving:
-    q: Scalar = FormalAngle() if frame.kind == "revolute" else np.array([0.0, 1.0])
-    return Moving(frame.kind, frame, JointState(joint_angle(frame, q).turn(), joint_offset(frame, q)))
+    q = formal_coordinate(frame.joint.basis)
+    state = JointState(joint_angle(frame, q).turn(), joint_offset(frame, q))
+    return Moving(frame.joint.basis, frame, state)
 
 
-def coefficients(at_points: Scalar, count: int, kind: JointKind) -> Array:
-    """Coefficients of degree one from values at the formal points, the new joint's axis last: (count * 3 or
-    2,)."""
-    values = np.broadcast_to(_at_least_double(at_points), (count, LINEAR_SIZE[kind]))
+def formal_coordinate(basis: Basis) -> Scalar:
+    """A coordinate at as many formal points as there are functions of degree one: at the first all of these but the
+    constant are zero, at each other one of them is one, so that their coefficients follow by exact differences."""
+    q, sine, cosine = np.array(basis.exponents[: basis.linear], dtype=np.float64).T
+    return FormalAngle(sine, cosine) if basis.has_sincos else q
+
+
+def coefficients(at_points: Scalar, count: int, basis: Basis) -> Array:
+    """Coefficients of degree one from values at the formal points, the new joint's axis last: (count * linear,)."""
+    values = np.broadcast_to(_at_least_double(at_points), (count, basis.linear))
     return np.concatenate([values[:, :1], values[:, 1:] - values[:, :1]], axis=1).reshape(-1)
 
 
@@ -65,8 +84,8 @@ def column(v: Vector) -> Vector:
     return (v[0][:, None], v[1][:, None], v[2][:, None])
 
 
-def expanded(v: Vector, count: int, kind: JointKind) -> Vector:
-    x, y, z = (coefficients(entry, count, kind) for entry in v)
+def expanded(v: Vector, count: int, basis: Basis) -> Vector:
+    x, y, z = (coefficients(entry, count, basis) for entry in v)
     return (x, y, z)
 
 
@@ -75,7 +94,7 @@ def carried_twist(joint: Moving, twist: Twist) -> Twist:
     linear, angular = twist
     moved = carried(joint.frame, joint.state, (column(linear), column(angular)))
     count = len(linear[0])
-    return expanded(moved[0], count, joint.kind), expanded(moved[1], count, joint.kind)
+    return expanded(moved[0], count, joint.basis), expanded(moved[1], count, joint.basis)
 
 
 def constant_twist(frame: Frame) -> Twist:
@@ -90,18 +109,21 @@ def _as_arrays(v: Vector) -> Vector:
 def mass_matrix_terms(
     frames: Sequence[Frame], link_frames: Sequence[Placed], functions: Functions, tolerance: float
 ) -> dict[tuple[int, int], Terms]:
-    """M_ij for i <= j as terms in codes and standard parameters (11 per link); `row` is the link.
+    """M_ij, i on the path to j, as terms in codes and standard parameters (11 per link); `row` is the link. Other
+    entries with i < j are zero.
 
     Lengths in a unit near the robot's size: `tolerance` is absolute, and decides which coefficients are zero.
     """
-    n = len(frames)
-    parts: dict[tuple[int, int], list[Terms]] = {(i, j): [] for i in range(n) for j in range(i, n)}
-    twists: list[Twist] = []
+    paths = [path_to(frames, k) for k in range(len(frames))]
+    pairs = sorted((i, j) for j, path in enumerate(paths) for i in path)
+    parts: dict[tuple[int, int], list[Terms]] = {pair: [] for pair in pairs}
+    twists: list[list[Twist]] = []
     for k, frame in enumerate(frames):
         joint = moving(frame)
-        twists = [carried_twist(joint, twist) for twist in twists] + [constant_twist(frame)]
-        seen = [np.stack([*v, *w]) for v, w in (twist_in(link_frames[k], twist) for twist in twists)]
-        for i, j, found in _link_terms(seen, k, functions, tolerance):
+        before = [] if frame.parent == BASE else twists[frame.parent]
+        twists.append([carried_twist(joint, twist) for twist in before] + [constant_twist(frame)])
+        seen = [np.stack([*v, *w]) for v, w in (twist_in(link_frames[k], twist) for twist in twists[k])]
+        for i, j, found in _link_terms(seen, paths[k], functions, tolerance):
             parts[i, j].append(found)
         parts[k, k].append(_drive_term(k))
     return {pair: joined(found) for pair, found in parts.items()}
@@ -114,37 +136,40 @@ def _drive_term(k: int) -> Terms:
 
 
 def _link_terms(
-    twists: Sequence[Array], k: int, functions: Functions, tolerance: float
+    twists: Sequence[Array], path: Sequence[int], functions: Functions, tolerance: float
 ) -> Iterator[tuple[int, int, Terms]]:
-    """The parts of M_ij that link k's ten parameters make; twists[i] is (6, coefficients)."""
-    kinds = functions.kinds
-    for j in range(k + 1):
-        inner = kinds[j + 1 : k + 1]
-        second = _at_nodes(twists[j], inner)
-        for i in range(j + 1):
-            first = _at_nodes(twists[i], inner)
+    """The parts of M_ij that the ten parameters of the link at the path's end make; twists[a] is (6, coefficients), of
+    joint path[a]."""
+    types, k = [functions.types[joint] for joint in path], path[-1]
+    for b in range(len(path)):
+        inner = types[b + 1 :]
+        second = _at_nodes(twists[b], inner)
+        for a in range(b + 1):
+            first = _at_nodes(twists[a], inner)
             products = mass_features(first, second)
             found = _interpolated(products, inner)
-            sizes = [LINEAR_SIZE[kind] for kind in kinds[i + 1 : j + 1]]
-            sizes += [QUADRATIC_SIZE[kind] for kind in inner]
+            sizes = linear_sizes(types[a + 1 : b + 1]) + quadratic_sizes(inner)
             parameter, place = np.nonzero(np.abs(found) > tolerance)
-            codes = functions.tensor_codes(i + 1, sizes)[place]
+            codes = functions.tensor_codes(path[a + 1 :], sizes)[place]
             columns = PARAMETERS_PER_LINK * k + parameter
-            yield i, j, Terms(np.full(len(codes), k), codes, columns, found[parameter, place])
+            terms = Terms(np.full(len(codes), k), codes, columns, found[parameter, place])
+            yield path[a], path[b], terms
 
 
-def _at_nodes(twist: Array, inner: Sequence[JointKind]) -> Array:
+def _at_nodes(twist: Array, inner: Sequence[JointType]) -> Array:
     """(6, outer, nodes): a twist's coefficients along the outer joints, its values along the inner ones."""
-    size = int(np.prod([LINEAR_SIZE[kind] for kind in inner], dtype=np.int64))
+    size = int(np.prod(linear_sizes(inner), dtype=np.int64))
     batch = twist.reshape(-1, size)
-    values = along_axes([evaluation(kind, twist.dtype) for kind in inner], np.ascontiguousarray(batch.T))
+    values = along_axes([evaluation(joint, twist.dtype) for joint in inner], np.ascontiguousarray(batch.T))
     return values.reshape(6, -1, values.shape[1])
 
 
-def _interpolated(products: Array, inner: Sequence[JointKind]) -> Array:
+def _interpolated(products: Array, inner: Sequence[JointType]) -> Array:
     """(10, outer * coefficients) from (10, outer, nodes)."""
     batch = products.reshape(-1, products.shape[-1])
-    found = along_axes([interpolation(kind, products.dtype) for kind in inner], np.ascontiguousarray(batch.T))
+    found = along_axes(
+        [interpolation(joint, products.dtype) for joint in inner], np.ascontiguousarray(batch.T)
+    )
     return found.reshape(products.shape[0], -1)
 
 

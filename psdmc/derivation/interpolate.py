@@ -1,60 +1,71 @@
 """Products of polynomials in the joint variables: evaluate on a tensor grid, multiply, interpolate axis by
 axis.
 
-A joint's polynomials of degree one have the basis {1, s, c} (revolute, s = sin q, c = cos q) or {1, q}
-(prismatic); their products have {1, s, c, s c, c^2} (s^2 = 1 - c^2) or {1, q, q^2}. The search space is the
-tensor product over the joints, so what PSDM-2021 solves as one dense system is a Kronecker product: one small
-inverse along each axis.
+A joint type's basis (robot/joints/basis.py) says which functions of q its polynomials of degree one are sums
+of, and which their products: {1, s, c} and {1, s, c, s c, c^2} (s = sin q, c = cos q), or {1, q} and {1, q, q^2}. The
+search space is the tensor product over the joints, so what PSDM-2021 solves as one dense system is a Kronecker
+product: one small inverse along each axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.robot.chain import JointKind
+from psdmc.robot.joints import JointType
 from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 
-LINEAR_SIZE: dict[JointKind, int] = {"revolute": 3, "prismatic": 2}
-QUADRATIC_SIZE: dict[JointKind, int] = {"revolute": 5, "prismatic": 3}
 DOUBLE = np.dtype(np.float64)
 
 
-def nodes(kind: JointKind) -> Array:
-    """Where products are sampled: equally spaced on the circle, which conditions the inverse best; or -1, 0,
-    1."""
-    if kind == "prismatic":
-        return np.array([-1.0, 0.0, 1.0])
-    return np.array([2.0 * np.pi * k / 5.0 for k in range(5)])
+def linear_sizes(joints: Iterable[JointType]) -> list[int]:
+    """How many functions of degree one at most each joint has."""
+    return [joint.basis.linear for joint in joints]
 
 
-def quadratic_basis(kind: JointKind, q: Array) -> Array:
-    """(len(q), 5 or 3) basis functions of degree two at each q."""
-    if kind == "prismatic":
-        return np.stack([np.ones_like(q), q, q * q], axis=-1)
-    s, c = np.sin(q), np.cos(q)
-    return np.stack([np.ones_like(q), s, c, s * c, c * c], axis=-1)
+def quadratic_sizes(joints: Iterable[JointType]) -> list[int]:
+    """How many functions of degree two at most each joint has."""
+    return [joint.basis.size for joint in joints]
+
+
+def nodes(joint: JointType) -> Array:
+    """Where products are sampled."""
+    return np.array(joint.basis.nodes)
+
+
+def quadratic_basis(joint: JointType, q: Array) -> Array:
+    """(len(q), size) basis functions of degree two at each q."""
+    rows = (q, np.sin(q), np.cos(q))
+    return np.stack([_product(powers, rows) for powers in joint.basis.exponents], axis=-1)
+
+
+def _product(powers: Sequence[int], rows: Sequence[Array]) -> Array:
+    value = np.ones_like(rows[0])
+    for power, row in zip(powers, rows, strict=True):
+        for _ in range(power):
+            value = value * row
+    return value
 
 
 @cache
-def evaluation(kind: JointKind, precision: np.dtype[Any] = DOUBLE) -> Array:
-    """(5, 3) or (3, 2): coefficients of degree one to values at the nodes."""
-    return quadratic_basis(kind, nodes(kind).astype(precision))[:, : LINEAR_SIZE[kind]]
+def evaluation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
+    """(size, linear): coefficients of degree one to values at the nodes."""
+    return quadratic_basis(joint, nodes(joint).astype(precision))[:, : joint.basis.linear]
 
 
 @cache
-def interpolation(kind: JointKind, precision: np.dtype[Any] = DOUBLE) -> Array:
-    """(5, 5) or (3, 3): values at the nodes to coefficients of degree two."""
-    inverse: Array = np.asarray(np.linalg.inv(quadratic_basis(kind, nodes(kind))), dtype=np.float64)
+def interpolation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
+    """(size, size): values at the nodes to coefficients of degree two."""
+    inverse: Array = np.asarray(np.linalg.inv(quadratic_basis(joint, nodes(joint))), dtype=np.float64)
     if precision == DOUBLE:
         return inverse
-    basis = quadratic_basis(kind, nodes(kind).astype(precision))
+    basis = quadratic_basis(joint, nodes(joint).astype(precision))
     twice = 2.0 * np.eye(len(basis), dtype=precision)
     for _ in range(2):  # each step squares the error
         inverse = times(inverse, twice - times(basis, inverse))

@@ -1,11 +1,11 @@
 """Base parameters link by link, in extended precision: for long chains, and for axes that are nearly parallel.
 
 Link k's parameters leave the torque of joint k at zero in every motion exactly where its Lagrangian depends on neither
-q_k nor its rate. Then link k might as well be fixed to link k-1, and its parameters, moved there, belong to that link.
-So with C_k the rows that joint k's torque has in the parameters of its own link, and T_k those parameters moved to link
-k-1 at q_k = 0, the torques of all joints depend on the parameters through
+q_k nor its rate. Then link k might as well be fixed to its parent, and its parameters, moved there, belong to that link.
+So with C_k the rows that joint k's torque has in the parameters of its own link, and T_c those of a link c moved to its
+parent at q_c = 0, the torques of all joints depend on the parameters through
 
-    C_k z_k,    z_k = x_k + T_(k+1) z_(k+1)
+    C_k z_k,    z_k = x_k + sum of T_c z_c over the links c that hang on k
 
 and on nothing else: each C_k is 11 columns of a few samples, whatever the length of the chain, and every decision about
 rank is made there, joint by joint, against that joint's own torque.
@@ -16,14 +16,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from psdmc.derivation.extended import Long, extended
 from psdmc.derivation.reduce import Reduction
 from psdmc.derivation.units import Scaled
+from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.motion import PLAIN, LinkMotion, sweep_outward
 from psdmc.dynamics.parameters import BODY_PARAMETERS, moving_map
 from psdmc.dynamics.regressor import DRIVE, unit_wrench
+from psdmc.dynamics.twist import effort
 from psdmc.robot.chain import PARAMETERS_PER_LINK
 from psdmc.robot.graded import graded_pivots, halving_shares, lengths
 from psdmc.robot.small import times
@@ -53,35 +56,41 @@ def torque_rows(robot: Scaled) -> Long:
 
     r is the number of base parameters of a chain whose parameters are all free. `robot` in extended precision.
     """
-    n = len(robot.kinds)
+    n = len(robot.types)
     own = [echelon_rows(samples) for samples in _own_torques(robot)]
     rows = np.zeros((sum(len(part) for part in own), PARAMETERS_PER_LINK * n), np.longdouble)
-    carried = np.zeros((0, BODY_PARAMETERS), np.longdouble)
+    carried: list[Long] = []
+    places: list[NDArray[np.int64]] = []
+    used = 0
     for k, (frame, place, part) in enumerate(zip(robot.frames, robot.link_frames, own, strict=True)):
         turned = np.array(frame.rotation, dtype=np.longdouble)
         fixed = moving_map(turned, np.array(frame.translation, dtype=np.longdouble))
-        before, first = len(carried), PARAMETERS_PER_LINK * k
-        carried = np.vstack([times(carried, fixed), part[:, :BODY_PARAMETERS]])
+        is_first = frame.parent == BASE
+        above = np.zeros((0, BODY_PARAMETERS), np.longdouble) if is_first else carried[frame.parent]
+        before, own_rows = len(above), np.arange(used, used + len(part))
+        used, first = used + len(part), PARAMETERS_PER_LINK * k
+        carried.append(np.vstack([times(above, fixed), part[:, :BODY_PARAMETERS]]))
+        places.append(own_rows if is_first else np.concatenate([places[frame.parent], own_rows]))
         about_link = moving_map(place.rotation, place.translation)
-        rows[: len(carried), first : first + BODY_PARAMETERS] = times(carried, about_link)
-        rows[before : len(carried), first + DRIVE] = part[:, DRIVE]
+        rows[places[k], first : first + BODY_PARAMETERS] = times(carried[k], about_link)
+        rows[places[k][before:], first + DRIVE] = part[:, DRIVE]
     return rows
 
 
 def _own_torques(robot: Scaled) -> list[Long]:
     """n of (STATES, 11): each joint's torque from its own link's parameters about its own frame, at random motions."""
-    n = len(robot.kinds)
+    n = len(robot.types)
     drawn = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, n, STATES)).astype(np.longdouble)
     q, qd, qdd = (list(vector) for vector in drawn)
-    motions = sweep_outward(robot.frames, q, qd, qd, qdd, robot.up, PLAIN).motions
+    motions = sweep_outward(robot.frames, q, qd, None, qdd, robot.up, PLAIN).motions
     return [
-        _own_torque(frame.kind == "revolute", motion, acceleration)
+        _own_torque(frame, motion, acceleration)
         for frame, motion, acceleration in zip(robot.frames, motions, qdd, strict=True)
     ]
 
 
-def _own_torque(turns: bool, motion: LinkMotion, acceleration: Long) -> Long:
-    columns: list[Any] = [unit_wrench(name, motion)[1 if turns else 0][2] for name in range(DRIVE)]
+def _own_torque(frame: Frame, motion: LinkMotion, acceleration: Long) -> Long:
+    columns: list[Any] = [effort(frame.joint, *unit_wrench(name, motion)) for name in range(DRIVE)]
     samples = [np.broadcast_to(column, (STATES,)) for column in (*columns, acceleration)]
     return np.stack(samples, axis=1).astype(np.longdouble)
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.derivation.functions import Functions
-from psdmc.derivation.interpolate import LINEAR_SIZE, QUADRATIC_SIZE
+from psdmc.derivation.interpolate import linear_sizes, quadratic_sizes
 from psdmc.derivation.terms import Terms
 from psdmc.derivation.velocity import slope_count
 from psdmc.errors import DerivationError
-from psdmc.robot.chain import JointKind
+from psdmc.robot.joints import JointType
 
 WITHOUT = "base parameters, regressor and generated code then come without E and P"
 
@@ -38,15 +38,13 @@ HEADROOM = 0.75
 """Part of the free memory that an expansion may plan for: the estimate is one, and others run on the machine, too."""
 
 
-def largest_function_count(kinds: Sequence[JointKind]) -> int:
+def largest_function_count(types: Sequence[JointType]) -> int:
     """The p of a chain of these joints with axes in general position; no such chain has more.
 
     M_0j has degree one in q_1 ... q_j and two in what follows; every rate product qd_j qd_k (k >= j) has at
     most that.
     """
-    n = len(kinds)
-    linear = [LINEAR_SIZE[kind] for kind in kinds]
-    quadratic = [QUADRATIC_SIZE[kind] for kind in kinds]
+    n, linear, quadratic = len(types), linear_sizes(types), quadratic_sizes(types)
     total, gravity = 0, 1
     for size in linear:
         gravity *= size
@@ -58,19 +56,21 @@ def largest_function_count(kinds: Sequence[JointKind]) -> int:
     return total + gravity - 1
 
 
-def grid_bytes(kinds: Sequence[JointKind]) -> int:
+def grid_bytes(types: Sequence[JointType]) -> int:
     """Largest grid of mass-matrix features."""
     size = 10 * 8 * _GRID_COPIES
-    for kind in kinds[1:]:
-        size *= QUADRATIC_SIZE[kind]
+    for points in quadratic_sizes(types[1:]):
+        size *= points
     return size
 
 
-def velocity_bytes(mass_matrix: Mapping[tuple[int, int], Terms], functions: Functions) -> tuple[int, int]:
-    """(terms, bytes) of the velocity terms before equal ones are summed."""
+def velocity_bytes(
+    mass_matrix: Mapping[tuple[int, int], Terms], functions: Functions, carried: Sequence[Sequence[int]]
+) -> tuple[int, int]:
+    """(terms, bytes) of the velocity terms before equal ones are summed; `carried` as in velocity_terms."""
     count = 0
     for (a, b), terms in mass_matrix.items():
-        slopes = sum(slope_count(terms, functions, d) for d in range(a + 1, functions.n))
+        slopes = sum(slope_count(terms, functions, d) for d in carried[a])
         count += slopes * (2 if a == b else 3)
     return count, count * BYTES_PER_TERM
 
@@ -86,17 +86,17 @@ def refuse_beyond(needed: int, available: int, functions: int, n: int) -> None:
     )
 
 
-def refuse_long(terms: int, kinds: Sequence[JointKind]) -> None:
+def refuse_long(terms: int, types: Sequence[JointType]) -> None:
     """DerivationError where an expansion would take more than about a minute: too many velocity terms, or, while these
     are unknown (0), too large a grid."""
-    grid = int(np.prod([QUADRATIC_SIZE[kind] for kind in kinds[1:]], dtype=float))
+    grid = int(np.prod(quadratic_sizes(types[1:]), dtype=float))
     if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:
         return
     what = f"{terms:,} velocity terms (limit {LARGEST_EXPANSION:,})"
     if not terms:
         what = f"a grid of {grid:,} points for the mass matrix alone (limit {LARGEST_GRID:,})"
     raise DerivationError(
-        f"expanding this {len(kinds)}-joint robot takes {what}: minutes",
+        f"expanding this {len(types)}-joint robot takes {what}: minutes",
         "derive with --no-expand: " + WITHOUT,
     )
 

@@ -29,7 +29,7 @@ SAMPLED_JOINTS = 10
 def reduction_of(scaled: Scaled) -> Reduction:
     """The base parameters: from sampled rows of doubles where these are few and no column is nearly dependent, else
     link by link in extended precision."""
-    if len(scaled.kinds) <= SAMPLED_JOINTS:
+    if len(scaled.types) <= SAMPLED_JOINTS:
         reduction = sampled_reduction(scaled)
         if reduction.is_clear:
             return reduction
@@ -38,14 +38,14 @@ def reduction_of(scaled: Scaled) -> Reduction:
 
 def sampled_reduction(scaled: Scaled) -> Reduction:
     """The same base parameters as the expanded path finds, within the span's columns."""
-    n = len(scaled.kinds)
+    n = len(scaled.types)
     rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
     return reduced((sparse.csr_array(scaled.span.T) @ rows.T).T)
 
 
 def sampled_regressor(scaled: Scaled, count: int) -> Array:
     """(count, n, 11 n) regressor at random states, in the robot's unit; gravity of strength one."""
-    n = len(scaled.kinds)
+    n = len(scaled.types)
     states = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, n, count))
     wanted = frozenset(range(PARAMETERS_PER_LINK * n))
     q, qd, qdd = (list(vector) for vector in states)

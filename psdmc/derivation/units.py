@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.frames import Frame, frames_of
+from psdmc.dynamics.frames import BASE, Frame, frames_of
 from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, JointKind, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement
+from psdmc.robot.joints import JointType
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,11 @@ _LENGTH_ORDER = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
 
 def length_unit(chain: Chain) -> float:
     """Metres: the power of two nearest to the longest step from joint to joint; one where all are zero."""
-    steps = [math.hypot(*joint.placement.translation) for joint in chain.joints[1:]]
+    steps = [
+        math.hypot(*joint.placement.translation)
+        for joint, parent in zip(chain.joints, chain.parents, strict=True)
+        if parent != BASE
+    ]
     steps += [math.hypot(*joint.link_frame.translation) for joint in chain.joints]
     longest = max(steps)
     return 2.0 ** round(math.log2(longest)) if longest > 0 else 1.0
@@ -41,25 +46,25 @@ def frame_in_unit(frame: Frame, unit: float) -> Frame:
     return replace(frame, translation=(x / unit, y / unit, z / unit))
 
 
-def parameter_units(kinds: Sequence[JointKind], unit: float) -> Array:
+def parameter_units(types: Sequence[JointType], unit: float) -> Array:
     """(11 n,) what one unit of each standard parameter is in SI."""
-    drive = [2 if kind == "revolute" else 0 for kind in kinds]
-    orders = np.column_stack([np.tile(_LENGTH_ORDER, (len(kinds), 1)), drive])
-    units: Array = unit ** orders.reshape(len(kinds) * PARAMETERS_PER_LINK).astype(np.float64)
+    drive = [joint.drive_order for joint in types]
+    orders = np.column_stack([np.tile(_LENGTH_ORDER, (len(types), 1)), drive])
+    units: Array = unit ** orders.reshape(len(types) * PARAMETERS_PER_LINK).astype(np.float64)
     return units
 
 
-def torque_units(kinds: Sequence[JointKind], unit: float) -> Array:
+def torque_units(types: Sequence[JointType], unit: float) -> Array:
     """(n,) one unit of torque (force for sliding joints) in SI; the units of mass and time are SI's."""
-    return np.array([unit**2 if kind == "revolute" else unit for kind in kinds])
+    return np.array([unit**joint.effort_order for joint in types])
 
 
-def function_units(exponents: NDArray[np.uint8], kinds: Sequence[JointKind], unit: float) -> Array:
+def function_units(exponents: NDArray[np.uint8], types: Sequence[JointType], unit: float) -> Array:
     """(p,) one unit of each function of E in SI; functions without rates carry |g|."""
-    n = len(kinds)
-    slides = np.array([kind == "prismatic" for kind in kinds])
+    n = len(types)
+    orders = np.array([joint.length_order for joint in types])
     blocks = exponents.reshape(5, n, -1).astype(np.int64)
-    lengths = blocks[[0, 3, 4]][:, slides].sum(axis=(0, 1))
+    lengths = (blocks[[0, 3, 4]] * orders[:, None]).sum(axis=(0, 1))
     is_gravity = ~blocks[3:].any(axis=(0, 1))
     units: Array = unit ** (lengths + is_gravity).astype(np.float64)
     return units
@@ -74,7 +79,7 @@ class Scaled:
     up      unit vector against gravity in the base frame; zero where there is no gravity
     """
 
-    kinds: tuple[JointKind, ...]
+    types: tuple[JointType, ...]
     frames: tuple[Frame, ...]
     link_frames: tuple[Placed, ...]
     unit: float
@@ -85,15 +90,14 @@ class Scaled:
 
 def scaled(chain: Chain) -> Scaled:
     """The chain in a unit of length near its size."""
-    kinds = tuple(joint.kind for joint in chain.joints)
     unit = length_unit(chain)
-    units = parameter_units(kinds, unit)
+    units = parameter_units(chain.types, unit)
     leads = leading_rows(chain.parameter_span)
     span = chain.parameter_span / units[:, None] * units[leads]
     strength = float(np.linalg.norm(chain.gravity))
     x, y, z = (-float(g) / strength if strength else 0.0 for g in chain.gravity)
     return Scaled(
-        kinds,
+        chain.types,
         tuple(frame_in_unit(frame, unit) for frame in frames_of(chain)),
         tuple(in_unit(joint.link_frame, unit) for joint in chain.joints),
         unit,

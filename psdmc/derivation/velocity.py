@@ -6,20 +6,12 @@ symmetric.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from psdmc.derivation.functions import Functions
 from psdmc.derivation.terms import Integers, Terms, joined, selected, summed
-from psdmc.robot.chain import JointKind
-
-_DERIVATIVES: dict[JointKind, tuple[tuple[tuple[int, float], ...], ...]] = {
-    "revolute": ((), ((2, 1.0),), ((1, -1.0),), ((4, 2.0), (0, -1.0)), ((3, -2.0),)),
-    "prismatic": ((), ((0, 1.0),), ((1, 2.0),)),
-}
-"""By digit: the digits and factors of its derivative. 1' = 0, s' = c, c' = -s, (s c)' = 2 c^2 - 1, (c^2)' =
--2 s c."""
 
 
 def derivative(terms: Terms, functions: Functions, joint: int) -> Terms:
@@ -27,7 +19,7 @@ def derivative(terms: Terms, functions: Functions, joint: int) -> Terms:
     digits = functions.digit(terms.function, joint)
     weight = functions.weight(joint)
     parts: list[Terms] = []
-    for digit, images in enumerate(_DERIVATIVES[functions.kinds[joint]]):
+    for digit, images in enumerate(functions.types[joint].basis.derivatives):
         chosen = selected(terms, digits == digit) if images else terms
         for image, factor in images:
             moved: Integers = chosen.function + (image - digit) * weight
@@ -36,12 +28,18 @@ def derivative(terms: Terms, functions: Functions, joint: int) -> Terms:
 
 
 def velocity_terms(
-    mass_matrix: Mapping[tuple[int, int], Terms], functions: Functions, tolerance: float
+    mass_matrix: Mapping[tuple[int, int], Terms],
+    functions: Functions,
+    carried: Sequence[Sequence[int]],
+    tolerance: float,
 ) -> Terms:
-    """Torque terms (row the joint, function the key) of all products of joint rates."""
+    """Torque terms (row the joint, function the key) of all products of joint rates.
+
+    carried   the joints beyond each joint, of which alone its row of the mass matrix may depend
+    """
     parts: list[Terms] = []
     for (a, b), terms in mass_matrix.items():
-        for d in range(a + 1, functions.n):
+        for d in carried[a]:
             slope = derivative(terms, functions, d)
             parts.append(_placed(slope, functions, a, b, d, 1.0))
             if a != b:
@@ -68,6 +66,6 @@ def acceleration_terms(mass_matrix: Mapping[tuple[int, int], Terms], functions: 
 
 def slope_count(terms: Terms, functions: Functions, joint: int) -> int:
     """How many terms `derivative` makes."""
-    images = [len(images) for images in _DERIVATIVES[functions.kinds[joint]]]
+    images = [len(images) for images in functions.types[joint].basis.derivatives]
     counts = np.bincount(functions.digit(terms.function, joint), minlength=len(images))
     return int(counts[: len(images)] @ np.array(images))

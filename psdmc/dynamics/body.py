@@ -58,7 +58,7 @@ def turned(body: Body, turn: Turn | None, double: Turn | None = None) -> Body:
 
 
 def in_previous(frame: Frame, body: Body) -> Body:
-    """A body about frame i before its turn, along the axes of frame i-1 (origin unmoved)."""
+    """A body about a frame before its turn, along the axes of its parent's (origin unmoved)."""
     if frame.is_parallel:
         return body
     moment = to_previous(frame, body.moment)

@@ -1,9 +1,9 @@
-"""Joint frames, the turn that a joint makes, and bodies: what every algorithm here starts from.
+"""Joint frames in a tree, and the turn that a joint makes: what every algorithm here starts from.
 
-Frame i sits in frame i-1 at   rotation @ Rz(q + offset), translation                        (revolute)
-                         or    rotation @ Rz(offset), translation + rotation @ z q           (prismatic)
-and carries one rigid body whose parameters are about frame i itself. Whole quarter turns of the offset are kept apart,
-so that they exchange sine and cosine exactly and cost nothing.
+Frame i sits in its parent's frame at   rotation @ Rz(turn + offset), translation + rotation @ z slide
+where turn and slide are what its joint's type makes of q, and carries one rigid body whose parameters are about frame i
+itself. Parents come before their children. Whole quarter turns of the offset are kept apart, so that they exchange sine
+and cosine exactly and cost nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector, sincos, transform, transpose
-from psdmc.robot.chain import Chain, JointKind, Placement
+from psdmc.robot.chain import BASE as BASE
+from psdmc.robot.chain import Chain, Placement
+from psdmc.robot.joints import JointType
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -22,13 +24,15 @@ IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Frame:
     """One joint's constant geometry as plain floats, so that exact zeros and ones stay visible.
 
-    rotation     3 x 3, frame i in frame i-1 where the turn about z is none
-    translation  m, origin of frame i at q = 0 in frame i-1
+    parent       index of the frame that it sits in; BASE: the base frame
+    rotation     3 x 3, this frame in the parent's where the turn about z is none
+    translation  m, origin of this frame at q = 0 in the parent's
     offset       rad, turn about z at q = 0, beside
     quarters     whole quarter turns, 0 to 3
     """
 
-    kind: JointKind
+    joint: JointType
+    parent: int
     rotation: Matrix
     translation: Vector
     offset: float = 0.0
@@ -36,7 +40,7 @@ class Frame:
 
     @property
     def is_parallel(self) -> bool:
-        """Whether its axis has the direction of the joint's before it."""
+        """Whether its axis has the direction of the joint's that it hangs on."""
         return self.rotation == IDENTITY
 
 
@@ -99,11 +103,21 @@ def as_vector(values: Sequence[float]) -> Vector:
 
 def frames_of(chain: Chain) -> tuple[Frame, ...]:
     """The chain's own joint frames, none moved."""
-    return tuple(frame_at(joint.kind, joint.placement) for joint in chain.joints)
+    return tuple(
+        frame_at(joint.type, parent, joint.placement)
+        for joint, parent in zip(chain.joints, chain.parents, strict=True)
+    )
 
 
-def frame_at(kind: JointKind, placement: Placement) -> Frame:
-    return Frame(kind, as_matrix(placement.rotation.tolist()), as_vector(placement.translation.tolist()))
+def frame_at(joint: JointType, parent: int, placement: Placement) -> Frame:
+    rotation = as_matrix(placement.rotation.tolist())
+    return Frame(joint, parent, rotation, as_vector(placement.translation.tolist()))
+
+
+def leaves(frames: Sequence[Frame]) -> tuple[bool, ...]:
+    """For each frame whether no other sits in it."""
+    parents = {frame.parent for frame in frames}
+    return tuple(i not in parents for i in range(len(frames)))
 
 
 def base_acceleration(chain: Chain) -> Vector:
@@ -128,22 +142,24 @@ def joined(first: Turn | None, second: Turn | None) -> Turn | None:
 def joint_angle(frame: Frame, q: Scalar) -> Angle:
     """The frame's turn about z at q."""
     value = frame.offset if frame.offset else None
-    if frame.kind == "revolute":
-        value = q if value is None else q + value
+    turned = frame.joint.turn(q)
+    if turned is not None:
+        value = turned if value is None else turned + value
     return Angle(value, frame.quarters)
 
 
 def joint_offset(frame: Frame, q: Scalar) -> Vector:
-    """Origin of frame i in frame i-1, m."""
-    if frame.kind == "revolute":
+    """Origin of the frame in its parent's, m."""
+    way = frame.joint.slide(q)
+    if way is None:
         return frame.translation
     x, y, z = frame.translation
-    slide = (frame.rotation[0][2] * q, frame.rotation[1][2] * q, frame.rotation[2][2] * q)
+    slide = (frame.rotation[0][2] * way, frame.rotation[1][2] * way, frame.rotation[2][2] * way)
     return (x + slide[0], y + slide[1], z + slide[2])
 
 
 def to_previous(frame: Frame, v: Vector) -> Vector:
-    """Constant part of the rotation, from frame i (before its turn) into frame i-1."""
+    """Constant part of the rotation, from a frame (before its turn) into its parent's."""
     return v if frame.is_parallel else transform(frame.rotation, v)
 
 

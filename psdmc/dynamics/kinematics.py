@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.frames import Frame, as_matrix, as_vector, joint_angle, joint_offset
-from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, cross, multiply, transform
+from psdmc.dynamics.frames import BASE, IDENTITY, Frame, as_matrix, as_vector, joint_angle, joint_offset
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transform
+from psdmc.dynamics.twist import axis_twist, turned
 from psdmc.robot.chain import Placement
+
+AT_BASE: tuple[Matrix, Vector] = (IDENTITY, ZERO)
+"""Rotation and origin of the base frame in itself."""
 
 
 def forward_kinematics(frames: Sequence[Frame], q: Sequence[Scalar]) -> tuple[tuple[Matrix, Vector], ...]:
     """Rotation and origin (m) of every joint frame in the base frame."""
-    rotation: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    origin: Vector = (0.0, 0.0, 0.0)
     placed: list[tuple[Matrix, Vector]] = []
     for frame, value in zip(frames, q, strict=True):
+        rotation, origin = AT_BASE if frame.parent == BASE else placed[frame.parent]
         origin = add(origin, transform(rotation, joint_offset(frame, value)))
         rotation = rotation if frame.is_parallel else multiply(rotation, frame.rotation)
         turn = joint_angle(frame, value).turn()
@@ -30,27 +33,56 @@ def _turned(rotation: Matrix, s: Scalar, c: Scalar) -> Matrix:
     return rows  # type: ignore[return-value]
 
 
-def jacobian(frames: Sequence[Frame], tip: Placement, q: Sequence[Scalar]) -> tuple[tuple[Scalar, ...], ...]:
-    """6 x n: velocity (linear, then angular) of the tip frame's origin per unit joint rate, in the base frame.
+def jacobian(
+    frames: Sequence[Frame], body: int, place: Placement, q: Sequence[Scalar]
+) -> tuple[tuple[Scalar, ...], ...]:
+    """6 x n: velocity (linear, then angular) of a frame's origin per unit joint rate, in the base frame.
 
-    `tip` is the tip frame in the last joint frame.
+    body, place   the frame: the body that it is fixed to, and where it sits in that body's joint frame
+    Columns of joints that do not carry the body are zero.
     """
     placed = forward_kinematics(frames, q)
-    last_rotation, last_origin = placed[-1]
-    point = add(last_origin, transform(last_rotation, as_vector(tip.translation.tolist())))
-    columns: list[tuple[Scalar, ...]] = []
-    for frame, (rotation, origin) in zip(frames, placed, strict=True):
-        axis = (rotation[0][2], rotation[1][2], rotation[2][2])
-        if frame.kind == "prismatic":
-            columns.append((*axis, 0.0, 0.0, 0.0))
-        else:
-            arm = (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])
-            columns.append((*cross(axis, arm), *axis))
+    rotation, origin = placed[body]
+    point = add(origin, transform(rotation, as_vector(place.translation.tolist())))
+    columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * len(frames)
+    for i in path_to(frames, body):
+        columns[i] = _column(frames[i], placed[i], point)
     return tuple(tuple(column[row] for column in columns) for row in range(6))
 
 
-def tip_placement(frames: Sequence[Frame], tip: Placement, q: Sequence[Scalar]) -> tuple[Matrix, Vector]:
-    """Rotation and origin (m) of the tip frame in the base frame."""
-    rotation, origin = forward_kinematics(frames, q)[-1]
-    point = add(origin, transform(rotation, as_vector(tip.translation.tolist())))
-    return multiply(rotation, as_matrix(tip.rotation.tolist())), point
+def _column(frame: Frame, placed: tuple[Matrix, Vector], point: Vector) -> tuple[Scalar, ...]:
+    """Velocity of a point and angular velocity that the joint's unit rate gives what it carries."""
+    rotation, origin = placed
+    along, about = axis_twist(frame.joint)
+    linear, angular = turned(rotation, along), turned(rotation, about)
+    if any(about):
+        arm = (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])
+        linear = add(linear, cross(angular, arm)) if any(along) else cross(angular, arm)
+    return (*linear, *angular)
+
+
+def path_to(frames: Sequence[Frame], body: int) -> tuple[int, ...]:
+    """The joints that carry a body, from the base outward, its own last."""
+    path: list[int] = []
+    while body != BASE:
+        path.append(body)
+        body = frames[body].parent
+    return tuple(reversed(path))
+
+
+def carried_by(frames: Sequence[Frame]) -> tuple[tuple[int, ...], ...]:
+    """For each joint those beyond it, which its motion carries along, ascending."""
+    beyond: list[list[int]] = [[] for _ in frames]
+    for k in range(len(frames)):
+        for i in path_to(frames, k)[:-1]:
+            beyond[i].append(k)
+    return tuple(tuple(found) for found in beyond)
+
+
+def frame_placement(
+    frames: Sequence[Frame], body: int, place: Placement, q: Sequence[Scalar]
+) -> tuple[Matrix, Vector]:
+    """Rotation and origin (m) in the base frame of a frame that is fixed at `place` in a body's joint frame."""
+    rotation, origin = forward_kinematics(frames, q)[body]
+    point = add(origin, transform(rotation, as_vector(place.translation.tolist())))
+    return multiply(rotation, as_matrix(place.rotation.tolist())), point

@@ -3,31 +3,36 @@
 Each frame gets the matrix U = [w][w_r] + [dw_r] and the acceleration a of its origin, so that the body's point at r
 accelerates with a + U r; newton_euler.py carries the wrenches that this asks of the bodies down to the axes.
 
-w_r is a second ("reference") angular velocity, linear in qd_r; with qd_r = qd it is w and the result is ordinary inverse
-dynamics. With qd_r apart the result is M qdd_r + C(q, qd) qd_r + g, where C is the matrix of
+w_r is a second ("reference") angular velocity, linear in qd_r. A caller that gives no qd_r has one velocity: w_r is w, it
+is not computed, and the result is ordinary inverse dynamics. With qd_r the result is M qdd_r + C(q, qd) qd_r + g, where C
+is the matrix of
 C_ij = sum_k tr(dT_k/dq_i S_k d/dt(dT_k/dq_j)^T) over the links' pseudo-inertias S_k, for which dM/dt - 2 C is
 skew-symmetric: the Slotine-Li form.
 
 Two choices that change the operation count, never the result:
-compound  consecutive parallel axes turn w and dw once, by the sum of their angles, from the frame before the first.
-fold      the last body is looked at from the frame before its joint's turn, where U differs from its predecessor's in
-          six entries only; the body's parameters are turned instead.
+compound  parallel axes that follow each other turn w and dw once, by the sum of their angles, from the frame before the
+          first.
+fold      a leaf, a body that carries no other, is looked at from the frame before its joint's turn, where U differs from
+          its parent's in six entries only; the body's parameters are turned instead.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from psdmc.dynamics.frames import (
+    BASE,
     NO_TURN,
+    Angle,
     Frame,
     Turn,
     from_previous,
     joined,
     joint_angle,
     joint_offset,
+    leaves,
     outward,
 )
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, multiply, transform, transpose
@@ -35,7 +40,7 @@ from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, multiply, t
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """How the recursion is arranged; see the module's docstring. `fold_double_angle` turns the folded body's second
+    """How the recursion is arranged; see the module's docstring. `fold_double_angle` turns a folded body's second
     moments by sincos(2 q) of its own instead of products of sincos(q); `add_sines` makes the compound turns' sincos from
     those of their parts instead of a sincos of the sum."""
 
@@ -67,37 +72,54 @@ class LinkMotion(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Angular velocity, reference angular velocity and its derivative, of one frame in itself."""
+    """Angular velocity, derivative of the reference angular velocity, and that velocity, of one frame in itself.
+
+    w_r   None: there is one velocity, w
+    """
 
     w: Vector
-    w_r: Vector
     dw_r: Vector
+    w_r: Vector | None = None
+
+    @property
+    def reference(self) -> Vector:
+        """The reference angular velocity."""
+        return self.w if self.w_r is None else self.w_r
 
 
-AT_REST = Rates(ZERO, ZERO, ZERO)
+class JointRates(NamedTuple):
+    """Rate, reference acceleration and reference rate of a turn about z or of a way along it; qd_r None: it is qd."""
+
+    qd: Scalar
+    qdd_r: Scalar
+    qd_r: Scalar | None = None
+
+    @property
+    def reference(self) -> Scalar:
+        return self.qd if self.qd_r is None else self.qd_r
 
 
 class JointState(NamedTuple):
-    """Where one joint stands: its turn relative to the frame before, and the offset of its origin there."""
+    """Where one joint stands: its turn relative to its parent's frame, and the offset of its origin there."""
 
     turn: Turn | None
     offset: Vector
 
 
 class Forward(NamedTuple):
-    """Result of the outward sweep. Bodies are in the frames that `motions` and `rates` are in: all after the joint's
-    turn, but for a folded last one, whose rates stay those before it."""
+    """Result of the outward sweep, body by body. Bodies are in the frames that `motions` and `rates` are in: all after the
+    joint's turn, but for folded ones, whose motions are before it and whose rates are their parent's."""
 
     states: tuple[JointState, ...]
     compound_turns: tuple[Turn | None, ...]
     motions: tuple[LinkMotion, ...]
     rates: tuple[Rates, ...]
-    folded: bool
+    folded: tuple[bool, ...]
 
 
 def spin_of(rates: Rates) -> Spin:
     """U = [w][w_r] + [dw_r] = w_r w^T - (w . w_r) 1 + [dw_r]."""
-    (wx, wy, wz), (rx, ry, rz), (ax, ay, az) = rates
+    (wx, wy, wz), (rx, ry, rz), (ax, ay, az) = rates.w, rates.reference, rates.dw_r
     xx, yy, zz = wx * rx, wy * ry, wz * rz
     field = (
         (-(yy + zz), rx * wy - az, rx * wz + ay),
@@ -107,21 +129,22 @@ def spin_of(rates: Rates) -> Spin:
     return Spin(field, (zz - yy, xx - zz, yy - xx))
 
 
-def spin_before_turn(
-    frame: Frame, previous: Spin, base: Rates, qd: Scalar, qd_r: Scalar, qdd_r: Scalar
-) -> Spin:
-    """The last frame's spin seen from before its turn: its predecessor's plus ([qd w_r + qd_r w + qd qd_r z] + qdd_r)[z]."""
-    if frame.kind == "prismatic":
-        rotated = _turned_field(frame, previous)
-        return rotated
-    if base.w is base.w_r and qd is qd_r:
-        twice = qd + qd
-        vx, vy, vz = twice * base.w[0], twice * base.w[1], qd * (base.w[2] + (base.w[2] + qd))
-    else:
-        vx = qd * base.w_r[0] + qd_r * base.w[0]
-        vy = qd * base.w_r[1] + qd_r * base.w[1]
-        vz = qd * base.w_r[2] + qd_r * (base.w[2] + qd)
+def spin_before_turn(frame: Frame, previous: Spin, before: Rates, turning: JointRates | None) -> Spin:
+    """A leaf's spin seen from before its turn: its parent's plus ([qd w_r + qd_r w + qd qd_r z] + qdd_r)[z]."""
     (u, d) = _turned_field(frame, previous)
+    if turning is None:
+        return Spin(u, d)
+    qd, qdd_r, w = turning.qd, turning.qdd_r, before.w
+    if turning.qd_r is None or before.w_r is None:
+        twice = qd + qd
+        vx, vy, vz = twice * w[0], twice * w[1], qd * (w[2] + (w[2] + qd))
+    else:
+        qd_r, w_r = turning.qd_r, before.w_r
+        vx, vy, vz = (
+            qd * w_r[0] + qd_r * w[0],
+            qd * w_r[1] + qd_r * w[1],
+            qd * w_r[2] + qd_r * (w[2] + qd),
+        )
     field = (
         (u[0][0] - vz, u[0][1] - qdd_r, u[0][2]),
         (u[1][0] + qdd_r, u[1][1] - vz, u[1][2]),
@@ -131,7 +154,7 @@ def spin_before_turn(
 
 
 def _turned_field(frame: Frame, spin: Spin) -> Spin:
-    """A spin of frame i-1 in frame i before its turn."""
+    """A spin of the parent's frame in this one before its turn."""
     if frame.is_parallel:
         return spin
     outward_rows = transpose(frame.rotation)
@@ -153,79 +176,142 @@ def _permuted_differences(rotation: Matrix, spin: Spin, field: Matrix) -> Vector
     return (difference(2, 1), difference(0, 2), difference(1, 0))
 
 
+class _Group(NamedTuple):
+    """Parallel axes that turn as one: rates in the frame before the first turn, and what the joints so far add up to."""
+
+    before: Rates
+    turning: JointRates
+    angle: Angle
+    turn: Turn | None
+
+
+class _Moved(NamedTuple):
+    """One body after the sweep has passed it."""
+
+    state: JointState
+    motion: LinkMotion
+    rates: Rates
+    group: _Group
+
+
 def sweep_outward(
     frames: Sequence[Frame],
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
-    qd_r: Sequence[Scalar],
+    qd_r: Sequence[Scalar] | None,
     qdd_r: Sequence[Scalar],
     base: Vector,
     choices: Choices = PLAIN,
 ) -> Forward:
-    """Motions of all bodies; `base` is the base's acceleration, minus gravity (m/s^2, base frame)."""
-    states: list[JointState] = []
-    compound_turns: list[Turn | None] = []
-    motions: list[LinkMotion] = []
-    all_rates: list[Rates] = []
-    rates, group = AT_REST, AT_REST
-    angle, turn = NO_TURN, None
-    group_rates: tuple[Scalar, Scalar, Scalar] = (0.0, 0.0, 0.0)
-    previous = LinkMotion(base, spin_of(AT_REST))
-    last = len(frames) - 1
-    folded = choices.fold and last > 0
+    """Motions of all bodies; `base` is the base's acceleration, minus gravity (m/s^2, base frame).
+
+    qd_r   reference rates; None: there is one velocity, qd
+    """
+    at_base = _resting(base, qd_r is not None)
+    folded = tuple(
+        choices.fold and is_leaf and frame.parent != BASE
+        for is_leaf, frame in zip(leaves(frames), frames, strict=True)
+    )
+    moved: list[_Moved] = []
     for i, frame in enumerate(frames):
-        own_angle = joint_angle(frame, q[i])
-        offset = joint_offset(frame, q[i])
-        joins = choices.compound and i > 0 and frame.is_parallel
-        if not joins:
-            group = _rates_before_turn(frame, rates)
-            group_rates, angle = (0.0, 0.0, 0.0), NO_TURN
-        angle = angle + own_angle
-        if frame.kind == "revolute":
-            group_rates = (group_rates[0] + qd[i], group_rates[1] + qd_r[i], group_rates[2] + qdd_r[i])
-        same = qd[i] is qd_r[i] and group.w is group.w_r
-        own_turn = own_angle.turn()
-        turn = joined(turn, own_turn) if joins and choices.add_sines else angle.turn()
-        shifted = from_previous(frame, add(previous.acceleration, transform(previous.spin.field, offset)))
-        if folded and i == last:
-            before = _rates_before_turn(frame, rates)
-            spin = spin_before_turn(frame, previous.spin, before, qd[i], qd_r[i], qdd_r[i])
-            acceleration = _slide(frame, shifted, before, qd[i], qd_r[i], qdd_r[i])
-        else:
-            rates = _rates_after_turn(group, turn, group_rates, same)
-            spin = spin_of(rates)
-            acceleration = _slide(frame, outward(own_turn, shifted), rates, qd[i], qd_r[i], qdd_r[i])
-        previous = LinkMotion(acceleration, spin)
-        states.append(JointState(own_turn, offset))
-        compound_turns.append(turn)
-        motions.append(previous)
-        all_rates.append(rates)
-    return Forward(tuple(states), tuple(compound_turns), tuple(motions), tuple(all_rates), folded)
+        parent = at_base if frame.parent == BASE else moved[frame.parent]
+        given = (qd[i], qdd_r[i], None if qd_r is None else qd_r[i])
+        moved.append(_swept(frame, parent, q[i], given, choices, folded[i]))
+    return Forward(
+        tuple(body.state for body in moved),
+        tuple(body.group.turn for body in moved),
+        tuple(body.motion for body in moved),
+        tuple(body.rates for body in moved),
+        folded,
+    )
+
+
+def _resting(base: Vector, two_velocities: bool) -> _Moved:
+    """The base: it accelerates, and does not turn."""
+    rates = Rates(ZERO, ZERO, ZERO if two_velocities else None)
+    group = _Group(rates, _no_turning(rates), NO_TURN, None)
+    return _Moved(JointState(None, ZERO), LinkMotion(base, spin_of(rates)), rates, group)
+
+
+def _no_turning(rates: Rates) -> JointRates:
+    return JointRates(0.0, 0.0, None if rates.w_r is None else 0.0)
+
+
+def _swept(
+    frame: Frame,
+    parent: _Moved,
+    q: Scalar,
+    given: tuple[Scalar, Scalar, Scalar | None],
+    choices: Choices,
+    is_folded: bool,
+) -> _Moved:
+    """One body, from its parent; `given` are the joint's rate, reference acceleration and reference rate."""
+    own_angle, offset = joint_angle(frame, q), joint_offset(frame, q)
+    turning, sliding = (_along(part, given) for part in (frame.joint.turn, frame.joint.slide))
+    group = parent.group
+    joins = choices.compound and frame.parent != BASE and frame.is_parallel
+    if not joins:
+        before = _rates_before_turn(frame, parent.rates)
+        group = _Group(before, _no_turning(before), NO_TURN, None)
+    angle = group.angle + own_angle
+    summed = group.turning if turning is None else _added(group.turning, turning)
+    own_turn = own_angle.turn()
+    turn = joined(group.turn, own_turn) if joins and choices.add_sines else angle.turn()
+    field = transform(parent.motion.spin.field, offset)
+    shifted = from_previous(frame, add(parent.motion.acceleration, field))
+    if is_folded:
+        rates, before = parent.rates, _rates_before_turn(frame, parent.rates)
+        spin = spin_before_turn(frame, parent.motion.spin, before, turning)
+        acceleration = _slid(shifted, before, sliding)
+    else:
+        rates = _rates_after_turn(group.before, turn, summed)
+        spin = spin_of(rates)
+        acceleration = _slid(outward(own_turn, shifted), rates, sliding)
+    group = _Group(group.before, summed, angle, turn)
+    return _Moved(JointState(own_turn, offset), LinkMotion(acceleration, spin), rates, group)
+
+
+def _along(
+    part: Callable[[Scalar], Scalar | None], given: tuple[Scalar, Scalar, Scalar | None]
+) -> JointRates | None:
+    """The rates of a joint's turn, or of its way; None where it makes none."""
+    qd, qdd_r, qd_r = given
+    rate = part(qd)
+    return None if rate is None else JointRates(rate, part(qdd_r), None if qd_r is None else part(qd_r))
+
+
+def _added(a: JointRates, b: JointRates) -> JointRates:
+    qd_r = None if a.qd_r is None or b.qd_r is None else a.qd_r + b.qd_r
+    return JointRates(a.qd + b.qd, a.qdd_r + b.qdd_r, qd_r)
 
 
 def _rates_before_turn(frame: Frame, rates: Rates) -> Rates:
     w = from_previous(frame, rates.w)
-    w_r = w if rates.w_r is rates.w else from_previous(frame, rates.w_r)
-    return Rates(w, w_r, from_previous(frame, rates.dw_r))
+    w_r = None if rates.w_r is None else from_previous(frame, rates.w_r)
+    return Rates(w, from_previous(frame, rates.dw_r), w_r)
 
 
-def _rates_after_turn(
-    group: Rates, turn: Turn | None, joint_rates: tuple[Scalar, Scalar, Scalar], same: bool
-) -> Rates:
+def _rates_after_turn(group: Rates, turn: Turn | None, turning: JointRates) -> Rates:
     """w = Rz^T w_g + z qd; dw_r = Rz^T dw_g + (Rz^T w_r,g) x z qd + z qdd_r."""
-    qd, qd_r, qdd_r = joint_rates
+    qd = turning.qd
     w_turned = outward(turn, group.w)
-    w_r_turned = w_turned if same else outward(turn, group.w_r)
+    w_r_turned = None if group.w_r is None else outward(turn, group.w_r)
     dw_turned = outward(turn, group.dw_r)
     w = (w_turned[0], w_turned[1], w_turned[2] + qd)
-    w_r = w if same else (w_r_turned[0], w_r_turned[1], w_r_turned[2] + qd_r)
-    dw_r = (dw_turned[0] + w_r[1] * qd, dw_turned[1] - w_r[0] * qd, dw_turned[2] + qdd_r)
-    return Rates(w, w_r, dw_r)
+    w_r = None if w_r_turned is None else (w_r_turned[0], w_r_turned[1], w_r_turned[2] + turning.reference)
+    reference = w if w_r is None else w_r
+    dw_r = (
+        dw_turned[0] + reference[1] * qd,
+        dw_turned[1] - reference[0] * qd,
+        dw_turned[2] + turning.qdd_r,
+    )
+    return Rates(w, dw_r, w_r)
 
 
-def _slide(frame: Frame, a: Vector, rates: Rates, qd: Scalar, qd_r: Scalar, qdd_r: Scalar) -> Vector:
-    """What a sliding joint adds to its origin's acceleration: z qdd_r + w_r x z qd + w x z qd_r."""
-    if frame.kind == "revolute":
+def _slid(a: Vector, rates: Rates, sliding: JointRates | None) -> Vector:
+    """With what a sliding joint adds to its origin's acceleration: z qdd_r + w_r x z qd + w x z qd_r."""
+    if sliding is None:
         return a
-    (wx, wy, _), (rx, ry, _) = rates.w, rates.w_r
-    return (a[0] + (ry * qd + wy * qd_r), a[1] - (rx * qd + wx * qd_r), a[2] + qdd_r)
+    qd, qd_r = sliding.qd, sliding.reference
+    (wx, wy, _), (rx, ry, _) = rates.w, rates.reference
+    return (a[0] + (ry * qd + wy * qd_r), a[1] - (rx * qd + wx * qd_r), a[2] + sliding.qdd_r)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body, turned
-from psdmc.dynamics.frames import Frame, Turn, inward, joint_angle, to_previous
+from psdmc.dynamics.frames import BASE, Frame, Turn, inward, joint_angle, to_previous
 from psdmc.dynamics.motion import PLAIN, Choices, Forward, LinkMotion, sweep_outward
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, transform
+from psdmc.dynamics.twist import effort
 
 
 def wrench(motion: LinkMotion, body: Body) -> tuple[Vector, Vector]:
@@ -41,11 +42,14 @@ def inverse_dynamics(
 
     Luh, Walker, Paul 1980, with the body's wrench written on its pseudo-inertia.
     """
-    forward = sweep_outward(frames, q, qd, qd if qd_r is None else qd_r, qdd, base, choices)
-    bodies = list(bodies)
-    if forward.folded:
-        bodies[-1] = _folded_body(frames[-1], bodies[-1], q[-1], forward.states[-1].turn, choices)
-    return sweep_inward(frames, bodies, drive_inertia, qdd, forward, choices)
+    forward = sweep_outward(frames, q, qd, qd_r, qdd, base, choices)
+    seen = [
+        _folded_body(frame, body, value, state.turn, choices) if is_folded else body
+        for frame, body, value, state, is_folded in zip(
+            frames, bodies, q, forward.states, forward.folded, strict=True
+        )
+    ]
+    return sweep_inward(frames, seen, drive_inertia, qdd, forward, choices)
 
 
 def _folded_body(frame: Frame, body: Body, q: Scalar, turn: Turn | None, choices: Choices) -> Body:
@@ -61,28 +65,29 @@ def sweep_inward(
     forward: Forward,
     choices: Choices = PLAIN,
 ) -> tuple[Scalar, ...]:
-    """Wrenches down to the base; each axis takes its component. With compound turns the moments' x and y of a group
-    of parallel axes are gathered in the frame before its first turn, their z and the forces joint by joint."""
+    """Wrenches down to the base, children before parents; each axis takes its component. With compound turns the moments'
+    x and y of a group of parallel axes are gathered in the frame before its first turn, their z and the forces joint by
+    joint."""
     n = len(frames)
     torques: list[Scalar] = [0.0] * n
-    force, moment, gathered = ZERO, ZERO, ZERO
+    forces, moments, gathered = [ZERO] * n, [ZERO] * n, [ZERO] * n
     for i in reversed(range(n)):
-        frame, state = frames[i], forward.states[i]
+        frame, state, parent = frames[i], forward.states[i], frames[i].parent
         own_force, own_moment = wrench(forward.motions[i], bodies[i])
-        force, moment = add(force, own_force), add(moment, own_moment)
-        torque = moment[2] if frame.kind == "revolute" else force[2]
-        torques[i] = torque + drive_inertia[i] * qdd[i]
-        is_folded = forward.folded and i == n - 1
-        own_turn = None if is_folded else state.turn
-        turn = None if is_folded else forward.compound_turns[i]
+        force, moment = add(forces[i], own_force), add(moments[i], own_moment)
+        torques[i] = effort(frame.joint, force, moment) + drive_inertia[i] * qdd[i]
+        if parent == BASE:
+            continue
+        own_turn = None if forward.folded[i] else state.turn
         force = to_previous(frame, inward(own_turn, force))
-        joins = choices.compound and i > 0 and frame.is_parallel
-        if joins:
-            turned = inward(forward.compound_turns[i - 1] if is_folded else turn, moment)
-            gathered = (gathered[0] + turned[0], gathered[1] + turned[1], 0.0)
-            moment = add((0.0, 0.0, moment[2]), cross(state.offset, force))
+        if choices.compound and frame.is_parallel:
+            group_turn = forward.compound_turns[parent if forward.folded[i] else i]
+            x, y, _ = inward(group_turn, moment)
+            gathered[parent] = add(gathered[parent], (gathered[i][0] + x, gathered[i][1] + y, 0.0))
+            carried: Vector = (0.0, 0.0, moment[2])
         else:
-            moment = to_previous(frame, add(inward(turn, moment), gathered))
-            gathered = ZERO
-            moment = add(moment, cross(state.offset, force))
+            turn = None if forward.folded[i] else forward.compound_turns[i]
+            carried = to_previous(frame, add(inward(turn, moment), gathered[i]))
+        carried = add(carried, cross(state.offset, force))
+        forces[parent], moments[parent] = add(forces[parent], force), add(moments[parent], carried)
     return tuple(torques)

@@ -1,7 +1,7 @@
 """The joint-torque regressor: torques as a matrix times the standard parameters.
 
 Each body's wrench is linear in its parameters; a column is that wrench for one parameter alone, dotted with the twist
-of each joint below it, carried into the body's frame.
+of each joint that carries it, moved into the body's frame.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
-from psdmc.dynamics.frames import Frame, from_previous, outward
+from psdmc.dynamics.frames import BASE, Frame, from_previous, outward
 from psdmc.dynamics.motion import PLAIN, JointState, LinkMotion, Rates, spin_of, sweep_outward
 from psdmc.dynamics.scalar import (
     ZERO,
@@ -23,6 +23,7 @@ from psdmc.dynamics.scalar import (
     transform,
     transpose,
 )
+from psdmc.dynamics.twist import axis_twist
 from psdmc.robot.chain import PARAMETERS_PER_LINK
 
 Twist = tuple[Vector, Vector]
@@ -58,19 +59,20 @@ def regressor(
     qd_r         with it, the Slotine-Li regressor of M qdd_r + C qd_r + g; else qd
     """
     n = len(frames)
-    forward = sweep_outward(frames, q, qd, qd if qd_r is None else qd_r, qdd_r, base, PLAIN)
+    forward = sweep_outward(frames, q, qd, qd_r, qdd_r, base, PLAIN)
     rows: tuple[dict[int, Scalar], ...] = tuple({} for _ in range(n))
-    twists: list[Twist] = []
+    twists: list[dict[int, Twist]] = []
     for k, frame in enumerate(frames):
-        twists = [carried(frame, forward.states[k], twist) for twist in twists]
-        twists.append(own_twist(frame))
+        before = {} if frame.parent == BASE else twists[frame.parent]
+        own = {i: carried(frame, forward.states[k], twist) for i, twist in before.items()}
+        twists.append(own | {k: own_twist(frame)})
         motion = seen_from(link_frames[k], forward.motions[k], forward.rates[k])
-        seen = [twist_in(link_frames[k], twist) for twist in twists]
+        seen = {i: twist_in(link_frames[k], twist) for i, twist in twists[k].items()}
         for name in range(DRIVE):
             column = PARAMETERS_PER_LINK * k + name
             if column in wanted:
                 force, moment = unit_wrench(name, motion)
-                for i, (linear, angular) in enumerate(seen):
+                for i, (linear, angular) in seen.items():
                     _put(rows[i], column, linear, force, angular, moment)
         if PARAMETERS_PER_LINK * k + DRIVE in wanted:
             rows[k][PARAMETERS_PER_LINK * k + DRIVE] = qdd_r[k]
@@ -90,12 +92,12 @@ def _put(
 
 
 def own_twist(frame: Frame) -> Twist:
-    axis: Vector = (0.0, 0.0, 1.0)
-    return (ZERO, axis) if frame.kind == "revolute" else (axis, ZERO)
+    """What the joint's unit rate does to its own frame."""
+    return axis_twist(frame.joint)
 
 
 def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
-    """A twist of the frame before, at the origin and along the axes of this one."""
+    """A twist of the parent's frame, at the origin and along the axes of this one."""
     linear, angular = twist
     moved = add(linear, cross(angular, state.offset))
     return (
@@ -118,9 +120,10 @@ def seen_from(place: Placed, motion: LinkMotion, rates: Rates) -> LinkMotion:
     rotation, translation = _plain(place)
     rows = transpose(rotation)
     acceleration = add(motion.acceleration, transform(motion.spin.field, translation))
-    w, w_r, dw_r = (transform(rows, v) for v in rates)
-    same = rates.w is rates.w_r
-    return LinkMotion(transform(rows, acceleration), spin_of(Rates(w, w if same else w_r, dw_r)))
+    w = transform(rows, rates.w)
+    w_r = None if rates.w_r is None else transform(rows, rates.w_r)
+    seen = Rates(w, transform(rows, rates.dw_r), w_r)
+    return LinkMotion(transform(rows, acceleration), spin_of(seen))
 
 
 def _plain(place: Placed) -> tuple[Matrix, Vector]:

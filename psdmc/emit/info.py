@@ -12,7 +12,7 @@ from psdmc.version import psdmc_version
 
 @dataclass(frozen=True, slots=True)
 class JointInfo:
-    """A joint's name, kind and limits (rad or m, their rates, N m or N; infinite where unknown)."""
+    """A joint's name, its type's word and units, and its limits in these (infinite where unknown)."""
 
     name: str
     kind: str
@@ -21,14 +21,8 @@ class JointInfo:
     speed: float = math.inf
     acceleration: float = math.inf
     effort: float = math.inf
-
-    @property
-    def unit(self) -> str:
-        return "rad" if self.kind == "revolute" else "m"
-
-    @property
-    def effort_unit(self) -> str:
-        return "N m" if self.kind == "revolute" else "N"
+    unit: str = "rad"
+    effort_unit: str = "N m"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +80,14 @@ def package_info(
     joints = tuple(
         JointInfo(
             joint.name,
-            joint.kind,
+            joint.type.word,
             joint.limits.lower,
             joint.limits.upper,
             joint.limits.speed,
             joint.limits.acceleration,
             joint.limits.effort,
+            joint.type.position_unit,
+            joint.type.effort_unit,
         )
         for joint in chain.joints
     )

@@ -15,8 +15,8 @@ def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scala
     n = model.n
     q = tracer.symbols("q", n)
     sincos = [
-        angle.sincos() if revolute else (0.0, 0.0)
-        for angle, revolute in zip(q, model.chain.is_revolute, strict=True)
+        value.sincos() if joint.basis.has_sincos else (0.0, 0.0)
+        for value, joint in zip(q, model.chain.types, strict=True)
     ]
     rates = [*tracer.symbols("qd", n), *tracer.symbols("qdd", n)]
     parameters = tracer.symbols("theta_b", model.l) if theta else []

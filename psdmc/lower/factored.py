@@ -218,7 +218,7 @@ def trace_jacobian(reframed: Reframed) -> Program:
     """The PROGRAM of the tip's geometric Jacobian in the chain's base frame."""
     tracer = Tracer()
     q = tracer.symbols("q", len(reframed.frames))
-    rows = jacobian(reframed.frames, reframed.tip, q)
+    rows = jacobian(reframed.frames, reframed.tip_body, reframed.tip, q)
     turned = [
         [dot(axes, (rows[k][j], rows[k + 1][j], rows[k + 2][j])) for j in range(len(q))]
         for k in (0, 3)

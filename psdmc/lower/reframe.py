@@ -1,9 +1,11 @@
-"""Re-frame a chain to modified DH for cheap arithmetic: joint axes as z, frames turned about and slid along them.
+"""Re-frame a robot to modified DH for cheap arithmetic: joint axes as z, frames turned about and slid along them.
 
-Never for E, P or theta_b: joint variables keep their zero, only intermediate frames move. Frame i's x points along the
-common normal from axis i to axis i+1, so that the constant rotation between frames is about x alone and a right angle
-costs nothing. Where a frame's origin sits on its axis is a free choice (`feet`); an axis that slides has only a
-direction and is put through a neighbour's origin.
+Never for E, P or theta_b: joint variables keep their zero, only intermediate frames move. A frame's x points along the
+common normal from its axis to its child's, so that the constant rotation between the two frames is about x alone and a
+right angle costs nothing. A body with several children does so towards the first; the others' frames are turned about
+both z and x. Where a frame's origin sits on its axis is a free choice (`feet`), on the normal to its parent's axis
+("previous") or to its first child's ("next"); an axis that slides has only a direction and is put through a
+neighbour's origin.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import numpy as np
 
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector
 from psdmc.dynamics.scalar import Matrix, Vector
-from psdmc.robot.chain import Array, Chain, Placement
+from psdmc.robot.chain import BASE, Array, Chain, Placement
 from psdmc.robot.small import length, times
 
 Foot = Literal["previous", "next"]
@@ -41,13 +43,14 @@ centimetres would lose digits."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reframed:
-    """A chain's geometry for lowering.
+    """A robot's geometry for lowering.
 
     frames       n
-    base         base acceleration, minus gravity, m/s^2, along the axes that the first frame turns from
+    base         base acceleration, minus gravity, m/s^2, along base_axes
     link_frames  n, the file's link frames in the new joint frames
-    tip          the tip frame in the last new joint frame
-    base_axes    3 x 3, the axes that the first frame turns from, as columns in the chain's base frame
+    tip          the tip frame in the new joint frame of `tip_body`
+    base_axes    3 x 3, the axes that the first frame turns from, as columns in the robot's base frame
+    tip_body     the body that the tip frame is fixed to
     """
 
     frames: tuple[Frame, ...]
@@ -55,6 +58,7 @@ class Reframed:
     link_frames: tuple[Placement, ...]
     tip: Placement
     base_axes: Matrix
+    tip_body: int
 
     def is_same(self, other: Reframed) -> bool:
         """Whether every number of both is."""
@@ -70,21 +74,23 @@ def _is_same(a: Placement, b: Placement) -> bool:
 
 
 def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
-    """The chain in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""
+    """The robot in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""
     placed, reach = _placed_at_zero(chain), _reach(chain)
     axes = [_clean(place.rotation[:, 2]) for place in placed]
     origins = _origins(chain, placed, axes, feet)
     before, after = _orientations(chain, placed, axes, origins)
     frames, link_frames = [], []
-    for i, joint in enumerate(chain.joints):
-        rotation = np.eye(3) if i == 0 else _between(times(after[i - 1].T, before[i]))
-        offset = np.zeros(3) if i == 0 else times(after[i - 1].T, origins[i] - origins[i - 1])
+    for i, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True)):
+        outer, foot = (before[0], origins[0]) if parent == BASE else (after[parent], origins[parent])
+        rotation = np.eye(3) if i == 0 else _between(times(outer.T, before[i]))
+        offset = np.zeros(3) if i == 0 else times(outer.T, origins[i] - foot)
         angle = _angle_about_z(times(before[i].T, after[i]))
         quarters = round(angle / (np.pi / 2))
         rest = angle - quarters * (np.pi / 2)
         frames.append(
             Frame(
-                joint.kind,
+                joint.type,
+                parent,
                 as_matrix(rotation.tolist()),
                 as_vector(_clean_lengths(offset, reach).tolist()),
                 0.0 if abs(rest) < EXACT else float(rest),
@@ -94,9 +100,10 @@ def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
         mine = Placement(after[i], origins[i])
         link_frames.append(_rounded(mine.inverse() @ placed[i] @ joint.link_frame, reach))
     base = _clean_lengths(times(before[0].T, -chain.gravity), length(chain.gravity))
-    tip = _rounded(Placement(after[-1], origins[-1]).inverse() @ placed[-1] @ chain.tip, reach)
+    end = chain.tip_body
+    tip = _rounded(Placement(after[end], origins[end]).inverse() @ placed[end] @ chain.tip, reach)
     base_axes = as_matrix(np.where(np.abs(before[0]) < EXACT, 0.0, before[0]).tolist())
-    return Reframed(tuple(frames), as_vector(base.tolist()), tuple(link_frames), tip, base_axes)
+    return Reframed(tuple(frames), as_vector(base.tolist()), tuple(link_frames), tip, base_axes, end)
 
 
 def _rounded(place: Placement, reach: float) -> Placement:
@@ -108,11 +115,25 @@ def _rounded(place: Placement, reach: float) -> Placement:
 
 def _placed_at_zero(chain: Chain) -> list[Placement]:
     """Joint frames in the base frame at q = 0."""
-    placed, here = [], Placement.identity()
-    for joint in chain.joints:
-        here = here @ joint.placement
-        placed.append(here)
+    placed: list[Placement] = []
+    for joint, parent in zip(chain.joints, chain.parents, strict=True):
+        before = Placement.identity() if parent == BASE else placed[parent]
+        placed.append(before @ joint.placement)
     return placed
+
+
+def _first_children(chain: Chain) -> list[int | None]:
+    """Each body's first child; None for a leaf."""
+    found: list[int | None] = [None] * len(chain)
+    for i, parent in reversed(list(enumerate(chain.parents))):
+        if parent != BASE:
+            found[parent] = i
+    return found
+
+
+def _has_direction_only(chain: Chain, i: int) -> bool:
+    """Whether an axis may be shifted sideways: that of a joint that slides, and does not turn."""
+    return not any(any(angular) for _, angular in chain.joints[i].type.twists)
 
 
 def _reach(chain: Chain) -> float:
@@ -142,23 +163,24 @@ def _origins(
     chain: Chain, placed: Sequence[Placement], axes: Sequence[Array], feet: Sequence[Foot]
 ) -> list[Array]:
     """Origins at q = 0 in the base frame. Parallel neighbours share a level; sliding axes go through a neighbour."""
-    n = len(chain)
+    n, children = len(chain), _first_children(chain)
     points = [place.translation for place in placed]
-    for i in reversed(range(n - 1)):
-        if chain.joints[i].kind == "prismatic" and feet[i] == "next":
-            points[i] = points[i + 1]
+    for i, child in reversed(list(enumerate(children))):
+        if child is not None and feet[i] == "next" and _has_direction_only(chain, i):
+            points[i] = points[child]
     origins: list[Array] = []
     for i in range(n):
-        sliding = chain.joints[i].kind == "prismatic"
-        if sliding and feet[i] == "previous" and i > 0:
-            points[i] = origins[i - 1]
+        parent, child = chain.parents[i], children[i]
+        if feet[i] == "previous" and parent != BASE and _has_direction_only(chain, i):
+            points[i] = origins[parent]
         foot = None
-        if feet[i] == "next" and i + 1 < n:
-            foot = _foot(points[i], axes[i], points[i + 1], axes[i + 1])
-        if foot is None and i > 0:
-            foot = _foot(points[i], axes[i], origins[i - 1], axes[i - 1])
+        if feet[i] == "next" and child is not None:
+            foot = _foot(points[i], axes[i], points[child], axes[child])
+        if foot is None and parent != BASE:
+            foot = _foot(points[i], axes[i], origins[parent], axes[parent])
         if foot is None:
-            reference = origins[i - 1] if i > 0 and _parallel(axes[i], axes[i - 1]) else points[i]
+            is_level = parent != BASE and _parallel(axes[i], axes[parent])
+            reference = origins[parent] if is_level else points[i]
             foot = points[i] + axes[i] * times(axes[i], reference - points[i])
         origins.append(foot)
     return origins
@@ -178,19 +200,36 @@ def _orientations(
     chain: Chain, placed: Sequence[Placement], axes: Sequence[Array], origins: Sequence[Array]
 ) -> tuple[list[Array], list[Array]]:
     """Each frame's axes before and after its joint's turn, at q = 0, as columns in the base frame."""
-    n = len(chain)
-    x_before = _first_x(chain, placed[0], axes[0])
-    before, after = [], []
-    for i in range(n):
+    children, first = _first_children(chain), _first_x(chain, placed[0], axes[0])
+    before: list[Array] = []
+    after: list[Array] = []
+    for i, (parent, child) in enumerate(zip(chain.parents, children, strict=True)):
+        x_before = first
+        if parent != BASE:
+            x_before = after[parent][:, 0]
+            if children[parent] != i:
+                x_before = _own_normal(axes[parent], axes[i], origins[i] - origins[parent], x_before)
+        elif i:
+            x_before = min(before[0].T, key=lambda x: abs(float(times(x, axes[i]))))
+        if i:
+            x_before = _across(x_before, axes[i])
         before.append(np.column_stack([x_before, np.cross(axes[i], x_before), axes[i]]))
-        x_after = _normal(axes[i], axes[i + 1], origins[i + 1] - origins[i]) if i + 1 < n else None
+        x_after = None
+        if child is not None:
+            x_after = _normal(axes[i], axes[child], origins[child] - origins[i])
         if x_after is None:
-            x_after = placed[i].rotation[:, 0] if chain.joints[i].kind == "revolute" else x_before
+            x_after = x_before if _has_direction_only(chain, i) else placed[i].rotation[:, 0]
         elif times(x_after, x_before) < -EXACT:
             x_after = -x_after
         after.append(np.column_stack([x_after, np.cross(axes[i], x_after), axes[i]]))
-        x_before = x_after if i + 1 == n else _across(x_after, axes[i + 1])
     return before, after
+
+
+def _own_normal(axis: Array, following: Array, step: Array, x: Array) -> Array:
+    """The common normal of a body's axis and a further child's, x where every perpendicular would do: the body's own x
+    looks along the normal to its first child."""
+    own = _normal(axis, following, step)
+    return x if own is None else own
 
 
 def _across(direction: Array, axis: Array) -> Array:

@@ -150,7 +150,7 @@ class Search:
     def _units(self, found: Arrangement) -> Iterator[Arrangement]:
         """Each length of the robot as the unit; not with sliding joints, whose variables would need scaling."""
         frames = found.reframed.frames
-        if any(frame.kind == "prismatic" for frame in frames):
+        if any(frame.joint.length_order for frame in frames):
             return
         lengths = {abs(x): None for frame in frames for x in frame.translation if x}
         for unit in lengths:
@@ -193,7 +193,8 @@ class _Descent:
 
 
 def all_feet(chain: Chain) -> Iterator[tuple[Foot, ...]]:
-    """Where frames may sit: all on the normal to the axis before, then one at a time on the next, then all of them."""
-    n = len(chain)
-    for moved in [(), *((i,) for i in range(n - 1)), tuple(range(n))]:
+    """Where frames may sit: all on the normal to the axis before, then one at a time on the next, then all of them. A leaf
+    has no next."""
+    n, leaves = len(chain), chain.leaves
+    for moved in [(), *((i,) for i in range(n) if i not in leaves), tuple(range(n))]:
         yield tuple("next" if i in moved else "previous" for i in range(n))

@@ -12,6 +12,7 @@ import numpy as np
 
 from psdmc.model.json_values import entries, number, numbers, part, text, whole
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Limits, Placement
+from psdmc.robot.joints import joint_type
 
 MOST_JOINTS = 256
 """Joints of a model file: its span alone takes 0.5 kB times the square of that, 64 MB."""
@@ -127,13 +128,10 @@ def _joint_to_json(joint: Joint) -> dict[str, Any]:
 def _joint_from_json(data: object) -> Joint:
     limits = part(data, "limits", "a joint")
     found = {name: part(limits, name, "a joint's limits") for name in _NO_LIMIT}
-    kind = text(part(data, "kind", "a joint"), "a joint's kind")
-    if kind not in ("revolute", "prismatic"):
-        raise ValueError(f"joint kind {kind!r}")
     return Joint(
         text(part(data, "name", "a joint"), "a joint's name"),
         text(part(data, "link_name", "a joint"), "a link's name"),
-        kind,  # type: ignore[arg-type]
+        joint_type(text(part(data, "kind", "a joint"), "a joint's kind")),
         _placement_from_json(part(data, "placement", "a joint"), "a joint"),
         _placement_from_json(part(data, "link_frame", "a joint"), "a link frame"),
         Limits(**{k: _NO_LIMIT[k] if v is None else number(v, f"a joint's {k}") for k, v in found.items()}),

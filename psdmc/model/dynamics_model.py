@@ -187,7 +187,7 @@ class DynamicsModel:
         inertia: ArrayLike | None = None,
         frame: Placement | str | None = None,
     ) -> DynamicsModel:
-        """The model with a rigid load fixed to its last link.
+        """The model with a rigid load fixed to the link that carries its tip.
 
         mass      kg
         com       (3,) m, centre of mass in `frame`
@@ -203,5 +203,5 @@ class DynamicsModel:
             raise InputError(
                 f"the base parameters of '{self.chain.name}' are unknown", "calibrate before adding a load"
             )
-        index = payload.last_link(self.chain)
+        index = payload.tip_link(self.chain)
         return replace(self, theta_b=self.theta_b + self.B[:, index] @ load, chain=chain)

@@ -98,7 +98,7 @@ def _order(index: int, chain: Chain) -> int:
     joint, parameter = divmod(index, PARAMETERS_PER_LINK)
     if parameter < len(_LENGTH_ORDER):
         return _LENGTH_ORDER[parameter]
-    return 2 if chain.joints[joint].kind == "revolute" else 0
+    return chain.joints[joint].type.drive_order
 
 
 def _unit(index: int, chain: Chain) -> str:

@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 POSES = 2000
 """Poses tried, each joint drawn evenly within its limits."""
 SEED = 88_061
-FREE_RANGE = {"revolute": np.pi, "prismatic": 1.0}
-"""rad, m: either way for a joint without limits."""
 ROUNDING = 64 * float(np.finfo(float).eps)
 """Share of a matrix's largest eigenvalue below which its smallest one is rounding, and counts as zero."""
 
@@ -73,6 +71,6 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
 
 
 def _range(joint: Joint) -> tuple[float, float]:
-    free = FREE_RANGE[joint.kind]
+    free = joint.type.free_range
     low, high = joint.limits.lower, joint.limits.upper
     return (low if np.isfinite(low) else -free, high if np.isfinite(high) else free)

@@ -23,21 +23,21 @@ SPAN_TOLERANCE = 1e-9
 
 
 def loaded(chain: Chain, load: Array, mass: float) -> Chain:
-    """The chain with the load on its last link; InputError where the chain's assumptions do not admit it.
+    """The chain with the load on the link that carries its tip; InputError where the chain's assumptions do not admit it.
 
     load  (10,) standard parameters of `load_parameters`
     mass  kg, for the note
     """
     _check_admitted(chain, load)
     parameters = chain.parameters.copy()
-    parameters[-1, :BODY_PARAMETERS] += load
-    note = f"payload of {mass:g} kg on link '{chain.joints[-1].link_name}'"
+    parameters[chain.tip_body, :BODY_PARAMETERS] += load
+    note = f"payload of {mass:g} kg on link '{chain.joints[chain.tip_body].link_name}'"
     return replace(chain, parameters=parameters, notes=(*chain.notes, note))
 
 
-def last_link(chain: Chain) -> NDArray[np.int64]:
-    """(10,) where the last link's body parameters are in x."""
-    return PARAMETERS_PER_LINK * (len(chain) - 1) + np.arange(BODY_PARAMETERS)
+def tip_link(chain: Chain) -> NDArray[np.int64]:
+    """(10,) where the body parameters of the link that carries the tip are in x."""
+    return PARAMETERS_PER_LINK * chain.tip_body + np.arange(BODY_PARAMETERS)
 
 
 def load_parameters(
@@ -47,13 +47,14 @@ def load_parameters(
     inertia: ArrayLike | None = None,
     frame: Placement | str | None = None,
 ) -> Array:
-    """(10,) the load's standard parameters about the last link's frame; see DynamicsModel.with_payload."""
+    """(10,) the load's standard parameters about the frame of the link that carries the tip; arguments as in
+    DynamicsModel.with_payload."""
     centre, about_com = _checked(mass, com, inertia)
     kilograms = float(mass)
     about_frame = about_com + kilograms * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     own = standard_parameters(kilograms, kilograms * centre, about_frame)
     in_tip = chain.tip @ _frame(chain, frame)
-    return moved(own, chain.joints[-1].link_frame.inverse() @ in_tip)
+    return moved(own, chain.joints[chain.tip_body].link_frame.inverse() @ in_tip)
 
 
 def _frame(chain: Chain, frame: Placement | str | None) -> Placement:
@@ -128,12 +129,12 @@ _SHAPES = {(): "a finite number", (3,): "three finite numbers", (3, 3): "3 x 3 f
 def _check_admitted(chain: Chain, load: Array) -> None:
     """The load must lie in the span: a link whose mx is assumed zero cannot carry one off its axis."""
     x = np.zeros(PARAMETERS_PER_LINK * len(chain))
-    x[last_link(chain)] = load
+    x[tip_link(chain)] = load
     span = chain.parameter_span
     leads = np.argmax(span != 0.0, axis=0)
     missed = np.abs(x - span @ x[leads]).max()
     if missed > SPAN_TOLERANCE * np.abs(x).max(initial=0.0):
-        link = chain.joints[-1].link_name
+        link = chain.joints[chain.tip_body].link_name
         raise InputError(
             f"link '{link}' cannot carry this load: the model assumes some of its parameters zero",
             "derive the model again without those assumptions",

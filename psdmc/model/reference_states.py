@@ -146,7 +146,7 @@ def _without_parameters(model: DynamicsModel, given: Mapping[str, Array]) -> dic
     """Regressors and the tip's Jacobian."""
     frames = frames_of(model.chain)
     q, qd, qdd, qd_r, qdd_r = (list(given[name].T) for name in ("q", "qd", "qdd", "qd_r", "qdd_r"))
-    rows = jacobian(frames, model.chain.tip, q)
+    rows = jacobian(frames, model.chain.tip_body, model.chain.tip, q)
     return {
         "regressor": _regressor(model, q, qd, qdd, None),
         "regressor_slotine_li": _regressor(model, q, qd, qdd_r, qd_r),

@@ -1,4 +1,4 @@
-"""The robot as psdmc sees it: a serial chain of one-axis joints, each turning or sliding along its own z."""
+"""The robot as psdmc sees it: bodies in a tree, each on a joint that moves about or along its own z."""
 
 from __future__ import annotations
 
@@ -8,53 +8,19 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psdmc.robot.small import times
-
-Array = NDArray[np.float64]
-JointKind = Literal["revolute", "prismatic"]
+from psdmc.robot.joints import JointType
+from psdmc.robot.placement import Array as Array
+from psdmc.robot.placement import Placement as Placement
+from psdmc.robot.placement import frozen_array as frozen_array
 
 PARAMETER_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz", "Im")
 """Standard parameters of one link, in the order of x; about the link frame, Im the joint's drive inertia."""
 
 PARAMETERS_PER_LINK = len(PARAMETER_NAMES)
 
-
-def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
-    """A private read-only float64 copy of `values`; ValueError where its shape is another."""
-    array = np.array(values, dtype=np.float64)
-    if array.shape != shape:
-        raise ValueError(f"{what} has shape {array.shape}, expected {shape}")
-    array.setflags(write=False)
-    return array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Placement:
-    """Where a frame sits in another: x_outer = rotation @ x_inner + translation.
-
-    rotation     (3, 3)  orthonormal
-    translation  (3,)    m
-    """
-
-    rotation: Array
-    translation: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3), "rotation"))
-        object.__setattr__(self, "translation", frozen_array(self.translation, (3,), "translation"))
-
-    @staticmethod
-    def identity() -> Placement:
-        return Placement(np.eye(3), np.zeros(3))
-
-    def __matmul__(self, inner: Placement) -> Placement:
-        translation = times(self.rotation, inner.translation) + self.translation
-        return Placement(times(self.rotation, inner.rotation), translation)
-
-    def inverse(self) -> Placement:
-        return Placement(self.rotation.T, -times(self.rotation.T, self.translation))
+BASE = -1
+"""Parent of a body that hangs on the base."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,32 +38,39 @@ class Limits:
 class Joint:
     """One movable joint and the link that it carries.
 
-    The joint frame F is psdmc's own: its z is the joint's axis, it turns (or slides) with the link. At q = 0 it sits
-    at `placement` in the previous joint frame (the first: in the chain's base frame), so that
-    F_prev -> F  is  placement @ Rz(q)  (revolute)  or  placement @ Tz(q)  (prismatic).
+    The joint frame F is psdmc's own: its z is the joint's axis, it moves with the link. At q = 0 it sits at `placement`
+    in its parent's joint frame (or in the base frame), so that
+    F_parent -> F  is  placement @ type.transform(q):  Rz(q) where the joint turns, Tz(q) where it slides.
     The link frame is the file's (URDF child link frame, DH distal frame), `link_frame` its constant placement in F.
     """
 
     name: str
     link_name: str
-    kind: JointKind
+    type: JointType
     placement: Placement
     link_frame: Placement
     limits: Limits = field(default_factory=Limits)
 
+    @property
+    def kind(self) -> str:
+        """The type's word."""
+        return self.type.word
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """A serial robot: kinematics, gravity and what is known of its inertia. n joints.
+    """A robot: kinematics, gravity and what is known of its inertia. n joints, each with the body that it carries.
 
-    joints           n, from base to tip
+    joints           n, parents before their children; a serial chain's from base to tip
     parameters       (n, 11)   standard parameters x about the link frames (PARAMETER_NAMES), SI; NaN where unknown
     parameter_span   (11 n, k) columns span the parameters that the assumptions allow (assume-zero, no drive inertia,
                                links without inertia), in reduced column echelon form: each column leads with a one,
                                in a row where all others are zero
     gravity          (3,)      m/s^2, acceleration of gravity in the base frame
-    tip              tip frame in the last joint frame
+    tip              tip frame in the joint frame of `tip_body`
     notes            what was snapped, merged, locked, assumed or found odd, one sentence each, for `show`
+    parents          n, the body that each joint hangs on: its index, or BASE; left out: each on the one before
+    tip_body         the body that the tip frame is fixed to; left out: the only leaf
     """
 
     name: str
@@ -110,6 +83,8 @@ class Chain:
     gravity: Array
     tip: Placement
     notes: tuple[str, ...] = ()
+    parents: tuple[int, ...] = ()
+    tip_body: int = BASE
 
     def __post_init__(self) -> None:
         n = len(self.joints)
@@ -122,17 +97,63 @@ class Chain:
         object.__setattr__(self, "parameter_span", frozen_array(span, expected, "parameter_span"))
         object.__setattr__(self, "gravity", frozen_array(self.gravity, (3,), "gravity"))
         object.__setattr__(self, "notes", tuple(self.notes))
+        object.__setattr__(self, "parents", _checked_parents(self.parents, n))
+        object.__setattr__(self, "tip_body", _checked_tip(self.tip_body, self.leaves, n))
 
     @property
     def joint_names(self) -> tuple[str, ...]:
         return tuple(joint.name for joint in self.joints)
 
     @property
-    def is_revolute(self) -> tuple[bool, ...]:
-        return tuple(joint.kind == "revolute" for joint in self.joints)
+    def types(self) -> tuple[JointType, ...]:
+        return tuple(joint.type for joint in self.joints)
+
+    @property
+    def leaves(self) -> tuple[int, ...]:
+        """Bodies that carry no other."""
+        return tuple(i for i in range(len(self)) if i not in self.parents)
+
+    @property
+    def is_serial(self) -> bool:
+        """Whether each body hangs on the one before, the first on the base, and the tip is on the last."""
+        return self.parents == serial_parents(len(self)) and self.tip_body == len(self) - 1
+
+    def path_to(self, body: int) -> tuple[int, ...]:
+        """Bodies from the base to this one, which is the last."""
+        path: list[int] = []
+        while body != BASE:
+            path.append(body)
+            body = self.parents[body]
+        return tuple(reversed(path))
 
     def __len__(self) -> int:
         return len(self.joints)
+
+
+def serial_parents(n: int) -> tuple[int, ...]:
+    """Of a serial chain of n bodies: each hangs on the one before, the first on the base."""
+    return tuple(range(BASE, n - 1))
+
+
+def _checked_parents(parents: Sequence[int], n: int) -> tuple[int, ...]:
+    if not parents:
+        return serial_parents(n)
+    if len(parents) != n:
+        raise ValueError(f"{len(parents)} parents for {n} joints")
+    for i, parent in enumerate(parents):
+        if not BASE <= parent < i:
+            raise ValueError(f"parent {parent} of body {i} does not come before it")
+    return tuple(parents)
+
+
+def _checked_tip(tip_body: int, leaves: Sequence[int], n: int) -> int:
+    if not n:
+        return BASE
+    if tip_body == BASE and len(leaves) == 1:
+        return leaves[0]
+    if not 0 <= tip_body < n:
+        raise ValueError(f"the tip is on body {tip_body}, expected one of 0 to {n - 1}")
+    return tip_body
 
 
 def parameter_names(link_names: Sequence[str]) -> tuple[str, ...]:

@@ -12,8 +12,9 @@ from typing import Any, Literal
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.chain import JointKind, Limits
+from psdmc.robot.chain import Limits
 from psdmc.robot.inertia import INERTIA_NAMES
+from psdmc.robot.joints import JOINT_TYPES, REVOLUTE, JointType
 from psdmc.robot.limits import Range, shown
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.numerals import WHITE_SPACE, decimal
@@ -45,7 +46,7 @@ class DhJoint:
     """One row of the table: a, d in m, alpha, theta in rad; drive_inertia in kg m^2 (kg), NaN if unknown."""
 
     name: str
-    kind: JointKind
+    type: JointType
     a: float
     alpha: float
     d: float
@@ -178,23 +179,23 @@ def _joint(value: object, number: int, problems: list[str]) -> DhJoint:
     name = given if isinstance(given, str) and given else f"joint{number}"
     table = _Table(value, f"joint {shown(name)}", JOINT_KEYS, problems)
     table.read("name", _text, "")
-    kind: JointKind = table.read("type", _one_of("revolute", "prismatic"), "revolute")
+    joint_type = JOINT_TYPES[table.read("type", _one_of(*JOINT_TYPES), REVOLUTE.word)]
     return DhJoint(
         name=name,
-        kind=kind,
+        type=joint_type,
         a=table.read("a", LENGTH, 0.0),
         alpha=table.read("alpha", angle, 0.0),
         d=table.read("d", LENGTH, 0.0),
         theta=table.read("theta", angle, 0.0),
-        limits=_limits(table.read("limits", _same, {}), kind, f"{table.where} limits", problems),
+        limits=_limits(table.read("limits", _same, {}), joint_type, f"{table.where} limits", problems),
         drive_inertia=table.read("drive_inertia", _drive_inertia, None),
         link=_link(table.read("link", _same, {}), f"{table.where} link", problems),
     )
 
 
-def _limits(value: object, kind: JointKind, where: str, problems: list[str]) -> Limits:
+def _limits(value: object, joint: JointType, where: str, problems: list[str]) -> Limits:
     table = _Table(value, where, LIMIT_KEYS, problems)
-    convert = partial(angle, accepted=limits.ANY) if kind == "revolute" else finite
+    convert = partial(angle, accepted=limits.ANY) if joint.position_unit == "rad" else finite
     lower, upper = table.read("position", _range_of(convert), (-math.inf, math.inf))
     speed, acceleration, effort = (
         table.read(key, reader, math.inf)

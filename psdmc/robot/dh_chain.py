@@ -59,7 +59,7 @@ def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tupl
         else:
             placement = before @ Placement(twist, times(twist, np.array([row.a, 0.0, row.d]))) @ offset
             link = Placement.identity()
-        joints.append(Joint(row.name, link_name(number), row.kind, placement, link, row.limits))
+        joints.append(Joint(row.name, link_name(number), row.type, placement, link, row.limits))
         before = link
     return tuple(joints), tuple(snaps)
 

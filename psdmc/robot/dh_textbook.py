@@ -18,6 +18,9 @@ import pinocchio
 
 from psdmc.robot.chain import Array
 
+MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelPZ}
+"""Pinocchio's joints by a row's type; written down here, because this reader shares nothing with the other."""
+
 
 def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
     """Pinocchio's model of a table that read_dh has accepted, links called link1, link2 and so on.
@@ -30,7 +33,7 @@ def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
     model.name = str(table.get("name", "robot"))
     before, parent = pinocchio.SE3.Identity(), 0
     for number, row in enumerate(table["joint"], start=1):
-        kind = pinocchio.JointModelPZ() if row.get("type") == "prismatic" else pinocchio.JointModelRZ()
+        kind = MODELS[row.get("type", "revolute")]()
         whole = pinocchio.SE3((modified_matrix if is_modified else standard_matrix)(*_numbers(row)))
         place, link = (before * whole, pinocchio.SE3.Identity()) if is_modified else (before, whole)
         parent = model.addJoint(parent, kind, place, row.get("name", f"joint{number}"))

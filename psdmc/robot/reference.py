@@ -217,14 +217,16 @@ def _placed_as(chain: Chain, model: pinocchio.Model) -> pinocchio.Model:
     """The model's bodies on joints that sit as the chain's do, about their z."""
     placed = pinocchio.Model()
     placed.name = model.name
-    for k, joint in enumerate(chain.joints):
-        about = pinocchio.JointModelRZ() if joint.kind == "revolute" else pinocchio.JointModelPZ()
-        placed.addJoint(k, about, _se3(joint.placement), joint.name)
+    for k, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True)):
+        about = getattr(pinocchio, f"JointModel{joint.type.pinocchio}")()
+        placed.addJoint(parent + 1, about, _se3(joint.placement), joint.name)
         own = model.frames[model.getFrameId(joint.link_name, pinocchio.FrameType.BODY)].placement
         place = _se3(joint.link_frame)
         placed.inertias[k + 1] = (place * own.inverse()).act(model.inertias[k + 1])
         placed.addFrame(pinocchio.Frame(joint.link_name, k + 1, 0, place, pinocchio.FrameType.BODY))
-    tip = pinocchio.Frame(chain.tip_name, len(chain), 0, _se3(chain.tip), pinocchio.FrameType.OP_FRAME)
+    tip = pinocchio.Frame(
+        chain.tip_name, chain.tip_body + 1, 0, _se3(chain.tip), pinocchio.FrameType.OP_FRAME
+    )
     if not placed.existFrame(chain.tip_name):
         placed.addFrame(tip)
     placed.gravity.linear = np.array(chain.gravity)

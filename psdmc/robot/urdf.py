@@ -12,6 +12,7 @@ from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.chain import Limits
 from psdmc.robot.inertia import INERTIA_NAMES
+from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.urdf_tree import tree_faults
 from psdmc.robot.urdf_words import (
@@ -27,7 +28,7 @@ from psdmc.robot.xml_text import number, numbers, only, parse_xml, required_numb
 Triple = tuple[float, float, float]
 Quadruple = tuple[float, float, float, float]
 
-MOVABLE = ("revolute", "continuous", "prismatic")
+MOVABLE = tuple(URDF_TYPES)
 """Joint types that psdmc models; fixed ones are merged, all others refused on the chain."""
 
 LOCKABLE = (*MOVABLE, "fixed", "floating", "planar")

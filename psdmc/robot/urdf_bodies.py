@@ -9,6 +9,7 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.robot.chain import Array, Placement
 from psdmc.robot.inertia import inertia_matrix, six_of, standard_parameters, without_noise
+from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.small import times
@@ -57,7 +58,7 @@ def hold_against_pinocchio(
 
     Each link is compared alone (every joint made a revolute one, so that nothing is merged), then what was merged.
     """
-    alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, "revolute"))
+    alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word))
     for joint in robot.joints:
         own = body_parameters(robot.inertials[joint.child], Placement.identity())
         _compare(

@@ -9,6 +9,7 @@ import numpy as np
 from psdmc.robot.chain import Array, Joint, Placement
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
+from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, snap_translation
 from psdmc.robot.tree import Route, find_route, listed
@@ -91,8 +92,7 @@ def _placed_joints(route: Route, snap: float) -> tuple[tuple[Joint, ...], Placem
 
 
 def _joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:
-    kind = "prismatic" if joint.type == "prismatic" else "revolute"
-    return Joint(joint.name, joint.child, kind, placement, link, joint.limits)  # type: ignore[arg-type]
+    return Joint(joint.name, joint.child, URDF_TYPES[joint.type], placement, link, joint.limits)
 
 
 def _base_rotation(route: Route, snap: float) -> tuple[Array, list[Snap]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.robot.chain import Chain, Placement
+from psdmc.robot.chain import BASE, Chain, Placement
 
 Array = NDArray[np.float64]
 
@@ -48,18 +48,12 @@ def _in_the_one_before(poses: Array) -> Array:
 
 
 def _poses_at(chain: Chain, q: Array) -> list[Array]:
-    poses, frame = [], Placement.identity()
-    for joint, value in zip(chain.joints, q, strict=True):
-        frame = frame @ joint.placement @ _motion(joint.kind, value)
-        poses.append(_matrix(frame @ joint.link_frame))
-    return [*poses, _matrix(frame @ chain.tip)]
-
-
-def _motion(kind: str, value: float) -> Placement:
-    if kind == "prismatic":
-        return Placement(np.eye(3), np.array([0.0, 0.0, value]))
-    c, s = np.cos(value), np.sin(value)
-    return Placement(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
+    frames: list[Placement] = []
+    for joint, parent, value in zip(chain.joints, chain.parents, q, strict=True):
+        before = Placement.identity() if parent == BASE else frames[parent]
+        frames.append(before @ joint.placement @ joint.type.transform(float(value)))
+    links = [_matrix(frame @ joint.link_frame) for frame, joint in zip(frames, chain.joints, strict=True)]
+    return [*links, _matrix(frames[chain.tip_body] @ chain.tip)]
 
 
 def _matrix(place: Placement) -> Array:

@@ -58,10 +58,10 @@ def test_the_benchmark_works_with_no_rival(two_link):
 
 def test_numbers_read_back_exactly(two_link):
     lines = robot_as_numbers(two_link.chain).splitlines()
-    kind, *numbers = lines[2].split()
+    word, parent, *numbers = lines[2].split()
 
     assert lines[0].split()[0] == "2"
-    assert kind == "revolute"
+    assert (word, parent) == ("RZ", "1")
     assert len(numbers) == 9 + 3 + 10 + 1
     assert np.array_equal(
         np.array(numbers[9:12], dtype=float), two_link.chain.joints[1].placement.translation

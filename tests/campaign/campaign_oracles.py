@@ -10,6 +10,8 @@ from psdmc.robot.chain import Chain
 
 Array = np.ndarray
 
+MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelPZ}
+
 
 class Pinocchio:
     """rnea, and the mass matrix's condition number."""
@@ -26,7 +28,7 @@ class Pinocchio:
         """psdmc's own chain, rounded angles made exact: what snapping left, but nothing of the derivation."""
         model, parent = pinocchio.Model(), 0
         for joint, row in zip(chain.joints, chain.parameters, strict=True):
-            kind = pinocchio.JointModelRZ() if joint.kind == "revolute" else pinocchio.JointModelPZ()
+            kind = MODELS[joint.kind]()
             place = pinocchio.SE3(joint.placement.rotation.copy(), joint.placement.translation.copy())
             parent = model.addJoint(parent, kind, place, joint.name)
             body = pinocchio.Inertia.FromDynamicParameters(row[:10].copy())

@@ -16,7 +16,7 @@ from psdmc.derivation.rounding import merged
 from psdmc.derivation.terms import Terms, summed, times_matrix
 from psdmc.derivation.velocity import derivative, slope_count
 from psdmc.errors import DerivationError
-from psdmc.robot.chain import JointKind
+from psdmc.robot.joints import PRISMATIC, REVOLUTE, JointType
 
 
 def terms(*entries: tuple[int, int, int, float]) -> Terms:
@@ -28,18 +28,18 @@ def test_a_product_of_two_linear_polynomials_interpolates_to_its_coefficients() 
     """(1 + 2 s)(3 c - s) = 3 c - s + 6 s c - 2 + 2 c^2, times q2 * q2."""
     first, second = np.array([1.0, 2.0, 0.0]), np.array([0.0, -1.0, 3.0])
     slide = np.array([0.0, 1.0])
-    kinds: tuple[JointKind, ...] = ("revolute", "prismatic")
-    matrices = [evaluation(kind) for kind in kinds]
+    types = (REVOLUTE, PRISMATIC)
+    matrices = [evaluation(kind) for kind in types]
     values = [along_axes(matrices, np.outer(a, slide).reshape(-1, 1)) for a in (first, second)]
     product = values[0] * values[1]
-    found = along_axes([interpolation(kind) for kind in kinds], product.T).reshape(5, 3)
+    found = along_axes([interpolation(kind) for kind in types], product.T).reshape(5, 3)
     assert np.allclose(found[:, 2], [-2.0, -1.0, 3.0, 6.0, 2.0], atol=1e-14)
     assert np.allclose(found[:, :2], 0.0, atol=1e-14)
 
 
-@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
-def test_the_derivative_in_coefficient_space_is_the_derivative(kind: JointKind) -> None:
-    functions = Functions(("revolute", kind))
+@pytest.mark.parametrize("kind", [REVOLUTE, PRISMATIC])
+def test_the_derivative_in_coefficient_space_is_the_derivative(kind: JointType) -> None:
+    functions = Functions((REVOLUTE, kind))
     count = len(nodes(kind))
     coefficients = np.random.default_rng(0).normal(size=count)
     given = terms(*((0, 10 + digit, 0, value) for digit, value in enumerate(coefficients)))
@@ -137,7 +137,7 @@ def test_values_further_apart_than_rounding_stay() -> None:
 def test_the_bound_on_p_holds_and_is_near(kinds: str) -> None:
     chain = random_chain(0, kinds)
     p = derive_model(chain).p
-    bound = largest_function_count([joint.kind for joint in chain.joints])
+    bound = largest_function_count(chain.types)
     assert p <= bound
     assert kinds != "RRRR" or p > 0.8 * bound
 
@@ -152,14 +152,14 @@ def test_velocity_terms_beyond_memory_are_refused() -> None:
     """The grid fits, the velocity terms do not: their number is known once the mass matrix is."""
     chain, steps = random_chain(0, "RRRRRR"), []
     with pytest.raises(DerivationError, match="6-joint"):
-        derive_model(chain, memory=grid_bytes(["revolute"] * 6), progress=steps.append)
+        derive_model(chain, memory=grid_bytes([REVOLUTE] * 6), progress=steps.append)
     assert steps[-1] == "velocity terms"
 
 
 def test_terms_are_counted_before_they_are_made() -> None:
-    functions = Functions(("revolute", "revolute"))
+    functions = Functions((REVOLUTE, REVOLUTE))
     mass = {(0, 0): terms((0, 3, 0, 1.0), (0, 0, 0, 1.0)), (0, 1): terms((0, 1, 0, 1.0))}
-    count, _ = velocity_bytes(mass, functions)
+    count, _ = velocity_bytes(mass, functions, ((1,), ()))
     assert count == 2 * 2 + 3
 
 

@@ -10,6 +10,7 @@ from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import sizes_of
 from psdmc.robot.chain import PARAMETER_NAMES, Chain, Joint, Placement
+from psdmc.robot.joints import REVOLUTE
 
 PUBLISHED = {
     "two_link": (10, 4, (3, 4, 2, 1)),
@@ -42,7 +43,7 @@ def test_denso_without_its_joint_offsets_has_another_p() -> None:
 def _without_offsets(chain: Chain) -> Chain:
     before, joints = Placement.identity(), []
     for joint in chain.joints:
-        joints.append(Joint(joint.name, joint.link_name, joint.kind, before, joint.link_frame, joint.limits))
+        joints.append(Joint(joint.name, joint.link_name, joint.type, before, joint.link_frame, joint.limits))
         before = joint.link_frame
     return Chain(
         chain.name,
@@ -73,8 +74,8 @@ def eight_joints() -> Chain:
     *before, last = chain.joints
     joints = (
         *before,
-        Joint("extra", "extra", "revolute", before[-1].link_frame, extra),
-        Joint(last.name, last.link_name, last.kind, extra, last.link_frame),
+        Joint("extra", "extra", REVOLUTE, before[-1].link_frame, extra),
+        Joint(last.name, last.link_name, last.type, extra, last.link_frame),
     )
     span = np.delete(np.eye(88), np.s_[10::11], axis=1)
     unknown = np.full((8, 11), np.nan)

@@ -15,7 +15,7 @@ from psdmc.derivation.interpolate import DOUBLE, interpolation, nodes, quadratic
 from psdmc.derivation.reduce import reduced
 from psdmc.derivation.sampled import reduction_of, sampled_reduction
 from psdmc.derivation.units import scaled
-from psdmc.robot.chain import JointKind
+from psdmc.robot.joints import PRISMATIC, REVOLUTE, JointType
 
 ACCURACY = 1e-12
 TILTS = (0.0, *(10.0**k for k in np.arange(-10.0, -0.9, 0.5)))
@@ -82,8 +82,8 @@ def test_zeros_of_a_rotation_about_an_axis_stay() -> None:
     assert np.array_equal(exact == 0.0, np.array([[0, 0, 1], [0, 0, 1], [1, 1, 0]], dtype=bool))
 
 
-@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
-def test_interpolation_in_extended_precision(kind: JointKind) -> None:
+@pytest.mark.parametrize("kind", [REVOLUTE, PRISMATIC])
+def test_interpolation_in_extended_precision(kind: JointType) -> None:
     long = np.dtype(np.longdouble)
     basis = quadratic_basis(kind, nodes(kind).astype(long))
     product = np.einsum("ij,jk->ik", interpolation(kind, long), basis)

@@ -173,7 +173,9 @@ def test_mass_matrix_and_jacobian(snapped):
     found = mass_matrix(frames_of(chain), bodies_of(chain, chain.parameters), [0.1] * 7, q)
 
     np.testing.assert_allclose(found, oracle.mass_matrix(q), atol=1e-13)
-    np.testing.assert_allclose(jacobian(frames_of(chain), chain.tip, q), oracle.jacobian(q), atol=1e-14)
+    np.testing.assert_allclose(
+        jacobian(frames_of(chain), chain.tip_body, chain.tip, q), oracle.jacobian(q), atol=1e-14
+    )
 
 
 def test_the_reference_agrees_with_itself():

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 from direct import error, expected
-from traced import KINDS, L, N, arm_kernels, arm_package, arm_references
+from traced import L, N, arm_kernels, arm_package, arm_references
 
 from psdmc.emit.options import EmitOptions
 from psdmc.errors import InputError
@@ -123,7 +123,7 @@ def test_a_wrong_number_of_joints_names_the_joints(robot: CompiledRobot) -> None
         InputError, match=r"inverse_dynamics: qd has shape \(3, 5\), expected \(\.\.\., 4\)"
     ) as caught:
         robot.inverse_dynamics(np.zeros(N), np.zeros((3, 5)), np.zeros(N))
-    assert caught.value.hint == f"the robot has {len(KINDS)} joints: joint 0, joint 1, joint 2, joint 3"
+    assert caught.value.hint == f"the robot has {N} joints: joint 0, joint 1, joint 2, joint 3"
 
 
 def test_a_scalar_is_no_state(robot: CompiledRobot) -> None:

@@ -23,9 +23,10 @@ from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
 from psdmc.program.trace import Tracer
 from psdmc.robot.chain import Placement
+from psdmc.robot.joints import PRISMATIC, REVOLUTE
 
-KINDS = ("revolute", "revolute", "prismatic", "revolute")
-N = len(KINDS)
+TYPES = (REVOLUTE, REVOLUTE, PRISMATIC, REVOLUTE)
+N = len(TYPES)
 L = 11 * N
 UP = (0.0, 0.0, 9.81)
 Outputs = list[tuple[Slot, object]]
@@ -35,9 +36,9 @@ def arm(seed: int = 0) -> tuple[list[Frame], np.ndarray]:
     """Frames, and body parameters (N, 11): mass, moment, second moments, drive inertia."""
     random = np.random.default_rng(seed)
     places = [
-        Placement(np.linalg.qr(random.normal(size=(3, 3)))[0], random.normal(size=3) * 0.3) for _ in KINDS
+        Placement(np.linalg.qr(random.normal(size=(3, 3)))[0], random.normal(size=3) * 0.3) for _ in TYPES
     ]
-    frames = [frame_at(kind, place) for kind, place in zip(KINDS, places, strict=True)]
+    frames = [frame_at(TYPES[i], i - 1, place) for i, place in enumerate(places)]
     mass, moment = random.uniform(1, 5, (N, 1)), random.normal(size=(N, 3)) * 0.1
     second = np.hstack([random.uniform(0.5, 1, (N, 3)), random.normal(size=(N, 3)) * 0.05])
     return frames, np.hstack([mass, moment, second, random.uniform(0, 0.3, (N, 1))])
@@ -119,7 +120,7 @@ def traced(name: str, theta: bool, frames: list[Frame], parameters: np.ndarray) 
         "gravity": lambda: vector("g", torque(zero, zero)),
         "regressor": lambda: feature_rows("qdd"),
         "regressor_slotine_li": lambda: feature_rows("qdd_r", given["qd_r"]),
-        "jacobian": lambda: matrix("J", jacobian(frames, Placement.identity(), given["q"])),
+        "jacobian": lambda: matrix("J", jacobian(frames, N - 1, Placement.identity(), given["q"])),
     }
     return drop_unused(tracer.finish(makers[name]()))
 
@@ -142,7 +143,17 @@ def arm_info(name: str = "test arm", seed: int = 0) -> PackageInfo:
     return PackageInfo(
         name=name,
         joints=tuple(
-            JointInfo(f"joint {i}", kind, -1.0, 1.0, 2.0, effort=10.0) for i, kind in enumerate(KINDS)
+            JointInfo(
+                f"joint {i}",
+                joint.word,
+                -1.0,
+                1.0,
+                2.0,
+                effort=10.0,
+                unit=joint.position_unit,
+                effort_unit=joint.effort_unit,
+            )
+            for i, joint in enumerate(TYPES)
         ),
         gravity=(0.0, 0.0, -9.81),
         base="base",

@@ -15,7 +15,7 @@ from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import inertia_matrix, joint_frame_map
 from psdmc.errors import ToolchainError
-from psdmc.robot.chain import Array, Chain
+from psdmc.robot.chain import BASE, Array, Chain
 
 RIVAL = "MuJoCo"
 FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")
@@ -66,17 +66,18 @@ def mjcf(chain: Chain) -> str:
     root = ElementTree.Element("mujoco", model="robot")
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="false")
     ElementTree.SubElement(root, "option", gravity=_text(chain.gravity))
-    parent = ElementTree.SubElement(root, "worldbody")
-    for joint, row in zip(chain.joints, chain.parameters, strict=True):
-        parent = ElementTree.SubElement(
-            parent,
+    world = ElementTree.SubElement(root, "worldbody")
+    bodies: list[ElementTree.Element] = []
+    for joint, parent, row in zip(chain.joints, chain.parents, chain.parameters, strict=True):
+        body = ElementTree.SubElement(
+            world if parent == BASE else bodies[parent],
             "body",
             pos=_text(joint.placement.translation),
             quat=_text(quaternion(joint.placement.rotation)),
         )
-        kind = "hinge" if joint.kind == "revolute" else "slide"
-        ElementTree.SubElement(parent, "joint", type=kind, axis="0 0 1")
-        _add_inertia(parent, joint_frame_map(joint.link_frame) @ row[:DRIVE])
+        ElementTree.SubElement(body, "joint", type=joint.type.mujoco, axis="0 0 1")
+        _add_inertia(body, joint_frame_map(joint.link_frame) @ row[:DRIVE])
+        bodies.append(body)
     return ElementTree.tostring(root, encoding="unicode")
 
 

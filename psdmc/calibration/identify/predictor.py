@@ -8,7 +8,7 @@ import numpy as np
 
 from psdmc.calibration.logs.log import Array
 from psdmc.dynamics.frames import base_acceleration, frames_of
-from psdmc.dynamics.kinematics import jacobian, tip_placement
+from psdmc.dynamics.kinematics import frame_placement, jacobian
 from psdmc.dynamics.regressor import regressor
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import Chain
@@ -72,7 +72,7 @@ def payload_torque(chain: Chain, q: Array, mass: float, com: tuple[float, float,
     """(N, n) N m that hold a mass (kg) at `com` (m, tip frame) against gravity: -J^T f with f of (17)."""
     frames = frames_of(chain)
     states = [q[:, k] for k in range(len(chain))]
-    rotation, _ = tip_placement(frames, chain.tip, states)
+    rotation, _ = frame_placement(frames, chain.tip_body, chain.tip, states)
     arm = [sum(rotation[r][c] * com[c] for c in range(3)) for r in range(3)]
     weight = (mass * chain.gravity).tolist()
     moment = (
@@ -80,7 +80,7 @@ def payload_torque(chain: Chain, q: Array, mass: float, com: tuple[float, float,
         arm[2] * weight[0] - arm[0] * weight[2],
         arm[0] * weight[1] - arm[1] * weight[0],
     )
-    rows = jacobian(frames, chain.tip, states)
+    rows = jacobian(frames, chain.tip_body, chain.tip, states)
     torque = np.zeros_like(q)
     for row, component in zip(rows, (*weight, *moment), strict=True):
         for k, entry in enumerate(row):

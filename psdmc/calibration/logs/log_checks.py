@@ -87,12 +87,11 @@ def _units(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list
         return []
     faults = []
     for joint in chain.joints:
-        slides = joint.kind == "prismatic"
-        if slides != (joint.name in log.sliding):
-            found, right = ("rad", "m") if slides else ("m", "rad")
+        found, right = ("m" if joint.name in log.sliding else "rad"), joint.type.position_unit
+        if found != right:
             faults.append(
                 Fault(
-                    f"joint {joint.name}: position_{found}.{joint.name}, but it {'slides' if slides else 'turns'}",
+                    f"joint {joint.name}: position_{found}.{joint.name}, but it {joint.type.verb}",
                     f"expected position_{right}.<joint>, and its other columns in units to match",
                 )
             )
@@ -107,8 +106,8 @@ def _positions(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> 
         bound = options.free_position if not np.isfinite(bound) else bound * (1 + options.limit_slack)
         if not reach > bound:
             continue
-        unit = "rad" if joint.kind == "revolute" else "m"
-        suspicion = ": degrees?" if joint.kind == "revolute" and np.radians(reach) <= bound else ""
+        unit = joint.type.position_unit
+        suspicion = ": degrees?" if unit == "rad" and np.radians(reach) <= bound else ""
         faults.append(
             Fault(
                 f"joint {joint.name}: position reaches {reach:.4g} {unit}, limit {bound:.4g} {unit}{suspicion}",

@@ -104,8 +104,8 @@ def _named(columns: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def sliding_joints(chain: Chain) -> tuple[str, ...]:
-    """Names of the chain's joints that slide."""
-    return tuple(joint.name for joint in chain.joints if joint.kind == "prismatic")
+    """Names of the chain's joints whose position is in m."""
+    return tuple(joint.name for joint in chain.joints if joint.type.length_order)
 
 
 def limit_faults(trajectory: Trajectory, chain: Chain) -> list[str]:

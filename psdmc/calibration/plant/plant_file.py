@@ -39,6 +39,8 @@ LARGEST_BODY = 1e6
 """kg, kg m^2 of a link or drive."""
 ROUNDED = 1e-12
 """Share of an inertia's largest entry by which a principal moment may be negative: rounding."""
+SLIDES = {"revolute": False, "prismatic": True}
+"""By a row's type."""
 LARGEST_PLANT = 100
 """Joints of a virtual robot."""
 
@@ -248,7 +250,7 @@ def _row(joint: dict[str, Any], faults: list[str]) -> PlantRow:
         faults.append(f"{where}: inertia_com: no body has it: it has a negative principal moment")
     return PlantRow(
         name=str(joint.get("name", "")),
-        slides=joint.get("type", "revolute") == "prismatic",
+        slides=SLIDES[str(joint.get("type", "revolute"))],
         a=table.number("a", -LARGEST_LENGTH, LARGEST_LENGTH),
         alpha=_angle(joint.get("alpha", 0.0)),
         d=table.number("d", -LARGEST_LENGTH, LARGEST_LENGTH),

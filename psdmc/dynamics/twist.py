@@ -1,0 +1,69 @@
+"""Constant twists, such as a joint's motion subspace, applied to vectors; their zeros and ones cost nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.body import Body
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add
+from psdmc.robot.joints import JointType, Twist
+
+
+def weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
+    """The sum of constant weights times values."""
+    total: Scalar | None = None
+    for weight, value in zip(weights, values, strict=True):
+        if weight == 0.0:
+            continue
+        part = value if weight == 1.0 else value * weight
+        total = part if total is None else total + part
+    return 0.0 if total is None else total
+
+
+def axis_twist(joint: JointType) -> Twist:
+    """The twist per unit rate of a joint of one rate; ValueError where it has more."""
+    (twist,) = joint.twists
+    return twist
+
+
+def effort(joint: JointType, force: Vector, moment: Vector) -> Scalar:
+    """What a force and a moment about the joint frame's origin do along the joint: N m, or N where it slides."""
+    linear, angular = axis_twist(joint)
+    return weighted((*linear, *angular), (*force, *moment))
+
+
+def turned(rotation: Matrix, v: tuple[float, float, float]) -> Vector:
+    """rotation @ v for a constant v."""
+    return (weighted(v, rotation[0]), weighted(v, rotation[1]), weighted(v, rotation[2]))
+
+
+def momentum(body: Body, twist: Twist) -> tuple[Vector, Vector]:
+    """Momentum and angular momentum about the frame's origin of a body that moves with a constant twist."""
+    found: tuple[Vector, Vector] | None = None
+    for weight, part in zip((*twist[0], *twist[1]), range(6), strict=True):
+        if weight == 0.0:
+            continue
+        force, moment = (_scaled(v, weight) for v in _unit_momentum(body, part))
+        found = (force, moment) if found is None else (add(found[0], force), add(found[1], moment))
+    return (ZERO, ZERO) if found is None else found
+
+
+def _scaled(v: Vector, weight: float) -> Vector:
+    return v if weight == 1.0 else (v[0] * weight, v[1] * weight, v[2] * weight)
+
+
+def _unit_momentum(body: Body, part: int) -> tuple[Vector, Vector]:
+    """Of a way along x, y or z (part 0, 1, 2), or a turn about it (3, 4, 5)."""
+    m, (hx, hy, hz) = body.mass, body.moment
+    if part == 0:
+        return (m, 0.0, 0.0), (0.0, hz, -hy)
+    if part == 1:
+        return (0.0, m, 0.0), (-hz, 0.0, hx)
+    if part == 2:
+        return (0.0, 0.0, m), (hy, -hx, 0.0)
+    xx, yy, zz, xy, xz, yz = body.second
+    if part == 3:
+        return (0.0, -hz, hy), (yy + zz, -xy, -xz)
+    if part == 4:
+        return (hz, 0.0, -hx), (-xy, xx + zz, -yz)
+    return (-hy, hx, 0.0), (-xz, -yz, xx + yy)

@@ -1,0 +1,48 @@
+"""Where a frame sits in another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.robot.small import times
+
+Array = NDArray[np.float64]
+
+
+def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
+    """A private read-only float64 copy of `values`; ValueError where its shape is another."""
+    array = np.array(values, dtype=np.float64)
+    if array.shape != shape:
+        raise ValueError(f"{what} has shape {array.shape}, expected {shape}")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where a frame sits in another: x_outer = rotation @ x_inner + translation.
+
+    rotation     (3, 3)  orthonormal
+    translation  (3,)    m
+    """
+
+    rotation: Array
+    translation: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3), "rotation"))
+        object.__setattr__(self, "translation", frozen_array(self.translation, (3,), "translation"))
+
+    @staticmethod
+    def identity() -> Placement:
+        return Placement(np.eye(3), np.zeros(3))
+
+    def __matmul__(self, inner: Placement) -> Placement:
+        translation = times(self.rotation, inner.translation) + self.translation
+        return Placement(times(self.rotation, inner.rotation), translation)
+
+    def inverse(self) -> Placement:
+        return Placement(self.rotation.T, -times(self.rotation.T, self.translation))

@@ -1,0 +1,110 @@
+"""Random small trees of bodies, and Pinocchio's own model of each: an oracle that shares no code."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from helical import HELICAL, PITCH
+from random_chains import _body, _rotation, _tidy
+
+from psdmc.dynamics.body import Body, body_from_parameters
+from psdmc.dynamics.frames import BASE, Frame, frame_at
+from psdmc.robot.chain import Placement
+from psdmc.robot.joints import PRISMATIC, REVOLUTE
+
+TYPES = {"R": REVOLUTE, "P": PRISMATIC, "H": HELICAL}
+
+TREES = {
+    "a fork": (BASE, 0, 0),
+    "two on the base": (BASE, BASE, 1),
+    "a trunk with two arms": (BASE, 0, 1, 2, 1, 4),
+    "four legs on a body": (BASE, 0, 1, 0, 3, 0, 5, 0),
+    "interleaved": (BASE, BASE, 0, 1, 2, 0, 3, 5),
+}
+"""Parents, body by body."""
+
+KINDS = ("RRRRRRRR", "RPRRPRPR", "PRPPRRRP", "RHRPHRRH")
+
+
+class RandomTree:
+    """Frames and bodies by psdmc, and Pinocchio's model of the same numbers.
+
+    parallel   axes are parallel to their parents' where a fair coin says so, so that compound turns have something to do
+    """
+
+    def __init__(self, seed: int, parents: tuple[int, ...], kinds: str, parallel: bool = False) -> None:
+        rng = np.random.default_rng(seed)
+        self.parents, self.n = parents, len(parents)
+        self.types = [TYPES[kind] for kind in kinds[: self.n]]
+        self.places = [self._place(rng, parallel) for _ in parents]
+        self.parameters = np.array([_body(rng) for _ in parents])
+        self.drives = rng.uniform(0.0, 0.3, self.n).tolist()
+        self.gravity = rng.normal(size=3) * 5.0
+        self.model, self.joints = self._pinocchio()
+        self.data = self.model.createData()
+
+    @staticmethod
+    def _place(rng: np.random.Generator, parallel: bool) -> Placement:
+        if parallel and rng.random() < 0.6:
+            return Placement(np.eye(3), rng.uniform(-0.5, 0.5, 3))
+        return _tidy(rng) if parallel else Placement(_rotation(rng), rng.uniform(-0.5, 0.5, 3))
+
+    @property
+    def frames(self) -> list[Frame]:
+        return [
+            frame_at(joint, parent, place)
+            for joint, parent, place in zip(self.types, self.parents, self.places, strict=True)
+        ]
+
+    @property
+    def bodies(self) -> list[Body]:
+        return [body_from_parameters(row.tolist()) for row in self.parameters]
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        x, y, z = (-self.gravity).tolist()
+        return x, y, z
+
+    def _pinocchio(self) -> tuple[pin.Model, list[int]]:
+        """Pinocchio's crba wants a branch's joints in a row: another order than ours may be."""
+        model, joints = pin.Model(), [0] * self.n
+        for i in self._depth_first(BASE):
+            joint, parent, place = self.types[i], self.parents[i], self.places[i]
+            made = getattr(pin, f"JointModel{joint.pinocchio}")
+            about = made(PITCH) if joint is HELICAL else made()
+            above = 0 if parent == BASE else joints[parent]
+            se3 = pin.SE3(place.rotation.copy(), place.translation.copy())
+            joints[i] = model.addJoint(above, about, se3, f"joint{i}")
+            body = pin.Inertia.FromDynamicParameters(self.parameters[i].copy())
+            model.appendBodyToJoint(joints[i], body, pin.SE3.Identity())
+        model.gravity.linear = self.gravity.copy()
+        armature = np.zeros(model.nv)
+        for joint, drive in zip(joints, self.drives, strict=True):
+            armature[model.joints[joint].idx_v] = drive
+        model.armature = armature
+        return model, joints
+
+    def _depth_first(self, body: int) -> list[int]:
+        """Bodies beyond this one, each branch in a row."""
+        beyond = [i for i, parent in enumerate(self.parents) if parent == body]
+        return [k for i in beyond for k in (i, *self._depth_first(i))]
+
+    @property
+    def order(self) -> list[int]:
+        """Where our joints are in Pinocchio's vectors."""
+        return [self.model.joints[joint].idx_v for joint in self.joints]
+
+    def theirs(self, values: np.ndarray) -> np.ndarray:
+        """A vector of ours in Pinocchio's order."""
+        out = np.zeros(self.model.nv)
+        out[self.order] = values
+        return out
+
+    def states(self, count: int, vectors: int, seed: int = 0) -> np.ndarray:
+        return np.random.default_rng(seed).uniform(-2.0, 2.0, (vectors, count, self.n))
+
+    def each(self, function, *states: np.ndarray) -> np.ndarray:
+        """A Pinocchio function of the states, its vector (or its matrix's last axis) in our order."""
+        rows = zip(*states, strict=True)
+        found = [np.array(function(self.model, self.data, *map(self.theirs, row))) for row in rows]
+        return np.array(found)[..., self.order]
