@@ -57,7 +57,8 @@ class Tracer:
 
     def constant(self, value: float) -> Symbol:
         """A constant; its sign is kept beside it."""
-        return Symbol(self, self._constant(abs(float(value))), value < 0)
+        number = float(value)  # of NumPy's too: signs are told apart by identity, which its booleans lack
+        return Symbol(self, self._constant(abs(number)), number < 0)
 
     def _constant(self, value: float) -> int:
         index = self.record((_CONST, value, None))

@@ -124,3 +124,14 @@ def test_a_trace_computes_what_the_numbers_do(seed: int):
     tau = interpret(program, {"q": q}, {"tau": 3})["tau"]
     for i, value in enumerate(expected):
         np.testing.assert_allclose(tau[:, i], value, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("number", [np.float64(-2.0), np.float64(2.0), -2.0, 2])
+def test_numpys_numbers_keep_their_sign_in_sums_and_products(number):
+    tracer = Tracer()
+    (q,) = tracer.symbols("q", 1)
+    values = (q + number, q - number, number - q, -q - number, q * number, q / number)
+    program = tracer.finish([(Slot("tau", i), value) for i, value in enumerate(values)])
+    found = interpret(program, {"q": np.array([3.0])}, {"tau": len(values)})["tau"]
+    x = float(number)
+    assert found == pytest.approx([3 + x, 3 - x, x - 3, -3 - x, 3 * x, 3 / x])
