@@ -18,8 +18,8 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.reference_states import reference_states
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.call import CompiledRobot
-from psdmc.toolchain.compile import compile_library
 from psdmc.toolchain.kept_kernels import lowered_once
+from psdmc.toolchain.kept_libraries import compiled_once
 
 if TYPE_CHECKING:
     from psdmc.robot.load import LoadedRobot
@@ -107,7 +107,7 @@ def emit_c(
     name       the robot's name in C; None: the robot's own
     force      whether to overwrite files that psdmc did not write
     """
-    package = _package(model, lowering, functions, EmitOptions(real, trig), name, progress)
+    package = _package(model, lowering, functions, _options(lowering, real, trig), name, progress)
     progress("writing")
     return write_package(directory, package_files(package), force)
 
@@ -121,9 +121,15 @@ def compile(
     progress: Progress = silent,
 ) -> CompiledRobot:
     """The model's functions, compiled for this machine and callable on NumPy arrays; cached by content."""
-    package = _package(model, lowering, functions, EmitOptions(real, trig), None, progress)
-    progress("compiling")
-    return CompiledRobot(package, compile_library(package))
+    options = _options(lowering, real, trig)
+
+    def make() -> PackageView:
+        package = _package(model, lowering, functions, options, None, progress)
+        progress("compiling")
+        return package
+
+    parts = (model.content_hash, lowering, real, trig, *_wanted(functions))
+    return CompiledRobot(*compiled_once(parts, make))
 
 
 def _package(
@@ -134,16 +140,26 @@ def _package(
     name: str | None,
     progress: Progress,
 ) -> PackageView:
-    _choose("lowering", lowering, ("auto", "expanded", "factored"))
-    _choose("real", options.real, ("float64", "float32"))
-    _choose("trig", options.trig, ("inline", "libm", "freestanding"))
     require_forward_dynamics(model, functions)
-    wanted = ("all",) if functions is None else ("some", *functions)
     kernels = lowered_once(
-        (model.content_hash, lowering, *wanted), lambda: lower(model, lowering, functions, progress)
+        (model.content_hash, lowering, *_wanted(functions)),
+        lambda: lower(model, lowering, functions, progress),
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     return package_view(package_info(model, name, shown), kernels, options, reference_states(model))
+
+
+def _wanted(functions: Sequence[str] | None) -> tuple[str, ...]:
+    """The functions as part of a cache key."""
+    return ("all",) if functions is None else ("some", *functions)
+
+
+def _options(lowering: str, real: Real, trig: Trig) -> EmitOptions:
+    """InputError where a choice is none."""
+    _choose("lowering", lowering, ("auto", "expanded", "factored"))
+    _choose("real", real, ("float64", "float32"))
+    _choose("trig", trig, ("inline", "libm", "freestanding"))
+    return EmitOptions(real, trig)
 
 
 def _choose(option: str, value: str, allowed: Sequence[str]) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import sys
 import sysconfig
@@ -52,6 +53,15 @@ def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()
         make_room(place, final, limit)
     except OSError as error:
         raise unusable(place, error) from error
+    return final
+
+
+def found(key: str) -> Path | None:
+    """The folder kept for a key, unaltered; None where there is none. ToolchainError as `cached`."""
+    final = open_cache() / key
+    if not re.fullmatch(r"[0-9a-f]{64}", key) or not is_sound(final):
+        return None
+    touch(final)
     return final
 
 

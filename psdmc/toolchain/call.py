@@ -12,9 +12,9 @@ import cffi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from psdmc.emit.package import PackageView
 from psdmc.errors import InputError, ToolchainError
 from psdmc.program.functions import BY_NAME
+from psdmc.toolchain.interface import Interface, batch_symbol
 
 Array = NDArray[Any]
 
@@ -27,16 +27,16 @@ class CompiledRobot:
     compiled in.
     """
 
-    def __init__(self, package: PackageView, library: Path) -> None:
+    def __init__(self, interface: Interface, library: Path) -> None:
         self._ffi = cffi.FFI()
-        self._ffi.cdef(package.cdef)
-        self._library = _opened(self._ffi, library, package.robot)
-        self._robot = package.robot
-        self._n, self._l = package.n, package.l
-        self._dtype = np.dtype(package.options.real)
-        self._pointer = self._ffi.typeof(f"{package.real} *")
-        self._kernels = {name: _bound(package, self._library, name) for name in package.kernel_names}
-        self.joint_names = tuple(joint.name for joint in package.info.joints)
+        self._ffi.cdef(interface.cdef)
+        self._library = _opened(self._ffi, library, interface.robot)
+        self._robot = interface.robot
+        self._n, self._l = interface.n, interface.l
+        self._dtype = np.dtype(interface.dtype)
+        self._pointer = self._ffi.typeof(f"{interface.real} *")
+        self._kernels = {name: _bound(interface, self._library, name) for name in interface.kernels}
+        self.joint_names = interface.joint_names
         self.library = library
 
     def inverse_dynamics(
@@ -156,9 +156,7 @@ class _Kernel:
     batch: Callable[..., int | None]
 
 
-def _bound(package: PackageView, library: Any, name: str) -> _Kernel:
-    base = name.removesuffix("_theta")
-    function = BY_NAME[base]
-    lengths = {"n": package.n, "l": package.l, "6": 6}
-    tail = tuple(lengths[axis] for axis in (function.rows, function.columns) if axis != "1")
-    return _Kernel(name, function.inputs, tail, getattr(library, f"{package.robot}_{name}_batch"))
+def _bound(interface: Interface, library: Any, name: str) -> _Kernel:
+    inputs = BY_NAME[name.removesuffix("_theta")].inputs
+    batch = getattr(library, batch_symbol(interface.robot, name))
+    return _Kernel(name, inputs, interface.kernels[name], batch)

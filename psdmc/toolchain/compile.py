@@ -21,14 +21,7 @@ def compile_library(package: PackageView) -> Path:
     """
     files = library_files(package)
     compiler = find_compiler()
-    parts = (
-        *compiler.command,
-        compiler.version,
-        compiler.target,
-        *compiler.flags,
-        package.info.psdmc_version,
-    )
-    key = cache_key(files, parts)
+    key = cache_key(files, (*compiler.identity, package.info.psdmc_version))
     return cached(key, lambda own: _build(package, files, compiler, own), [LIBRARY]) / LIBRARY
 
 

@@ -42,6 +42,11 @@ class Compiler:
     flags: tuple[str, ...]
     target: str
 
+    @property
+    def identity(self) -> tuple[str, ...]:
+        """What of it decides a library, for cache keys."""
+        return (*self.command, self.version, self.target, *self.flags)
+
 
 def find_compiler() -> Compiler:
     """The compiler that CC names, else the first of CANDIDATES; ToolchainError where there is none."""

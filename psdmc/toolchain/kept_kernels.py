@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -44,6 +44,12 @@ def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -
 @cache
 def sources_digests() -> tuple[str, ...]:
     """NumPy's version and the digests of the sources that lowering runs: an edited psdmc lowers anew."""
+    return (np.__version__, *digests(DECIDES))
+
+
+def digests(folders: Sequence[str]) -> Iterator[str]:
+    """The digests of the sources in psdmc's folders of these names."""
     root = Path(__file__).parent.parent
-    files = [path for folder in DECIDES for path in sorted((root / folder).rglob("*.py"))]
-    return (np.__version__, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in files))
+    for folder in folders:
+        for path in sorted((root / folder).rglob("*.py")):
+            yield hashlib.sha256(path.read_bytes()).hexdigest()

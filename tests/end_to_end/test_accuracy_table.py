@@ -21,6 +21,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
+from psdmc.toolchain.interface import interface_of
 
 FEW = 100
 """States at which generic robots' other functions are evaluated from E and P: theirs are the largest."""
@@ -62,7 +63,7 @@ def test_its_program_and_its_c(name: str):
 def compiled(model: DynamicsModel, kernels: Mapping[str, Kernel]) -> CompiledRobot:
     """As psdmc.compile, of kernels at hand: lowering takes longer than all else here."""
     package = package_view(package_info(model), kernels, EmitOptions())
-    return CompiledRobot(package, compile_library(package))
+    return CompiledRobot(interface_of(package), compile_library(package))
 
 
 @pytest.mark.parametrize("name", [*BUNDLED, *FOREIGN])

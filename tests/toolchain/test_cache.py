@@ -17,6 +17,7 @@ from psdmc.toolchain.cache_place import cache_directory
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
 from psdmc.toolchain.compiler_command import find_compiler
+from psdmc.toolchain.interface import interface_of
 
 
 @pytest.fixture
@@ -170,7 +171,7 @@ def test_a_damaged_entry_is_built_again(damage: Callable[[Path], None], fresh_ca
     assert compile_library(package) == library
     assert library.read_bytes() == sound
     assert not library.is_symlink()
-    assert CompiledRobot(package, library).gravity([0.1, 0.2, 0.3, 0.4]).shape == (4,)
+    assert CompiledRobot(interface_of(package), library).gravity([0.1, 0.2, 0.3, 0.4]).shape == (4,)
     assert [path.name for path in fresh_cache.iterdir()] == [library.parent.name]
 
 
@@ -194,7 +195,7 @@ def test_a_compiler_that_makes_nothing_leaves_no_entry(
 def test_a_library_for_another_machine_is_one_clear_error(tmp_path: Path) -> None:
     (tmp_path / "library.so").write_bytes(b"\x7fELF" + bytes(200))
     with pytest.raises(ToolchainError, match="cannot be loaded") as caught:
-        CompiledRobot(arm_package(names=["gravity"]), tmp_path / "library.so")
+        CompiledRobot(interface_of(arm_package(names=["gravity"])), tmp_path / "library.so")
     assert "CC" in str(caught.value.hint)
 
 

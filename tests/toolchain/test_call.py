@@ -15,6 +15,7 @@ from psdmc.emit.options import EmitOptions
 from psdmc.errors import InputError
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
+from psdmc.toolchain.interface import interface_of
 
 KERNELS = arm_kernels()
 RANDOM = np.random.default_rng(11)
@@ -23,7 +24,7 @@ RANDOM = np.random.default_rng(11)
 @pytest.fixture(scope="module")
 def robot() -> CompiledRobot:
     package = arm_package()
-    return CompiledRobot(package, compile_library(package))
+    return CompiledRobot(interface_of(package), compile_library(package))
 
 
 @pytest.mark.parametrize("name", [name for name, kernel in KERNELS.items() if not kernel.theta])
@@ -84,7 +85,7 @@ def test_inputs_are_never_written(robot: CompiledRobot) -> None:
 
 def test_single_precision_gives_single_precision() -> None:
     package = arm_package(options=EmitOptions(real="float32"), names=["gravity"])
-    robot = CompiledRobot(package, compile_library(package))
+    robot = CompiledRobot(interface_of(package), compile_library(package))
     q = RANDOM.normal(size=(20, N))
     found = robot.gravity(q)
     assert found.dtype == np.float32
@@ -143,7 +144,7 @@ def test_a_wrong_number_of_parameters_is_said(robot: CompiledRobot) -> None:
 
 def test_a_function_that_was_not_compiled_is_said() -> None:
     package = arm_package(names=["gravity"])
-    robot = CompiledRobot(package, compile_library(package))
+    robot = CompiledRobot(interface_of(package), compile_library(package))
     with pytest.raises(InputError, match="mass_matrix was not compiled") as caught:
         robot.mass_matrix(np.zeros(N))
     assert caught.value.hint == "compiled are gravity, gravity_theta"

@@ -1,0 +1,67 @@
+"""Compiled libraries with their interfaces kept in the compile cache: an equal call of `compile` only opens one."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from functools import cache
+from importlib import resources
+from importlib.metadata import version
+from pathlib import Path
+
+from psdmc.emit.package import PackageView
+from psdmc.errors import InternalError
+from psdmc.toolchain.cache import cache_key, cached, found
+from psdmc.toolchain.compile import LIBRARY, compile_library
+from psdmc.toolchain.compiler_command import find_compiler
+from psdmc.toolchain.interface import Interface, interface_from_json, interface_of, interface_to_json
+from psdmc.toolchain.kept_kernels import digests, sources_digests
+from psdmc.version import psdmc_version
+
+INTERFACE = "interface.json"
+
+
+def compiled_once(parts: Sequence[str], make: Callable[[], PackageView]) -> tuple[Interface, Path]:
+    """Interface and shared library of the package that `make` gives, from the cache where an equal call was made before.
+
+    parts  everything that decides the package besides psdmc's own sources: the model's hash, the options
+
+    Raises what `make` and `compile_library` raise. An interface whose library is gone or altered is not believed.
+    """
+    made: list[tuple[Interface, Path]] = []
+
+    def build(folder: Path) -> None:
+        package = make()
+        library = compile_library(package)
+        made.append((interface_of(package), library))
+        (folder / INTERFACE).write_text(interface_to_json(made[0][0], library.parent.name), encoding="utf-8")
+
+    key = cache_key({}, ("interface", *sources_digests(), *_emission(), *find_compiler().identity, *parts))
+    entry = cached(key, build, [INTERFACE])
+    return made[0] if made else _opened(entry) or _made(make())
+
+
+@cache
+def _emission() -> tuple[str, ...]:
+    """psdmc's version and the digests of what makes C of kernels and a library of C."""
+    texts = sorted(
+        (file.name, file.read_bytes())
+        for file in resources.files("psdmc.templates").iterdir()
+        if file.is_file()
+    )
+    templates = hashlib.sha256(repr(texts).encode()).hexdigest()
+    return (psdmc_version(), version("jinja2"), templates, *digests(("emit", "toolchain")))
+
+
+def _opened(entry: Path) -> tuple[Interface, Path] | None:
+    """What an entry tells; None where it tells nothing or its library is not to be had."""
+    try:
+        interface, key = interface_from_json((entry / INTERFACE).read_text(encoding="utf-8"))
+    except (InternalError, OSError, UnicodeDecodeError):
+        return None
+    folder = found(key)
+    return None if folder is None else (interface, folder / LIBRARY)
+
+
+def _made(package: PackageView) -> tuple[Interface, Path]:
+    return interface_of(package), compile_library(package)
