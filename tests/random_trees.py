@@ -9,7 +9,8 @@ from random_chains import _body, _rotation, _tidy
 
 from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.dynamics.frames import BASE, Frame, frame_at
-from psdmc.robot.chain import Placement
+from psdmc.dynamics.parameters import moved
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Placement
 from psdmc.robot.joints import PRISMATIC, REVOLUTE
 
 TYPES = {"R": REVOLUTE, "P": PRISMATIC, "H": HELICAL}
@@ -17,6 +18,7 @@ TYPES = {"R": REVOLUTE, "P": PRISMATIC, "H": HELICAL}
 TREES = {
     "a fork": (BASE, 0, 0),
     "two on the base": (BASE, BASE, 1),
+    "a wrist with two fingers": (BASE, 0, 1, 1),
     "a trunk with two arms": (BASE, 0, 1, 2, 1, 4),
     "four legs on a body": (BASE, 0, 1, 0, 3, 0, 5, 0),
     "interleaved": (BASE, BASE, 0, 1, 2, 0, 3, 5),
@@ -59,6 +61,21 @@ class RandomTree:
     @property
     def bodies(self) -> list[Body]:
         return [body_from_parameters(row.tolist()) for row in self.parameters]
+
+    def mechanism(self) -> Chain:
+        """The same robot as a Chain, parameters about link frames of their own; the tip on the first leaf."""
+        rng = np.random.default_rng(self.n)
+        links = [Placement(_rotation(rng), rng.uniform(-0.2, 0.2, 3)) for _ in self.parents]
+        joints = tuple(
+            Joint(f"joint{i}", f"link{i}", joint, place, link)
+            for i, (joint, place, link) in enumerate(zip(self.types, self.places, links, strict=True))
+        )
+        about_links = [moved(row, link.inverse()) for row, link in zip(self.parameters, links, strict=True)]
+        return Chain(
+            "tree", "urdf", "base", "tip", joints, np.column_stack([about_links, self.drives]),
+            np.eye(PARAMETERS_PER_LINK * self.n), self.gravity, Placement(_rotation(rng), rng.uniform(-0.2, 0.2, 3)),
+            parents=self.parents, tip_body=next(i for i in range(self.n) if i not in self.parents),
+        )  # fmt: skip
 
     @property
     def up(self) -> tuple[float, float, float]:

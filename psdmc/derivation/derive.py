@@ -21,6 +21,7 @@ from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
+from psdmc.robot.derivable import require_derivable
 from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
@@ -52,10 +53,11 @@ def derive_model(
     progress    called with the name of each step as it begins
     provenance  plain JSON values to keep with the model; the tolerances used are added
     memory      bytes that the expansion may take; default: most of what the machine has free
-    Raises DerivationError where the expansion would take too much memory or time, the chain is longer than
-    LARGEST_CHAIN, its numbers are beyond double precision, or no parameter has any effect.
+    Raises InputError where the robot is no serial chain; DerivationError where the expansion would take too much memory
+    or time, the chain is longer than LARGEST_CHAIN, its numbers are beyond double precision, or no parameter has any effect.
     """
     tell = progress or _silent
+    require_derivable(chain)
     _refuse_absurd(chain)
     if expand:
         refuse_long(0, chain.types)

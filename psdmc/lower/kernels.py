@@ -15,6 +15,7 @@ from psdmc.program.functions import BY_NAME, FUNCTIONS, Function
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
+from psdmc.robot.derivable import require_derivable
 
 Lowering = Literal["auto", "expanded", "factored"]
 
@@ -51,6 +52,7 @@ def lower(
     functions  names of FUNCTIONS; None takes all; without theta_b only those variants that need none are made
     Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
+    require_derivable(model.chain)
     wanted = _wanted(model, functions)
     lowered = _Lowered(model, lowering)
     kernels: dict[str, Kernel] = {}

@@ -12,6 +12,7 @@ import numpy as np
 
 from psdmc.model.json_values import entries, number, numbers, part, text, whole
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Limits, Placement
+from psdmc.robot.derivable import require_derivable
 from psdmc.robot.joints import joint_type
 
 MOST_JOINTS = 256
@@ -25,6 +26,8 @@ _NO_LIMIT["effort"] = math.inf
 
 
 def chain_to_json(chain: Chain) -> dict[str, Any]:
+    """Plain values; InputError where the robot is no serial chain, which is all that a model file holds."""
+    require_derivable(chain)
     rows, columns = np.nonzero(chain.parameter_span)
     values = chain.parameter_span[rows, columns]
     return {

@@ -1,0 +1,32 @@
+"""Which mechanisms psdmc derives, lowers and keeps in model files: serial chains, so far."""
+
+from __future__ import annotations
+
+from psdmc.errors import InputError
+from psdmc.robot.chain import BASE, Chain
+from psdmc.robot.limits import shown
+
+CUT = "choose a chain in it with --base and --tip"
+
+
+def require_derivable(chain: Chain) -> None:
+    """InputError where the robot is no serial chain, each joint with a coordinate of its own; the hint is the remedy."""
+    fault = _fork(chain) or _inner_tip(chain)
+    if fault is not None:
+        raise InputError(f"{shown(chain.name)}: {fault}, and psdmc derives serial chains only", CUT)
+
+
+def _fork(chain: Chain) -> str | None:
+    """The first link, or base, that carries several joints."""
+    for body in range(BASE, len(chain)):
+        carried = [shown(chain.joints[i].name) for i, parent in enumerate(chain.parents) if parent == body]
+        if len(carried) > 1:
+            link = chain.base_name if body == BASE else chain.joints[body].link_name
+            return f"link {shown(link)} carries joints {', '.join(carried[:-1])} and {carried[-1]}"
+    return None
+
+
+def _inner_tip(chain: Chain) -> str | None:
+    if chain.tip_body in chain.leaves:
+        return None
+    return f"the tip is on link {shown(chain.joints[chain.tip_body].link_name)}, which carries other joints"
