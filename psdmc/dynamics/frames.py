@@ -102,7 +102,7 @@ def as_vector(values: Sequence[float]) -> Vector:
 
 
 def frames_of(chain: Chain) -> tuple[Frame, ...]:
-    """The chain's own joint frames, none moved."""
+    """The robot's own joint frames, none moved. What runs on them takes joint values; see coordinates.py."""
     return tuple(
         frame_at(joint.type, parent, joint.placement)
         for joint, parent in zip(chain.joints, chain.parents, strict=True)

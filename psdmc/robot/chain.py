@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from psdmc.robot.coordinates import Coordinate, checked_coordinates
 from psdmc.robot.joints import JointType
 from psdmc.robot.placement import Array as Array
 from psdmc.robot.placement import Placement as Placement
@@ -71,6 +72,7 @@ class Chain:
     notes            what was snapped, merged, locked, assumed or found odd, one sentence each, for `show`
     parents          n, the body that each joint hangs on: its index, or BASE; left out: each on the one before
     tip_body         the body that the tip frame is fixed to; left out: the only leaf
+    coordinates      n, which coordinate each joint's q follows; left out: each joint its own
     """
 
     name: str
@@ -85,6 +87,7 @@ class Chain:
     notes: tuple[str, ...] = ()
     parents: tuple[int, ...] = ()
     tip_body: int = BASE
+    coordinates: tuple[Coordinate, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.joints)
@@ -99,6 +102,7 @@ class Chain:
         object.__setattr__(self, "notes", tuple(self.notes))
         object.__setattr__(self, "parents", _checked_parents(self.parents, n))
         object.__setattr__(self, "tip_body", _checked_tip(self.tip_body, self.leaves, n))
+        object.__setattr__(self, "coordinates", checked_coordinates(self.coordinates, n))
 
     @property
     def joint_names(self) -> tuple[str, ...]:

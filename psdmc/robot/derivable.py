@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from psdmc.errors import InputError
 from psdmc.robot.chain import BASE, Chain
+from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.limits import shown
 
 CUT = "choose a chain in it with --base and --tip"
+FREE = "make it a fixed joint, or leave out what it follows"
 
 
 def require_derivable(chain: Chain) -> None:
@@ -14,6 +16,9 @@ def require_derivable(chain: Chain) -> None:
     fault = _fork(chain) or _inner_tip(chain)
     if fault is not None:
         raise InputError(f"{shown(chain.name)}: {fault}, and psdmc derives serial chains only", CUT)
+    follower = _follower(chain)
+    if follower is not None:
+        raise InputError(f"{shown(chain.name)}: {follower}, and psdmc derives independent joints only", FREE)
 
 
 def _fork(chain: Chain) -> str | None:
@@ -30,3 +35,15 @@ def _inner_tip(chain: Chain) -> str | None:
     if chain.tip_body in chain.leaves:
         return None
     return f"the tip is on link {shown(chain.joints[chain.tip_body].link_name)}, which carries other joints"
+
+
+def _follower(chain: Chain) -> str | None:
+    """The first joint without a coordinate of its own."""
+    for i, coordinate in enumerate(chain.coordinates):
+        name = f"joint {shown(chain.joints[i].name)}"
+        if coordinate.leader is None:
+            return f"{name} is held at {coordinate.offset:g}"
+        if coordinate != Coordinate(i):
+            leader = shown(chain.joints[coordinate.leader].name)
+            return f"{name} follows joint {leader} ({coordinate.ratio:g} q + {coordinate.offset:g})"
+    return None

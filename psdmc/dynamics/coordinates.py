@@ -1,0 +1,52 @@
+"""From the robot's coordinates to its joints' and back, where joints follow others: q_joint = ratio q_leader + offset.
+
+The algorithms run on joint values. A motion of the coordinates gives those by `joint_positions` and `joint_rates`; the
+power of the joints' torques at these rates is that of the coordinates' torques, so torques and the mass matrix's rows and
+columns are gathered with the same ratios.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.scalar import Scalar
+from psdmc.robot.coordinates import Coordinate, leaders
+
+Rows = Sequence[Sequence[Scalar]]
+
+
+def joint_positions(coordinates: Sequence[Coordinate], q: Sequence[Scalar]) -> list[Scalar]:
+    """q of every joint from the coordinates, one for each leader."""
+    return [
+        value + coordinate.offset if coordinate.offset else value
+        for value, coordinate in zip(joint_rates(coordinates, q), coordinates, strict=True)
+    ]
+
+
+def joint_rates(coordinates: Sequence[Coordinate], qd: Sequence[Scalar]) -> list[Scalar]:
+    """qd, or qdd, of every joint from the coordinates'; zero of one that is held."""
+    own = dict(zip(leaders(coordinates), qd, strict=True))
+    return [
+        _times(coordinate, own[coordinate.leader]) if coordinate.leader is not None else 0.0
+        for coordinate in coordinates
+    ]
+
+
+def gathered_torques(coordinates: Sequence[Coordinate], tau: Sequence[Scalar]) -> list[Scalar]:
+    """Torques of the coordinates from those of all joints."""
+    found: dict[int, Scalar] = dict.fromkeys(leaders(coordinates), 0.0)
+    for coordinate, torque in zip(coordinates, tau, strict=True):
+        if coordinate.leader is not None:
+            found[coordinate.leader] = found[coordinate.leader] + _times(coordinate, torque)
+    return list(found.values())
+
+
+def gathered_matrix(coordinates: Sequence[Coordinate], matrix: Rows) -> list[list[Scalar]]:
+    """The mass matrix of the coordinates from that of all joints."""
+    rows = [gathered_torques(coordinates, row) for row in matrix]
+    columns = [gathered_torques(coordinates, column) for column in zip(*rows, strict=True)]
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _times(coordinate: Coordinate, value: Scalar) -> Scalar:
+    return value if coordinate.ratio == 1.0 else value * coordinate.ratio

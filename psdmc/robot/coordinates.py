@@ -1,0 +1,50 @@
+"""How joints follow the robot's coordinates: q_joint = ratio q_leader + offset, or a constant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """What one joint's q is: ratio * q[leader] + offset.
+
+    leader   the joint whose q is meant, which has a coordinate of its own; None: the joint is held at `offset`
+    ratio    of the two rates, in the joint's unit per the leader's
+    offset   rad or m
+    """
+
+    leader: int | None
+    ratio: float = 1.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.ratio) and math.isfinite(self.offset)):
+            raise ValueError(f"a coordinate with ratio {self.ratio} and offset {self.offset}")
+
+
+def own_coordinates(n: int) -> tuple[Coordinate, ...]:
+    """Of n joints that follow no other."""
+    return tuple(Coordinate(i) for i in range(n))
+
+
+def leaders(coordinates: Sequence[Coordinate]) -> tuple[int, ...]:
+    """The joints that have a coordinate of their own, in order: q has one entry for each."""
+    return tuple(i for i, coordinate in enumerate(coordinates) if coordinate == Coordinate(i))
+
+
+def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coordinate, ...]:
+    """As they are, each joint's own where none are given; ValueError where a joint follows one that follows another."""
+    if not coordinates:
+        return own_coordinates(n)
+    if len(coordinates) != n:
+        raise ValueError(f"{len(coordinates)} coordinates for {n} joints")
+    own = leaders(coordinates)
+    for i, coordinate in enumerate(coordinates):
+        if coordinate.leader is not None and coordinate.leader not in own:
+            raise ValueError(
+                f"joint {i} follows joint {coordinate.leader}, which has no coordinate of its own"
+            )
+    return tuple(coordinates)

@@ -1,0 +1,121 @@
+"""Joints that follow others, against Pinocchio's mimic joints; and joints that are held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from random_trees import TREES, RandomTree
+
+from psdmc.derivation.derive import derive_model
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.coordinates import gathered_matrix, gathered_torques, joint_positions, joint_rates
+from psdmc.dynamics.newton_euler import inverse_dynamics
+from psdmc.errors import InputError
+from psdmc.robot.coordinates import Coordinate, leaders
+
+FINGERS = (Coordinate(0), Coordinate(1), Coordinate(1, -0.7, 0.2), Coordinate(3), Coordinate(1, 1.3, -0.4))
+"""Five joints, three coordinates: two fingers follow a third."""
+
+PARENTS = (-1, 0, 0, 1, 2)
+
+
+def as_urdf(tree: RandomTree) -> str:
+    """The tree with FINGERS as mimic joints, numbers to all their digits."""
+
+    def words(values) -> str:
+        return " ".join(repr(float(value)) for value in values)
+
+    parts = ['<robot name="tree"><link name="base"/>']
+    for i, (joint, parent, place) in enumerate(zip(tree.types, tree.parents, tree.places, strict=True)):
+        body, coordinate = pin.Inertia.FromDynamicParameters(tree.parameters[i].copy()), FINGERS[i]
+        names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        six = " ".join(
+            f'{name}="{float(value)!r}"'
+            for name, value in zip(names, body.inertia[np.triu_indices(3)], strict=True)
+        )
+        above = "base" if parent < 0 else f"link{parent}"
+        mimic = (
+            f'<mimic joint="joint{coordinate.leader}" multiplier="{coordinate.ratio!r}" offset="{coordinate.offset!r}"/>'
+            if coordinate != Coordinate(i)
+            else ""
+        )
+        parts.append(
+            f'<link name="link{i}"><inertial><origin xyz="{words(body.lever)}"/><mass value="{body.mass!r}"/>'
+            f"<inertia {six}/></inertial></link>"
+            f'<joint name="joint{i}" type="{joint.word}"><axis xyz="0 0 1"/>{mimic}'
+            f'<parent link="{above}"/><child link="link{i}"/>'
+            f'<origin xyz="{words(place.translation)}" rpy="{words(pin.rpy.matrixToRpy(place.rotation))}"/>'
+            '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>'
+        )
+    return "".join([*parts, "</robot>"])
+
+
+@pytest.mark.parametrize("kinds", ["RRRRR", "RPPRP", "PRRPR"])
+def test_followers_are_pinocchios_mimic_joints(kinds: str) -> None:
+    tree = RandomTree(21, PARENTS, kinds)
+    model = pin.buildModelFromXML(as_urdf(tree), mimic=True)
+    model.gravity.linear = tree.gravity.copy()
+    data = model.createData()
+    assert (model.nq, model.nv) == (3, 3)
+    order = [model.joints[model.getJointId(f"joint{i}")].idx_v for i in leaders(FINGERS)]
+    still = [0.0] * tree.n
+    for q, qd, qdd in np.random.default_rng(0).uniform(-2.0, 2.0, (20, 3, 3)):
+        states = (joint_positions(FINGERS, q), joint_rates(FINGERS, qd), joint_rates(FINGERS, qdd))
+        theirs = np.zeros((3, 3))
+        theirs[:, order] = q, qd, qdd
+        tau = inverse_dynamics(tree.frames, tree.bodies, still, *states, tree.up)
+        expected = pin.rnea(model, data, *theirs)[order]
+        np.testing.assert_allclose(gathered_torques(FINGERS, tau), expected, rtol=1e-11)
+        M = gathered_matrix(FINGERS, mass_matrix(tree.frames, tree.bodies, still, states[0]))
+        upper = np.triu(pin.crba(model, data, theirs[0]))
+        whole = upper + np.triu(upper, 1).T
+        np.testing.assert_allclose(M, whole[np.ix_(order, order)], rtol=1e-11, atol=1e-12)
+
+
+def test_held_joints_stand_still() -> None:
+    tree = RandomTree(22, TREES["a trunk with two arms"], "RRPRRP")
+    held = {2: 0.3, 4: -0.8}
+    coordinates = tuple(
+        Coordinate(None, offset=held[i]) if i in held else Coordinate(i) for i in range(tree.n)
+    )
+    free = list(leaders(coordinates))
+    assert free == [0, 1, 3, 5]
+    q, qd, qdd = np.random.default_rng(1).uniform(-2.0, 2.0, (3, len(free)))
+    states = (joint_positions(coordinates, q), joint_rates(coordinates, qd), joint_rates(coordinates, qdd))
+    tau = inverse_dynamics(tree.frames, tree.bodies, tree.drives, *states, tree.up)
+    whole = np.array([[held.get(i, 0.0) for i in range(tree.n)], np.zeros(tree.n), np.zeros(tree.n)])
+    whole[:, free] = q, qd, qdd
+    (expected,) = tree.each(pin.rnea, *whole[:, None])
+    np.testing.assert_allclose(gathered_torques(coordinates, tau), expected[free], rtol=1e-11)
+
+
+def test_followers_are_refused_not_derived_wrongly() -> None:
+    chain = RandomTree(23, (-1, 0, 1), "RRR").mechanism()
+    with pytest.raises(InputError, match=r"joint 'joint2' follows joint 'joint0' \(2 q \+ 0\.1\)") as refused:
+        derive_model(replace(chain, coordinates=(Coordinate(0), Coordinate(1), Coordinate(0, 2.0, 0.1))))
+    assert refused.value.hint
+    with pytest.raises(InputError, match=r"joint 'joint1' is held at 0\.5"):
+        derive_model(replace(chain, coordinates=(Coordinate(0), Coordinate(None, offset=0.5), Coordinate(2))))
+
+
+@pytest.mark.parametrize(
+    ("coordinates", "message"),
+    [
+        ((Coordinate(0),), "1 coordinates for 3 joints"),
+        ((Coordinate(1), Coordinate(0), Coordinate(2)), "joint 0 follows joint 1, which has no coordinate"),
+        ((Coordinate(0), Coordinate(0), Coordinate(1)), "joint 2 follows joint 1, which has no coordinate"),
+        ((Coordinate(0), Coordinate(7), Coordinate(2)), "joint 1 follows joint 7"),
+    ],
+)
+def test_rings_and_followers_of_followers_are_no_coordinates(coordinates, message: str) -> None:
+    chain = RandomTree(24, (-1, 0, 1), "RRR").mechanism()
+    with pytest.raises(ValueError, match=message):
+        replace(chain, coordinates=coordinates)
+
+
+def test_a_ratio_is_a_number() -> None:
+    with pytest.raises(ValueError, match="nan"):
+        Coordinate(0, float("nan"))
