@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from psdmc.calibration.campaign_file import is_campaign, read_campaign
-from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
+from psdmc.calibration.identify.four_steps import FourSteps, Runs, calibrate_four_steps
 from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibration.identify.motor_constants import motors_of_logs
 from psdmc.calibration.identify.physical import (
@@ -15,10 +15,9 @@ from psdmc.calibration.identify.physical import (
     PhysicalOptions,
     nearest_physical,
     require_cvxpy,
-    whitening_of,
 )
+from psdmc.calibration.identify.physical_steps import physical_steps
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
-from psdmc.calibration.identify.residuals import noise_factor
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_files import read_log
@@ -95,23 +94,20 @@ def calibrate_campaign(
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
 ) -> Calibration:
-    """The four steps; their theta_b, or the nearest physical one, as their uncertainties and the prior measure."""
+    """The four steps; what they found, or the nearest that is physical, as their uncertainties and the prior measure."""
     found = calibrate_four_steps(
         model.chain, regressor, model.l, runs, options.campaign, progress, torque_constants, model.theta_b
     )
-    inertial = found.inertial
 
-    def record(theta_b: Array) -> Calibration:
-        return four_step_record(model, found, theta_b, options.campaign)
+    def record(steps: FourSteps, theta_b: Array) -> Calibration:
+        return four_step_record(model, steps, theta_b, options.campaign)
 
     progress("reading the result back")
-    plain = judged_record(record(inertial.theta_b), runs)
+    plain = judged_record(record(found, found.inertial.theta_b), runs)
 
     def consistent() -> Calibration:
-        factor = max(noise_factor(found.gravity.estimate), noise_factor(inertial.estimate))
-        whitening = whitening_of(factor**2 * inertial.covariance + inertial.prior_covariance)
-        near = nearest_physical(model, inertial.theta_b, whitening, None, options.consistency)
-        return judged_record(record(near.values), runs, plain, near.distance)
+        near = physical_steps(model, found, options.consistency)
+        return judged_record(record(near.found, near.theta_b), runs, plain, near.distance)
 
     result = _physical(plain, consistent, options, progress)
     progress("verdict")

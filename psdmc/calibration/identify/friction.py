@@ -12,6 +12,7 @@ from psdmc.calibration.identify.friction_run import JointRun, prepared
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.quality import quality
+from psdmc.calibration.identify.residuals import CORRELATED
 from psdmc.calibration.identify.steps import (
     FrictionOptions,
     FrictionRun,
@@ -62,7 +63,22 @@ def calibrate_friction(
         for name, joint in found.items()
         if joint.unseen
     )
-    return FrictionResult(found, warnings)
+    return FrictionResult(found, (*warnings, *_correlated(found)))
+
+
+def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
+    """One warning that names the joints whose residual is no noise."""
+    named = [
+        f"{name} ({joint.correlation:.2f}, by {joint.widened:.1f})"
+        for name, joint in found.items()
+        if joint.correlation > CORRELATED
+    ]
+    if not named:
+        return ()
+    return (
+        f"friction: the residual is no noise but correlated from sample to sample, joint(s) {', '.join(named)}: the "
+        "model lacks an effect there; standard deviations are widened for it, by the factor named",
+    )
 
 
 def judge_friction(

@@ -11,12 +11,14 @@ Unknowns p, in order: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1, ine
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import optimize
 
 from psdmc.calibration.identify.friction_run import JointRun, lugre_from
 from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
+from psdmc.calibration.identify.residuals import sample_correlation, widening
 from psdmc.calibration.identify.steps import FrictionOptions
 from psdmc.calibration.logs.log import Array
 
@@ -25,6 +27,12 @@ FREE = {"lugre": tuple(range(10)), "coulomb_viscous": (0, 3, 7, 8, DELAY)}
 """Unknowns that each friction law leaves to the data."""
 STIFF_BEND = 1e-5
 """rad: bristle deflection at Coulomb friction that stands for none at all."""
+PEAK_SPEEDS = (0.01, 0.04)
+"""Stribeck velocities that the last step starts from as well, shares of the run's largest speed."""
+PEAK_HEIGHT = 0.2
+"""F_s - F_c there, share of F_c."""
+SHORT_DESCENT, LONG_DESCENT = 8, 25
+"""Evaluations by which a start is judged, and that its best is given."""
 UNSEEN_CURVATURE = 1e-13
 """Of the sum of squares, relative to the largest, below which a direction is not seen."""
 
@@ -33,9 +41,10 @@ UNSEEN_CURVATURE = 1e-13
 class JointFriction:
     """One joint's friction as identified.
 
-    covariance  (7, 7)  in the order of lugre.PARAMETERS, of the fit alone
+    covariance  (7, 7)  in the order of lugre.PARAMETERS, of the fit alone, widened where residuals are correlated
     unseen      names of parameters that the data do not determine
-    inertia     kg m^2, of the joint in the run's pose;  offset N m;  delay s
+    inertia     kg m^2, of the joint in the run's pose, not negative;  offset N m;  delay s
+    correlation of the residual from sample to sample;  widened  the standard deviations, by this factor
     """
 
     joint: str
@@ -45,6 +54,8 @@ class JointFriction:
     inertia: float
     offset: float
     delay: float
+    correlation: float = 0.0
+    widened: float = 1.0
 
     @property
     def std(self) -> Array:
@@ -66,8 +77,25 @@ def fit_joint(
     if options.law == "coulomb_viscous":
         sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
         return _polished(name, replace(data, fit=sliding), _plain(_fast(data, options)), options)
-    first = _presliding(data, _fast(data, options), options) if start is None else unknowns_of(start)
-    return _polished(name, data, first, options)
+    if start is not None:
+        return _polished(name, data, unknowns_of(start), options)
+    fast = _fast(data, options)
+    return _polished(
+        name, data, _best_of_peaks(data, _presliding(data, fast, options), fast, options), options
+    )
+
+
+def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionOptions) -> Array:
+    """The start that leads lowest: a Stribeck peak that was missed, or found where nothing moves, is a minimum, too."""
+    top = float(np.abs(data.qd).max())
+    starts = [first]
+    for speed in PEAK_SPEEDS:
+        other = first.copy()
+        other[[0, 1, 2, 3, 4]] = fast[0], PEAK_HEIGHT * fast[0], np.log(speed * top), fast[1], fast[2]
+        starts.append(other)
+    found = [_descended(data, start, options, SHORT_DESCENT) for start in starts]
+    best = min(found, key=lambda fitted: float(fitted.cost))
+    return _put(first, _free(options), best.x)
 
 
 def _plain(fast: Array) -> Array:
@@ -90,10 +118,10 @@ def _fast(data: JointRun, options: FrictionOptions) -> Array:
         return np.asarray(friction + p[3] * qdd + p[4] - target)
 
     size = float(np.sqrt(np.mean(target**2)))
-    low = [1e-6 * size, 0.0, 0.1, -np.inf, -np.inf]
+    low = [1e-6 * size, 0.0, 0.1, 0.0, -np.inf]
     high = [np.inf, np.inf, 2.5, np.inf, np.inf]
     fitted = optimize.least_squares(
-        residual, [0.5 * size, 0.3 * size, 0.8, 0.0, 0.0], bounds=(low, high), x_scale="jac"
+        residual, [0.5 * size, 0.3 * size, 0.8, 1e-3 * size, 0.0], bounds=(low, high), x_scale="jac"
     )
     return np.asarray(fitted.x)
 
@@ -140,9 +168,30 @@ def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
 
 def _polished(name: str, data: JointRun, p: Array, options: FrictionOptions) -> JointFriction:
     """All free unknowns together by trust region, bounds kept; standard deviations from its Jacobian."""
-    free = list(FREE[options.law]) if options.estimate_delay else [j for j in FREE[options.law] if j != DELAY]
+    free = _free(options)
+    scale = step_sizes(p)[free]
+    fitted = _descended(data, p, options, LONG_DESCENT)
+    spread = np.zeros((len(p), len(p)))
+    spread[np.ix_(free, free)] = _covariance(fitted.jac * scale, fitted.fun) * np.outer(scale, scale)
+    left = np.zeros((len(data.time), 1))
+    left[data.fit, 0] = fitted.fun
+    use = np.isin(np.arange(len(left)), data.fit)[:, None]
+    left, use = left[data.every], use[data.every]
+    widened = float(widening(left, use)[0])
+    found = _with_uncertainty(name, _put(p, free, fitted.x), widened**2 * spread, options)
+    return replace(found, correlation=float(sample_correlation(left, use)[0]), widened=widened)
+
+
+def _free(options: FrictionOptions) -> list[int]:
+    """Unknowns that are left to the data."""
+    return [j for j in FREE[options.law] if options.estimate_delay or j != DELAY]
+
+
+def _descended(data: JointRun, p: Array, options: FrictionOptions, evaluations: int) -> Any:
+    """scipy's result for the free unknowns, from p by trust region within the bounds."""
+    free = _free(options)
     low, high = (bounds[free] for bounds in _bounds(options))
-    scale = _scale(p)[free]
+    scale = step_sizes(p)[free]
     inner = np.clip(p[free], low + 1e-6 * scale, np.where(np.isfinite(high), high - 1e-6 * scale, np.inf))
 
     def residual(x: Array) -> Array:
@@ -158,11 +207,8 @@ def _polished(name: str, data: JointRun, p: Array, options: FrictionOptions) -> 
         return np.stack(columns, axis=1)
 
     bounds = {"bounds": (low, high), "x_scale": scale}
-    limits = {"xtol": 1e-7, "ftol": 1e-9, "gtol": 1e-12, "max_nfev": 25}
-    fitted = optimize.least_squares(residual, inner, jac=jacobian, **bounds, **limits)
-    spread = np.zeros((len(p), len(p)))
-    spread[np.ix_(free, free)] = _covariance(fitted.jac * scale, fitted.fun) * np.outer(scale, scale)
-    return _with_uncertainty(name, _put(p, free, fitted.x), spread, options)
+    limits = {"xtol": 1e-7, "ftol": 1e-9, "gtol": 1e-12, "max_nfev": evaluations}
+    return optimize.least_squares(residual, inner, jac=jacobian, **bounds, **limits)
 
 
 def _put(p: Array, free: list[int], x: Array) -> Array:
@@ -172,14 +218,14 @@ def _put(p: Array, free: list[int], x: Array) -> Array:
 
 
 def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
-    """sigma_0, sigma_1, F_v >= 0, F_s >= F_c > 0, v_s > 0; the rest keeps the search where numbers make sense."""
+    """sigma_0, sigma_1, F_v, inertia >= 0, F_s >= F_c > 0, v_s > 0; the rest keeps the search where numbers make sense."""
     reach = options.largest_delay
-    low = [1e-9, 0.0, np.log(1e-5), 0.0, 0.05, np.log(1.0), 0.0, -np.inf, -np.inf, -reach]
+    low = [1e-9, 0.0, np.log(1e-5), 0.0, 0.05, np.log(1.0), 0.0, 0.0, -np.inf, -reach]
     high = [np.inf, np.inf, np.log(1e2), np.inf, 3.0, np.log(1e9), np.inf, np.inf, np.inf, reach]
     return np.array(low), np.array(high)
 
 
-def _scale(p: Array) -> Array:
+def step_sizes(p: Array) -> Array:
     """What counts as one step of each unknown."""
     viscous, damping = max(p[3], 0.1 * p[0]), max(p[6], 1e-4 * np.exp(p[5]))
     return np.array([p[0], 0.2 * p[0], 1.0, viscous, 0.5, 1.0, damping, 1.0, p[0], 1e-3])
@@ -193,13 +239,19 @@ def _covariance(jac: Array, residual: Array) -> Array:
     return np.asarray((directions * (variance / seen)) @ directions.T)
 
 
+def to_seven(friction: Lugre) -> Array:
+    """(7, 10) d lugre.PARAMETERS / d unknowns."""
+    turn = np.eye(7, 10)
+    turn[1, 0] = 1.0
+    turn[2, 2] = friction.stribeck_velocity
+    turn[5, 5] = friction.stiffness
+    return turn
+
+
 def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptions) -> JointFriction:
     friction = lugre_from(p)
-    to_seven = np.eye(7, 10)
-    to_seven[1, 0] = 1.0
-    to_seven[2, 2] = friction.stribeck_velocity
-    to_seven[5, 5] = friction.stiffness
-    covariance = to_seven @ spread @ to_seven.T
+    turn = to_seven(friction)
+    covariance = turn @ spread @ turn.T
     relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction.as_array()), 1e-12)
     unseen = [PARAMETERS[j] for j in range(7) if not relative[j] < options.unseen]
     no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: nothing hangs on v_s

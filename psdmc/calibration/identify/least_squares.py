@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.residuals import noise_factor, sample_correlation, spread
+from psdmc.calibration.identify.linear_rows import Block, Rows, collected, reduced, residual_of
+from psdmc.calibration.identify.residuals import sample_correlation, spread, widening
 from psdmc.calibration.logs.log import Array
 
 Method = Literal["ols", "wls", "irls"]
@@ -73,21 +74,22 @@ class Estimate:
     """The solution of target = columns @ values. l unknowns, n joints, r directions seen.
 
     values            (l,)      as near to the prior as the data allow: in unseen directions, on it
-    covariance        (l, l)    of the fit alone, from residuals taken as white; none in unseen directions
+    covariance        (l, l)    of the fit alone, widened where residuals are correlated; none in unseen directions
     considered        (l, k)    change of `values` per unit of what was considered; k may be 0
     total_covariance  (l, l)    with what was considered
     unseen            (l, l - r)  orthonormal directions that the data do not show, in units of `scale`
     scale             (l,)      the prior's, or the columns' where there is none
     prior_std         of unseen directions, in units of `scale`; zero without a prior
     whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances: the data's where they see
-                                (widened by noise_factor), the prior's where not
+                                (its sum of squares over noise_factor^2), the prior's where not
     identifiable      (l,)      whether the data see the parameter by itself
     singular_values   (l,)      of the weighted, column-scaled problem, descending
     rank              how many directions are seen
     sigma             (n,)      residual RMS per joint, target's unit
     weights           (N, n)    of the last round, one over unit; zero where a row did not count
     correlation       (n,)      of the residual from sample to sample: near zero for noise
-    optimism          robust over white standard deviation, median over parameters: near one for noise
+    noise_factor      by how much correlated residuals widened the standard deviation that they widened most; near one
+                      for noise
     """
 
     values: Array
@@ -104,7 +106,7 @@ class Estimate:
     sigma: Array
     weights: Array
     correlation: Array
-    optimism: float
+    noise_factor: float
 
     @property
     def prior_covariance(self) -> Array:
@@ -143,16 +145,34 @@ def estimate(
     use      (N, n)  entries that count; None: all
     prior    None: zero, in units of the columns, and no bound on what is believable
     """
+    noise = None if prior is None else prior.noise
+    rows = [Block(columns, noise, None if consider is None else consider.columns)]
+    return estimate_rows(rows, target, options, None if consider is None else consider.covariance, use, prior)
+
+
+def estimate_rows(
+    rows: Rows,
+    target: Array,
+    options: FitOptions | None = None,
+    considered: Array | None = None,
+    use: NDArray[np.bool_] | None = None,
+    prior: Prior | None = None,
+) -> Estimate:
+    """The same of columns that come block by block, and need not be held at once.
+
+    considered  (k, k)  covariance of what the blocks' `consider` columns belong to
+    prior       whose noise is the blocks'
+    """
     options = options or FitOptions()
     use = np.ones(target.shape, dtype=bool) if use is None else use
-    solved = _Solved(columns, target, use.astype(np.float64), options, prior, 0.0)
+    solved = _Solved(rows, target, use.astype(np.float64), options, prior, 0.0)
     for _ in range(1 if options.method == "ols" else options.rounds):
         plain = options.method == "ols"
         weights = (
             use.astype(np.float64) if plain else np.where(use, _weights(solved.residual, use, options), 0.0)
         )
-        solved = _Solved(columns, target, weights, options, prior, _level(solved.residual * weights, use))
-    return solved.estimate(consider)
+        solved = _Solved(rows, target, weights, options, prior, _level(solved.residual * weights, use))
+    return solved.estimate(considered)
 
 
 def _level(weighted: Array, use: NDArray[np.bool_]) -> float:
@@ -190,7 +210,7 @@ class _Solved:
 
     def __init__(
         self,
-        columns: Array,
+        rows: Rows,
         target: Array,
         weights: Array,
         options: FitOptions,
@@ -198,18 +218,17 @@ class _Solved:
         level: float,
     ) -> None:
         self.options = options
-        self.columns = columns
+        self.rows = rows
         self.weights = weights
-        l = columns.shape[2]
-        self.rows = (columns * weights[:, :, None]).reshape(-1, l)
-        factor = np.asarray(np.linalg.qr(self.rows, mode="r"))
-        factor = np.vstack([factor, np.zeros((l - len(factor), l))]) if len(factor) < l else factor
+        found = reduced(rows, target, weights, None if prior is None else prior.values)
+        factor, l = found.factor, found.factor.shape[1]
         sizes = np.linalg.norm(factor, axis=0)
         unit = np.where(sizes > 0, sizes, 1.0)
         self.column_values = np.asarray(np.linalg.svd(factor / unit, compute_uv=False), dtype=np.float64)
         start = np.zeros(l) if prior is None else prior.values
         scale = 1.0 / unit if prior is None else prior.scale
-        chol = np.linalg.cholesky(self._floor(sizes * scale, scale, prior, level))
+        noise = None if prior is None else found.noise
+        chol = np.linalg.cholesky(self._floor(sizes * scale, scale, noise, 0.0 if prior is None else level))
         by_prior = factor * scale
         _, strength, right = np.linalg.svd(by_prior @ np.linalg.inv(chol).T)
         self.rank = int(np.sum(strength > 1.0))
@@ -221,15 +240,13 @@ class _Solved:
         _, self.singular, turned = np.linalg.svd(by_prior @ shown, full_matrices=False)
         self.inverse = scale[:, None] * (shown @ turned.T) / self.singular
         self.forth = self.singular[:, None] * (turned @ shown.T) / scale
-        left = target - columns @ start
-        self.left = self.rows @ self.inverse
-        self.coordinates = self.left.T @ (left * weights).reshape(-1)
+        coordinates = (factor @ self.inverse).T @ found.onto
         share = np.sum(self.unseen**2, axis=1)
-        self.values = np.where(share > 1.0 - ROUNDING, start, start + self.inverse @ self.coordinates)
-        self.residual = target - columns @ self.values
+        self.values = np.where(share > 1.0 - ROUNDING, start, start + self.inverse @ coordinates)
+        self.residual = residual_of(rows, target, self.values)
         self.identifiable = share < options.unseen_share
 
-    def _floor(self, sizes: Array, scale: Array, prior: Prior | None, level: float) -> Array:
+    def _floor(self, sizes: Array, scale: Array, noise: Array | None, level: float) -> Array:
         """(l, l), in the prior's units: the square of what a direction must exceed to be seen.
 
         Noise in the columns, times the ratio asked for; the error of differentiation, a share of each column; and the
@@ -237,27 +254,33 @@ class _Solved:
         """
         options = self.options
         largest = float(sizes.max(initial=0.0)) or 1.0
-        believable = 0.0 if prior is None else level / options.seen
-        floor = np.diag((options.rank_tolerance * sizes) ** 2 + max(believable, NUMERICAL * largest) ** 2)
-        if prior is None or prior.noise is None:
-            return floor
-        noise = (prior.noise * self.weights[:, :, None]).reshape(-1, len(sizes)) * scale
-        return np.asarray(floor + options.noise_ratio * noise.T @ noise)
+        floor = np.diag(
+            (options.rank_tolerance * sizes) ** 2 + max(level / options.seen, NUMERICAL * largest) ** 2
+        )
+        return (
+            floor
+            if noise is None
+            else np.asarray(floor + options.noise_ratio * np.outer(scale, scale) * noise)
+        )
 
-    def estimate(self, consider: Consider | None) -> Estimate:
-        l = self.columns.shape[2]
+    def estimate(self, covariance: Array | None) -> Estimate:
+        l = len(self.values)
         freedom = max(int(np.count_nonzero(self.weights)) - self.rank, 1)
         weighted = self.residual * self.weights
         variance = float(np.sum(weighted**2)) / freedom
-        fit = variance * self.inverse @ self.inverse.T
-        considered = np.zeros((l, 0))
-        total = fit
-        if consider is not None and consider.columns.shape[2]:
-            rows = (consider.columns * self.weights[:, :, None]).reshape(-1, consider.columns.shape[2])
-            considered = -self.inverse @ (self.left.T @ rows)
-            total = fit + considered @ consider.covariance @ considered.T
+        own = widening(weighted, self.weights > 0)
+        sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)))
+        joints = np.tensordot(own**2, sums.squares, axes=1)
+        fit = variance * self.inverse @ (self.inverse.T @ joints @ self.inverse) @ self.inverse.T
+        fit *= max(self._optimism(np.diag(fit), sums.scores), 1.0) ** 2
+        considered, total = np.zeros((l, 0)), fit
+        if covariance is not None and sums.consider.shape[1]:
+            considered = -self.inverse @ (self.inverse.T @ sums.consider)
+            total = fit + considered @ covariance @ considered.T
+        factor = self._noise_factor(np.diag(fit), variance)
         unit = np.sqrt(variance) or 1.0
-        found = Estimate(
+        by_prior = self.unseen.T / self.scale / self.options.seen
+        return Estimate(
             values=self.values,
             covariance=fit,
             considered=considered,
@@ -265,28 +288,37 @@ class _Solved:
             unseen=self.unseen,
             scale=self.scale,
             prior_std=self.prior_std,
-            whitening=np.zeros((0, l)),
+            whitening=np.vstack([self.forth / (unit * factor), by_prior]),
             identifiable=self.identifiable,
             singular_values=self.column_values,
             rank=self.rank,
             sigma=spread(self.residual, self.weights > 0),
             weights=self.weights,
             correlation=sample_correlation(self.residual, self.weights > 0),
-            optimism=self._optimism(np.diag(fit), weighted),
+            noise_factor=factor,
         )
-        by_prior = self.unseen.T / self.scale / self.options.seen
-        return replace(found, whitening=np.vstack([self.forth / (unit * noise_factor(found)), by_prior]))
 
-    def _optimism(self, white: Array, weighted: Array) -> float:
-        """Cluster-robust over white standard deviation (Liang and Zeger 1986): clusters are stretches of time."""
-        count = min(self.options.clusters, len(weighted) // 4)
-        if count < 5 or not self.rank:
-            return 1.0
-        n = self.columns.shape[1]
-        scores = self.left * weighted.reshape(-1, 1)
-        cluster = np.repeat(np.arange(len(weighted)) * count // len(weighted), n)
-        sums = np.zeros((count, self.rank))
-        np.add.at(sums, cluster, scores)
-        robust = np.sum((sums @ self.inverse.T) ** 2, axis=0) * count / (count - 1)
+    def _noise_factor(self, widened: Array, variance: float) -> float:
+        """The largest ratio of a standard deviation to what residuals taken as white would give."""
+        white = variance * np.sum(self.inverse**2, axis=1)
         seen = np.flatnonzero((white > 0) & self.identifiable)
-        return float(np.sqrt(np.median(robust[seen] / white[seen]))) if len(seen) else 1.0
+        return float(np.sqrt(np.max(widened[seen] / white[seen]))) if len(seen) else 1.0
+
+    def _clusters(self, count: int) -> int:
+        """Stretches of time for robust standard deviations; none where there are too few rows."""
+        clusters = min(self.options.clusters, count // 4)
+        return clusters if clusters >= FEWEST_CLUSTERS and self.rank else 0
+
+    def _optimism(self, widened: Array, scores: Array) -> float:
+        """Cluster-robust over widened standard deviation, median over parameters (Liang and Zeger 1986): clusters are
+        stretches of time."""
+        count = len(scores)
+        seen = np.flatnonzero((widened > 0) & self.identifiable)
+        if not count or not len(seen):
+            return 1.0
+        robust = np.sum((scores @ self.inverse @ self.inverse.T) ** 2, axis=0) * count / (count - 1)
+        return float(np.sqrt(np.median(robust[seen] / widened[seen])))
+
+
+FEWEST_CLUSTERS = 5
+"""Below these, stretches of time say nothing of a standard deviation."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.predictor import payload_torque
 from psdmc.calibration.identify.quality import quality
+from psdmc.calibration.identify.residuals import widening
 from psdmc.calibration.identify.steps import JointQuality, MotorRun, Sample, StepOptions, StepQuality
 from psdmc.calibration.logs.filter import FilterOptions, away_from, filtered, held_out
 from psdmc.calibration.logs.log import Array, Log
@@ -102,13 +103,15 @@ def _sweeps(
 
 
 def _slope(x: Array, y: Array) -> tuple[float, float]:
-    """Of y = slope x, and its standard deviation."""
+    """Of y = slope x, and its standard deviation, widened where the residual is correlated along x."""
     power = float(x @ x)
     if power == 0 or len(x) < 3:
         return 0.0, np.inf
     slope = float(x @ y) / power
-    variance = float(np.sum((y - slope * x) ** 2)) / (len(x) - 1)
-    return slope, float(np.sqrt(variance / power))
+    left = (y - slope * x)[:, None]
+    variance = float(np.sum(left**2)) / (len(x) - 1)
+    widened = float(widening(left, np.ones(left.shape, dtype=bool))[0])
+    return slope, widened * float(np.sqrt(variance / power))
 
 
 def _added(chain: Chain, k: int, run: MotorRun, options: StepOptions) -> tuple[Array, Array, Array]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.logs.log import Array
 from psdmc.dynamics.parameters import inertia_matrix, second_moments
-from psdmc.errors import InputError
+from psdmc.errors import InputError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.chain import PARAMETERS_PER_LINK
 
@@ -82,24 +82,49 @@ def nearest_physical(
     For a linear fit that cost is what v adds to its sum of squares: one problem, its weights, and the prior where the
     data see nothing. InputError where cvxpy is missing, NotPhysical where no solution is found.
     """
-    options = options or PhysicalOptions()
     cp: Any = require_cvxpy()
+    bounded = np.zeros(len(values), dtype=bool) if never_negative is None else never_negative
+    for k, share in enumerate(EASED):
+        try:
+            near = _nearest(cp, model, values, share * whitening, bounded, options or PhysicalOptions())
+        except NotPhysical:
+            if k == len(EASED) - 1:
+                raise
+        else:
+            return replace(near, distance=near.distance / share)
+    raise InternalError("no physical estimate was tried")
+
+
+EASED = (1.0, 0.1, 0.01, 1e-3)
+"""Shares of the fit's certainty that are tried: where it contradicts every body by ten thousand standard deviations,
+no solver weighs it against a body's shape; with less certainty it can, and the answer hardly differs."""
+
+
+def _nearest(
+    cp: Any,
+    model: DynamicsModel,
+    values: Array,
+    whitening: Array,
+    bounded: NDArray[np.bool_],
+    options: PhysicalOptions,
+) -> Physical:
+    """One attempt; NotPhysical where the solver has no answer, or its answer is none."""
     l, span = model.l, model.chain.parameter_span
     inner = cp.Variable(span.shape[1])
-    extra = cp.Variable(len(values) - l) if len(values) > l else None
+    size = 1.0 / np.linalg.norm(whitening, axis=0)[l:]
+    extra = cp.Variable(len(size)) if len(size) else None  # in standard deviations from its estimate
     x = span @ inner
     theta = model.B @ x
-    vector = theta if extra is None else cp.hstack([theta, extra])
-    goal = whitening @ values
-    loss = cp.sum_squares(whitening @ vector - goal)
+    away = theta - values[:l] if extra is None else cp.hstack([theta - values[:l], cp.multiply(size, extra)])
+    loss = cp.sum_squares(np.linalg.qr(whitening, mode="r") @ away)
     constraints, divergence = [], 0.0
     for link in range(len(model.chain)):
-        own, away = _link_terms(cp, model, x, link, options)
+        own, unlike = _link_terms(cp, model, x, link, options)
         constraints += own
-        divergence += away
-    bounded = np.zeros(len(values), dtype=bool) if never_negative is None else never_negative
+        divergence += unlike
     if extra is not None and bounded[l:].any():
-        constraints.append(extra[np.flatnonzero(bounded[l:])] >= 0)
+        held = np.flatnonzero(bounded[l:])
+        constraints.append(extra[held] >= -values[l:][held] / size[held])
     settle = SETTLING * cp.sum_squares(inner - _known_inner(model))
     problem = cp.Problem(cp.Minimize(loss + settle + divergence), constraints)
     with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; what matters is checked below
@@ -112,12 +137,9 @@ def nearest_physical(
         raise NotPhysical(f"physical consistency: clarabel found no solution ({problem.status})")
     found = np.asarray(span @ inner.value)
     _require_physical(model, found)
-    rest = np.zeros(0) if extra is None else np.asarray(extra.value)
+    rest = np.zeros(0) if extra is None else values[l:] + size * np.asarray(extra.value)
     if bounded[l:].any() and float(rest[bounded[l:]].min()) < -SOLVER_SLACK * float(np.abs(rest).max()):
-        raise InputError(
-            f"physical consistency: friction came out at {float(rest[bounded[l:]].min()):.3g}",
-            "see the unconstrained fit with --no-physical",
-        )
+        raise NotPhysical(f"physical consistency: friction came out at {float(rest[bounded[l:]].min()):.3g}")
     rest = np.where(bounded[l:], np.maximum(rest, 0.0), rest)
     whole = np.concatenate([model.B @ found, rest])
     return Physical(found, whole, float(np.linalg.norm(whitening @ (whole - values))))

@@ -1,4 +1,4 @@
-"""What residuals say of a fit: their size, and whether they are noise."""
+"""What residuals say of a fit: their size, whether they are noise, and how many samples they are worth."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal
 
 from psdmc.calibration.logs.log import Array
 
@@ -17,7 +18,7 @@ class Judged(Protocol):
     @property
     def correlation(self) -> Array: ...
     @property
-    def optimism(self) -> float: ...
+    def noise_factor(self) -> float: ...
 
 
 def spread(residual: Array, use: NDArray[np.bool_]) -> Array:
@@ -34,33 +35,55 @@ def sample_correlation(residual: Array, use: NDArray[np.bool_]) -> Array:
     return np.asarray(np.divide(product, power, out=np.zeros_like(product), where=power > 0))
 
 
+SURELY = 0.999
+"""Largest correlation that is believed: closer to one, a log is too short to tell."""
+FEWEST_PAIRS = 20
+"""Pairs of samples below which a lag's correlation is not looked at."""
+
+
+def widening(residual: Array, use: NDArray[np.bool_]) -> Array:
+    """(n,) by how much correlated residuals widen standard deviations: the root of samples per effective sample, >= 1.
+
+    The larger of two counts. An autoregressive process with the lag-one correlation r has (1 + r) / (1 - r) samples per
+    effective one; any stationary process has 1 + 2 sum of its correlations, summed in pairs until the first that is
+    not positive (Geyer 1992). The former is right of short logs, the latter sees noise of several time scales.
+    """
+    first = np.clip(sample_correlation(residual, use), 0.0, SURELY)
+    each = [_samples_per_effective(residual[:, k], use[:, k]) for k in range(residual.shape[1])]
+    return np.sqrt(np.maximum((1.0 + first) / (1.0 - first), np.maximum(each, 1.0)))
+
+
+def _samples_per_effective(residual: Array, use: NDArray[np.bool_]) -> float:
+    """Of one joint: 1 + 2 sum of autocorrelations, by Geyer's initial positive and monotone sequence."""
+    counted = use.astype(np.float64)
+    kept = np.where(use, residual, 0.0)
+    products, pairs = (signal.correlate(x, x, method="fft")[len(x) - 1 :] for x in (kept, counted))
+    if not products[0] > 0:
+        return 1.0
+    enough = np.flatnonzero(np.round(pairs) < FEWEST_PAIRS)
+    lags = int(enough[0]) if len(enough) else len(pairs)
+    correlation = products[:lags] / np.round(pairs[:lags]) * (pairs[0] / products[0])
+    both = correlation[: lags // 2 * 2].reshape(-1, 2).sum(axis=1)
+    ends = np.flatnonzero(both <= 0)
+    positive = np.minimum.accumulate(both[: int(ends[0]) if len(ends) else len(both)])
+    return float(2.0 * positive.sum() - 1.0) if len(positive) else 1.0
+
+
 CORRELATED = 0.5
 """Correlation of neighbouring residuals above which they are called no noise: filtered white noise gives 0 +- 0.1."""
-
-
-def noise_factor(solved: Judged) -> float:
-    """By how much the standard deviations are too small at least, for residuals that are no noise; one where they are."""
-    correlated = solved.correlation[solved.correlation > CORRELATED]
-    if not len(correlated) and solved.optimism < OPTIMISTIC:
-        return 1.0
-    by_joint = np.sqrt((1.0 + correlated) / (1.0 - np.minimum(correlated, 0.999)))
-    return float(max([*by_joint.tolist(), solved.optimism]))
+NOISY = 1.7
+"""Widening from which a fit is said to lack something: white residuals of short logs reach 1.3."""
 
 
 def noise_warnings(step: str, joint_names: Sequence[str], solved: Judged) -> tuple[str, ...]:
-    """Says so where residuals are no noise, for then the standard deviations are too small, and by how much at least."""
+    """Says so where residuals are no noise: the model lacks something, and standard deviations were widened for it."""
     found = [
         (name, rho) for name, rho in zip(joint_names, solved.correlation, strict=True) if rho > CORRELATED
     ]
-    factor = noise_factor(solved)
-    if factor == 1.0:
+    if not found and solved.noise_factor < NOISY:
         return ()
     where = ", ".join(f"{name} ({rho:.2f})" for name, rho in found) or "all joints together"
     return (
         f"{step}: the residual is no noise but correlated from sample to sample, joint(s) {where}: the model lacks an "
-        f"effect there, and standard deviations are too small, by a factor of {factor:.1f} or more",
+        f"effect there; standard deviations are widened for it, by a factor of up to {solved.noise_factor:.1f}",
     )
-
-
-OPTIMISTIC = 1.7
-"""Robust over white standard deviation above which the latter is called too small."""

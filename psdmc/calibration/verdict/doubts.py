@@ -112,7 +112,7 @@ def _lacking(found: Findings) -> Iterator[str]:
     if named:
         yield (
             f"the model lacks an effect at joint(s) {listed(named)}: the residual is no sensor noise, "
-            "so that standard deviations are too small"
+            "and standard deviations are widened for it"
         )
 
 

@@ -38,7 +38,7 @@ def judged_record(
         cost = _cost(plain.steps, steps)
         facts["physical_cost_r2"] = cost
         facts["physical_distance_std"] = distance
-        notes.append(_price(cost, distance))
+        notes.append(_price(cost, distance, _cost_of_friction(plain.steps, steps)))
     if mass is not None:
         facts["mass_matrix"] = {"poses": mass.poses, "failing": mass.failing, "smallest": mass.smallest}
         if not mass.passed:
@@ -56,9 +56,20 @@ def _cost(before: Sequence[StepQuality], after: Sequence[StepQuality]) -> dict[s
     return {name: was[name].held_out.r2 - now[name].held_out.r2 for name in now}
 
 
-def _price(cost: dict[str, float], distance: float) -> str:
+def _cost_of_friction(before: Sequence[StepQuality], after: Sequence[StepQuality]) -> float | None:
+    """The most that any joint's friction run gives up of its held-out R^2; None where there are no such runs."""
+    was, now = ({step.step: step for step in steps}.get("Friction") for steps in (before, after))
+    if was is None or now is None:
+        return None
+    return max(
+        (was.joints[name].held_out.r2 - now.joints[name].held_out.r2 for name in now.joints), default=0.0
+    )
+
+
+def _price(cost: dict[str, float], distance: float, of_friction: float | None) -> str:
     words = ", ".join(f"{name} {-price:+.4f}" for name, price in cost.items())
+    rubbed = "" if of_friction is None else f"; of friction runs by {-of_friction:+.4f} at worst"
     return (
         f"physical consistency moved the parameters by {distance:.3g} standard deviations in all and held-out R^2 by "
-        f"{words}"
+        f"{words}{rubbed}"
     )

@@ -102,7 +102,7 @@ def test_a_harness_that_the_model_lacks_is_noticed(arm, campaign: Path):
     told = " ".join(record.warnings)
     assert "the residual is no noise" in told
     assert "elbow" in told
-    assert "standard deviations are too small" in told
+    assert "standard deviations are widened" in told
     assert record.verdict is not None
     assert record.verdict.word == "usable, with doubts"
     assert any("lacks an effect" in doubt and "elbow" in doubt for doubt in record.verdict.doubts)

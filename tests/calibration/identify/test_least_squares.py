@@ -111,4 +111,4 @@ def test_correlated_residuals_are_said_to_be_no_noise():
     assert noise_warnings("fit", ("a", "b"), quiet) == ()
     (warning,) = noise_warnings("fit", ("a", "b"), loud)
     assert "joint(s) a (0.9" in warning
-    assert "standard deviations are too small" in warning
+    assert "standard deviations are widened" in warning

@@ -1,0 +1,117 @@
+"""Rows of a linear problem block by block, and what a fit needs of them: sums, so that no fit holds all rows at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from psdmc.calibration.logs.log import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Some samples of a linear problem. N samples, n joints, l unknowns.
+
+    columns   (N, n, l)
+    noise     (N, n, l)  what the sensors' noise alone would make of the columns; None: nothing
+    consider  (N, n, k)  columns of what is uncertain and not estimated (least_squares.Consider); None: nothing
+    """
+
+    columns: Array
+    noise: Array | None = None
+    consider: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+class Rows(Protocol):
+    """Blocks of a problem, in the order of its samples; as often as they are asked for."""
+
+    def __iter__(self) -> Iterator[Block]: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reduced:
+    """Weighted rows A and targets y as their triangle: R'R = A'A.
+
+    factor  (l, l)  R
+    onto    (l,)    R^-T A'(y - A start)
+    noise   (l, l)  N'N of the weighted noise columns; None where there are none
+    """
+
+    factor: Array
+    onto: Array
+    noise: Array | None
+
+
+def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> Reduced:
+    """The triangle of all blocks; one block's rows and the triangle are all that is held.
+
+    target, weights (N, n);  start (l,) from which targets are counted; None: zero
+    """
+    triangle, noise, l = np.zeros((0, 0)), None, 0
+    for block, own in _with_rows(rows):
+        l = block.columns.shape[2]
+        weight = weights[own]
+        ahead = target[own] if start is None else target[own] - block.columns @ start
+        flat = (block.columns * weight[:, :, None]).reshape(-1, l)
+        together = np.column_stack([flat, (ahead * weight).reshape(-1)])
+        stacked = np.vstack([triangle, together]) if len(triangle) else together
+        triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
+        if block.noise is not None:
+            wrong = (block.noise * weight[:, :, None]).reshape(-1, l)
+            noise = wrong.T @ wrong if noise is None else noise + wrong.T @ wrong
+    whole = np.vstack([triangle, np.zeros((max(l - len(triangle), 0), l + 1))])
+    return Reduced(whole[:l, :l], whole[:l, l], noise)
+
+
+def residual_of(rows: Rows, target: Array, values: Array) -> Array:
+    """(N, n) target less what these values make of the columns."""
+    residual = np.empty_like(target)
+    for block, own in _with_rows(rows):
+        residual[own] = target[own] - block.columns @ values
+    return residual
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Collected:
+    """Sums over weighted rows that standard deviations are made of.
+
+    squares   (n, l, l)  A'A of each joint's rows
+    scores    (c, l)     A' of the weighted residual, per stretch of time
+    consider  (l, k)     A' of the weighted columns of what is considered
+    """
+
+    squares: Array
+    scores: Array
+    consider: Array
+
+
+def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Collected:
+    """`weighted` (N, n) residual; `clusters` stretches of time, 0: none."""
+    count, n = weighted.shape
+    squares, scores, consider = np.zeros((n, 0, 0)), np.zeros((clusters, 0)), np.zeros((0, 0))
+    for block, own in _with_rows(rows):
+        flat = block.columns * weights[own][:, :, None]
+        if not squares.shape[1]:
+            l, k = flat.shape[2], 0 if block.consider is None else block.consider.shape[2]
+            squares, scores, consider = np.zeros((n, l, l)), np.zeros((clusters, l)), np.zeros((l, k))
+        squares += np.stack([flat[:, j].T @ flat[:, j] for j in range(n)])
+        if clusters:
+            stretch = np.arange(own.start, own.stop) * clusters // count
+            np.add.at(scores, stretch, np.einsum("tnl,tn->tl", flat, weighted[own]))
+        if block.consider is not None:
+            consider += np.einsum("tnl,tnk->lk", flat, block.consider * weights[own][:, :, None])
+    return Collected(squares, scores, consider)
+
+
+def _with_rows(rows: Rows) -> Iterator[tuple[Block, slice]]:
+    """Each block with its place among all samples."""
+    start = 0
+    for block in rows:
+        yield block, slice(start, start + len(block))
+        start += len(block)

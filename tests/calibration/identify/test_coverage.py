@@ -1,0 +1,139 @@
+"""Standard deviations mean what they say where noise is coloured: the truth of an independent plant lies within three."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy import signal
+
+from psdmc.calibration.calibrate import CalibrateOptions, calibrate_campaign, calibrate_logs
+from psdmc.calibration.campaign_file import read_campaign
+from psdmc.calibration.identify.least_squares import estimate
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.plant.virtual_robot import load_virtual_robot
+from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibration.verdict.record import Calibration
+
+RATE = 250.0
+
+
+def coloured(rng: np.random.Generator, count: int, n: int, times: tuple[float, ...]) -> np.ndarray:
+    """(count, n) noise of unit variance whose memory is about so many seconds, every kind as strong as another."""
+    parts = []
+    for seconds in times:
+        keep = np.exp(-1.0 / (seconds * RATE)) if seconds else 0.0
+        settle = int(10 * seconds * RATE)
+        white = rng.standard_normal((count + settle, n)) * np.sqrt(1.0 - keep**2)
+        parts.append(signal.lfilter([1.0], [1.0, -keep], white, axis=0)[settle:])
+    return np.sum(parts, axis=0) / np.sqrt(len(times))
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9, 0.97])
+def test_coloured_noise_widens_standard_deviations_as_much_as_it_must(memory: float):
+    """Regressors as slow as the noise: the worst that can meet a count of effective samples."""
+    rng = np.random.default_rng(11)
+    true, inside = np.array([2.0, -1.0, 0.5]), []
+    for _ in range(100):
+        slow = signal.lfilter([1.0], [1.0, -0.97], rng.standard_normal((1400, 6)), axis=0)[200:]
+        columns = slow.reshape(-1, 2, 3)
+        noise = signal.lfilter([1.0], [1.0, -memory], rng.standard_normal((1400, 2)), axis=0)[200:]
+        found = estimate(columns, columns @ true + noise)
+        inside += (np.abs(found.values - true) < 3 * found.std).tolist()
+
+    assert np.mean(inside) >= 0.99
+
+
+def plant_torque(arm, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    """By Pinocchio, of the plant's own reader."""
+    model = load_virtual_robot(arm.plant).model
+    data = model.createData()
+    return np.array([pin.rnea(model, data, a, b, c) for a, b, c in zip(q, qd, qdd, strict=True)])
+
+
+def within_three(
+    record: Calibration, truth: np.ndarray, friction: dict[tuple[str, str], float]
+) -> list[bool]:
+    """Of everything that is called identified."""
+    rows = [
+        (row.value, row.std, true)
+        for row, true in zip(record.parameters, truth, strict=True)
+        if row.identifiable
+    ]
+    rows += [(row.value, row.std, friction[row.joint, row.name]) for row in record.friction if row.seen]
+    return [abs(value - true) < 3 * std for value, std, true in rows]
+
+
+@pytest.mark.parametrize("times", [(0.0,), (0.1,), (0.0, 1.0), (0.02, 0.3, 3.0)])
+def test_one_log_with_coloured_noise(arm, times: tuple[float, ...]):
+    """Twelve seeds each: torques by Pinocchio, friction by its formula, noise of one or several time scales."""
+    time = np.arange(int(60 * RATE)) / RATE
+    q, qd, qdd = (np.zeros((len(time), 2)) for _ in range(3))
+    for size, hertz in ((0.8, (0.17, 0.23)), (0.3, (0.61, 0.83)), (0.1, (1.3, 1.7))):
+        w = 2 * np.pi * np.array(hertz)
+        q += size * np.sin(w * time[:, None] + hertz)
+        qd += size * w * np.cos(w * time[:, None] + hertz)
+        qdd -= size * w**2 * np.sin(w * time[:, None] + hertz)
+    exact = plant_torque(arm, q, qd, qdd) + [1.0, 0.6] * np.tanh(qd / 0.03) + [0.8, 0.5] * qd + [0.4, -0.2]
+    names = arm.model.joint_names
+    each = zip(names, (1.0, 0.6), (0.8, 0.5), (0.4, -0.2), strict=True)
+    friction = {
+        (joint, word): value
+        for joint, *values in each
+        for word, value in zip(("coulomb", "viscous", "offset"), values, strict=True)
+    }
+    inside = []
+    for seed in range(12):
+        noise = coloured(np.random.default_rng(seed), len(time), 2, times) * [0.6, 0.3]
+        log = Log("coloured", names, time, q, qd, exact + noise, "motor_torque")
+        options = CalibrateOptions(physical=False)
+        record = calibrate_logs(arm.unknown, [log], options, arm.regressor, None, lambda step: None)
+        inside += within_three(record, arm.model.theta_b, friction)
+
+    assert len(inside) > 100
+    assert np.mean(inside) >= 0.99
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [(0.05,), (0.0, 1.0)])
+def test_a_campaign_with_coloured_noise(arm, campaign: Path, times: tuple[float, ...]):
+    """The four steps on Pinocchio and a stiff integrator of LuGre, current noise of several time scales."""
+    folder = arm.folder / "coloured"
+    shutil.copytree(campaign.parent, folder, dirs_exist_ok=True)
+    simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True))
+    runs = read_campaign(folder)
+    robot = load_virtual_robot(arm.plant)
+    friction = {(j.name, word): getattr(j, word) for j in robot.joints for word in LUGRE}
+    inside = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+
+        def noisy(log: Log) -> Log:
+            noise = coloured(rng, len(log), 2, times) * 0.02  # noqa: B023
+            return replace(log, effort=log.effort + noise)
+
+        loud = replace(
+            runs,
+            motor=[
+                replace(run, unloaded=noisy(run.unloaded), loaded=noisy(run.loaded)) for run in runs.motor
+            ],
+            gravity=[replace(run, log=noisy(run.log)) for run in runs.gravity],
+            friction=[replace(run, log=noisy(run.log)) for run in runs.friction],
+            inertial=[replace(run, log=noisy(run.log)) for run in runs.inertial],
+        )
+        options = CalibrateOptions(physical=False)
+        record = calibrate_campaign(arm.unknown, loud, options, arm.regressor, None, lambda step: None)
+        inside += within_three(record, arm.model.theta_b, friction)
+        inside += [
+            abs(row.value - j.torque_constant) < 3 * row.std
+            for row, j in zip(record.motors, robot.joints, strict=True)
+        ]
+    assert len(inside) > 60
+    assert np.mean(inside) >= 0.99
+
+
+LUGRE = ("coulomb", "static", "stribeck_velocity", "viscous", "viscous_exponent", "stiffness", "damping")
