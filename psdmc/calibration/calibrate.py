@@ -19,8 +19,9 @@ from psdmc.calibration.identify.physical import (
 from psdmc.calibration.identify.physical_steps import physical_steps
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
-from psdmc.calibration.logs.log import Array, Log
-from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.open_log import open_log
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.judged_record import judged_record
 from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
 from psdmc.calibration.verdict.record import Calibration, four_step_record, linear_record
@@ -82,7 +83,7 @@ def calibrate(
             model, read_campaign(paths[0], model.joint_names), options, regressor, torque_constants, progress
         )
     progress("reading logs")
-    logs = [read_log(path) for path in paths]
+    logs = [open_log(path, progress) for path in paths]
     return calibrate_logs(model, logs, options, regressor, torque_constants, progress)
 
 
@@ -130,7 +131,7 @@ def _physical(
 
 def calibrate_logs(
     model: DynamicsModel,
-    logs: Sequence[Log],
+    logs: Sequence[AnyLog],
     options: CalibrateOptions,
     regressor: Regressor,
     torque_constants: Mapping[str, float] | None,
@@ -140,7 +141,7 @@ def calibrate_logs(
     motors = motors_of_logs(model.joint_names, logs, torque_constants)
     progress("linear fit")
     linear = options.linear
-    found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b)
+    found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b, progress)
     solved = found.estimate
     progress("reading the result back")
     plain = judged_record(linear_record(model, found, solved.values, linear), logs, check=linear.check)

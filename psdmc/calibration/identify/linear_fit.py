@@ -6,13 +6,14 @@ constants. Regressor and friction columns pass through the filter that the measu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.least_squares import Consider, Estimate, FitOptions, Prior, estimate
+from psdmc.calibration.identify.kept_rows import KeptRows
+from psdmc.calibration.identify.least_squares import Estimate, FitOptions, Prior, estimate_rows
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.prior import base_scale, torque_sizes
@@ -22,13 +23,15 @@ from psdmc.calibration.logs.filter import (
     FilterOptions,
     SplitOptions,
     States,
-    filtered,
     held_out,
     smoothed_rows,
-    thinned,
+    stretches,
 )
-from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.log_survey import STRETCH_ROWS
+from psdmc.calibration.logs.row_store import HELD_BYTES
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.robot.chain import Chain
 
 
@@ -39,6 +42,8 @@ class LinearOptions:
     exponents       of the viscous terms |qd|^d sign(qd), each with a coefficient of its own; the first is `viscous`
     sign_speed      rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
     offset          whether each joint's torque has a constant of its own
+    stretch         rows of a log that are filtered at once
+    held_bytes      of columns that are held in memory; more of them go to a temporary file
     """
 
     filter: FilterOptions = field(default_factory=lambda: FilterOptions(cutoff=8.0))
@@ -48,6 +53,8 @@ class LinearOptions:
     exponents: tuple[float, ...] = (1.0,)
     sign_speed: float = 0.03
     offset: bool = True
+    stretch: int = STRETCH_ROWS
+    held_bytes: int = HELD_BYTES
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,14 +98,13 @@ class LinearResult:
 class LinearProblem:
     """The stacked rows of independent samples.
 
-    columns, noise  (N, n, l + n f)  of the unknowns, and what the position sensors' noise alone would make of them
-    torque          (N, n)  N m;  held_out (N,)
-    names           l + n f  of the unknowns, for messages
+    rows      of the l + n f unknowns, N samples, with what the position sensors' noise alone would make of them
+    torque    (N, n)  N m;  held_out (N,)
+    names     l + n f  of the unknowns, for messages
     """
 
     chain: Chain
-    columns: Array
-    noise: Array
+    rows: KeptRows
     torque: Array
     held_out: NDArray[np.bool_]
     l: int
@@ -120,24 +126,25 @@ def calibrate_linear(
     chain: Chain,
     model: Regressor,
     l: int,
-    logs: Sequence[Log],
+    logs: Sequence[AnyLog],
     options: LinearOptions | None = None,
     motors: Motors | None = None,
     theta_b: Array | None = None,
+    progress: Callable[[str], None] = lambda step: None,
 ) -> LinearResult:
     """Base parameters and simple friction by linear least squares; InputError where a log cannot be used.
 
-    theta_b  (l,)  the file's values, kept in directions that the logs do not show; None: zero
+    theta_b   (l,)  the file's values, kept in directions that the logs do not show; None: zero
+    progress  is told how much of the logs has been read
     """
     options = options or LinearOptions()
     motors = motors or Motors.torques(len(chain))
     checked_logs = [checked(log, chain, options.filter.cutoff, options.check) for log in logs]
-    problem, resting = linear_problem(chain, model, l, checked_logs, options, motors)
+    problem, resting = linear_problem(chain, model, l, checked_logs, options, motors, progress)
+    progress("linear fit: solving")
     kept = np.repeat(~problem.held_out[:, None], len(chain), axis=1)
-    scale = -problem.torque[:, :, None] * np.eye(len(chain))
-    consider = Consider(scale, np.diag(motors.relative_std**2))
     prior = _prior(chain, model, problem, options, theta_b)
-    solved = estimate(problem.columns, problem.torque, options.fit, consider, kept, prior)
+    solved = estimate_rows(problem.rows, problem.torque, options.fit, None, kept, prior)
     notes = tuple(note for log in checked_logs for note in log.notes)
     warnings = (*notes, *resting, *noise_warnings("linear fit", chain.joint_names, solved))
     return LinearResult(solved, problem, prior, motors, warnings)
@@ -151,7 +158,7 @@ def _prior(
     rigid = base_scale(chain, model, sizes, theta_b)
     own = np.repeat(sizes, len(problem.friction))
     values = np.concatenate([np.zeros(problem.l) if theta_b is None else theta_b, np.zeros(len(own))])
-    return Prior(values, np.concatenate([rigid, own]), problem.noise)
+    return Prior(values, np.concatenate([rigid, own]))
 
 
 def friction_names(exponents: Sequence[float], offset: bool) -> tuple[str, ...]:
@@ -168,37 +175,38 @@ def friction_terms(qd: Array, sign_speed: float, exponents: Sequence[float], off
 
 
 def linear_problem(
-    chain: Chain, model: Regressor, l: int, logs: Sequence[Log], options: LinearOptions, motors: Motors
+    chain: Chain,
+    model: Regressor,
+    l: int,
+    logs: Sequence[AnyLog],
+    options: LinearOptions,
+    motors: Motors,
+    progress: Callable[[str], None],
 ) -> tuple[LinearProblem, tuple[str, ...]]:
     """The stack of all logs' independent samples, every log split on its own; and remarks on joints that rest."""
-    columns, noise, torques, outs, remarks = [], [], [], [], []
+    names = friction_names(options.exponents, options.offset)
+    rows = KeptRows(len(chain), l + len(chain) * len(names), options.held_bytes)
+    torques, outs, remarks = [], [], []
     for log in logs:
-        states = filtered(log, options.filter, options.check)
-        at = thinned(states, options.filter)
-        measured, by_noise = _columns(model, states, at, options)
-        columns.append(measured)
-        noise.append(by_noise)
-        torques.append(motors.torque(states.effort)[at])
-        outs.append(held_out(len(at), options.split))
-        remarks += _ripples(log, states, options)
-    problem = LinearProblem(
-        chain,
-        np.concatenate(columns),
-        np.concatenate(noise),
-        np.concatenate(torques),
-        np.concatenate(outs),
-        l,
-        friction_names(options.exponents, options.offset),
-    )
+        count = 0
+        for stretch in stretches(log, options.filter, options.check, options.stretch):
+            states, at = stretch.states, stretch.at
+            rows.append(*_columns(model, states, at, options))
+            torques.append(motors.torque(states.effort)[at])
+            if not count:
+                remarks += _ripples(log, states, options)
+            count += len(at)
+            progress(f"linear fit: {log.name}: {(states.first + at[-1]) / len(log):.0%}")
+        outs.append(held_out(count, options.split))
+    problem = LinearProblem(chain, rows, np.concatenate(torques), np.concatenate(outs), l, names)
     return problem, tuple(remarks)
 
 
-def _ripples(log: Log, states: States, options: LinearOptions) -> list[str]:
+def _ripples(log: AnyLog, states: States, options: LinearOptions) -> list[str]:
     """Names the joints that move by no more than noise, where the log's own check did not call them still."""
-    motion = np.ptp(log.position, axis=0)
     found = [
         f"{name} ({size:.1e} rad)" if name not in (log.sliding or ()) else f"{name} ({size:.1e} m)"
-        for name, size, rests in zip(log.joint_names, motion, states.still, strict=True)
+        for name, size, rests in zip(log.joint_names, states.motion, states.still, strict=True)
         if rests and size >= options.check.smallest_motion
     ]
     if not found:

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from psdmc.calibration.identify.motor_model import Motors
-from psdmc.calibration.logs.log import Log, Quantity
+from psdmc.calibration.logs.log import Quantity
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.logs.wording import first_faults, listed, quoted
 from psdmc.errors import InputError
 
@@ -32,7 +33,7 @@ def require_constants(constants: Mapping[str, float], joint_names: Sequence[str]
         )
 
 
-def one_quantity(logs: Sequence[Log]) -> Quantity:
+def one_quantity(logs: Sequence[AnyLog]) -> Quantity:
     """What all the logs hold; InputError names those that hold something else."""
     by_quantity: dict[Quantity, list[str]] = {}
     for log in logs:
@@ -47,7 +48,7 @@ def one_quantity(logs: Sequence[Log]) -> Quantity:
 
 
 def motors_of_logs(
-    joint_names: Sequence[str], logs: Sequence[Log], constants: Mapping[str, float] | None
+    joint_names: Sequence[str], logs: Sequence[AnyLog], constants: Mapping[str, float] | None
 ) -> Motors:
     """Torque per logged unit for plain logs.
 
@@ -72,7 +73,7 @@ def motors_of_logs(
     return Motors(np.array([constants[name] for name in joint_names]), np.zeros(len(joint_names)))
 
 
-def refuse_constants(constants: Mapping[str, float] | None, log: Log) -> None:
+def refuse_constants(constants: Mapping[str, float] | None, log: AnyLog) -> None:
     """InputError where torque constants are given although a log holds torques."""
     if constants:
         raise InputError(

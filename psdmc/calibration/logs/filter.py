@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,9 @@ from scipy import interpolate, signal
 
 from psdmc.calibration.logs.check_options import CheckOptions
 from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.position_noise import noise_like, position_noise, resting
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.errors import InputError
 
 SMALLEST_CUTOFF, LARGEST_CUTOFF = 0.01, 10_000.0
@@ -64,6 +66,9 @@ class States:
     cutoff            Hz, of that filter
     noise             (n,)    standard deviation of a raw position sample, rad (m); zero for joints that rest
     still             (n,)    joints whose motion is no more than noise: their rates are exactly zero
+    motion            (n,)    of the whole log, peak to peak, rad (m)
+    first             row of the log's even grid that is the first one here
+    raw               (N, n)  effort before the filter
     """
 
     time: Array
@@ -77,10 +82,13 @@ class States:
     cutoff: float
     noise: Array
     still: NDArray[np.bool_]
+    motion: Array
+    first: int
+    raw: Array
 
     def jittered(self) -> tuple[Array, Array, Array]:
         """q, qd, qdd (N, n) as another draw of the position noise would have made them."""
-        draw = self.low_pass(noise_like(self.noise, len(self.time)))
+        draw = self.low_pass(noise_like(self.noise, self.first, self.first + len(self.time)))
         rate, acceleration = central_differences(draw, self.period)
         return self.q + draw, self.qd + rate, self.qdd + acceleration
 
@@ -108,41 +116,188 @@ class LowPass:
 
 
 def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None) -> States:
-    """States of a checked log; a joint that does no more than its sensor's noise gets exactly zero rates, so that it
-    excites nothing."""
-    time, position, effort = evenly_spaced(log)
-    period = float(time[1] - time[0])
-    low_pass = LowPass.design(options, period)
-    smooth = low_pass(position)
-    in_band = min(2.0 * options.cutoff * period, 1.0)
-    noise = position_noise(position, smooth, in_band)
+    """States of a checked log, held whole; a joint that does no more than its sensor's noise gets exactly zero rates, so
+    that it excites nothing."""
+    grid = even_grid(log)
+    low_pass = LowPass.design(options, grid.period)
+    return _states(log, grid, low_pass, noticed(log, grid, low_pass, options, check), options, 0, grid.count)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """A part of a log: its states with what lies before and after it, and which rows of them it stands for.
+
+    at  rows of `states` that are usable and one cut-off's independence apart, each in one stretch only
+    """
+
+    states: States
+    at: NDArray[np.intp]
+
+
+def stretches(
+    log: AnyLog, options: FilterOptions, check: CheckOptions | None = None, rows: int = STRETCH_ROWS
+) -> Iterator[Stretch]:
+    """The states of a log, `rows` at a time, each as if the whole log had been filtered at once.
+
+    Neighbours overlap by twice what the filter remembers, once for the states and once for what is made of them.
+    """
+    grid = even_grid(log)
+    low_pass = LowPass.design(options, grid.period)
+    found = noticed(log, grid, low_pass, options, check, rows)
+    reach = 2 * _memory(options.cutoff, grid.period)
+    every = independent_rows(grid, options, log)
+    for start in range(0, grid.count, rows):
+        wanted = every[(every >= start) & (every < start + rows)]
+        if len(wanted):
+            first, last = max(start - reach, 0), min(start + rows + reach, grid.count)
+            yield Stretch(_states(log, grid, low_pass, found, options, first, last), wanted - first)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Noticed:
+    """Of a log's joints: sensor noise of a raw sample, zero where it rests; whether it rests, and where; and its motion,
+    peak to peak. (n,) each, rad or m."""
+
+    noise: Array
+    still: NDArray[np.bool_]
+    rest: Array
+    motion: Array
+
+
+def noticed(
+    log: AnyLog,
+    grid: EvenGrid,
+    low_pass: LowPass,
+    options: FilterOptions,
+    check: CheckOptions | None = None,
+    rows: int = STRETCH_ROWS,
+) -> Noticed:
+    """Noise and rest of every joint, from one pass over the log; the noise of long logs from evenly spread rows."""
+    reach, every = _memory(options.cutoff, grid.period), max(1, grid.count // NOISE_ROWS)
+    raw, smooth = [], []
+    n = len(log.joint_names)
+    total, bounds = np.zeros(n), np.array([[np.inf] * n, [-np.inf] * n, [np.inf] * n, [-np.inf] * n])
+    for start in range(0, grid.count, rows):
+        first, last = max(start - reach, 0), min(start + rows + reach, grid.count)
+        position, _ = evenly_spaced(log, grid, first, last)
+        own = slice(start - first, min(start + rows, grid.count) - first)
+        filtered_position = low_pass(position)[own]
+        position = position[own]
+        total += position.sum(axis=0)
+        for k, values in ((0, position), (2, filtered_position)):
+            bounds[k] = np.minimum(bounds[k], values.min(axis=0))
+            bounds[k + 1] = np.maximum(bounds[k + 1], values.max(axis=0))
+        raw.append(position[-start % every :: every])
+        smooth.append(filtered_position[-start % every :: every])
+    in_band = min(2.0 * options.cutoff * grid.period, 1.0)
+    position = np.concatenate(raw)
+    noise = position_noise(position, np.concatenate(smooth), in_band)
     smallest = (check or CheckOptions()).smallest_motion
-    still = resting(position, smooth, noise, in_band, smallest)
-    q = np.where(still, np.mean(position, axis=0), smooth)
-    qd, qdd = central_differences(q, period)
-    margin = int(np.ceil(options.settle / options.cutoff / period))
-    use = np.zeros(len(time), dtype=bool)
-    use[margin : len(time) - margin] = True
-    if not use.any():
+    motion = bounds[1] - bounds[0]
+    still = resting(position, motion, bounds[3] - bounds[2], noise, in_band, smallest)
+    return Noticed(np.where(still, 0.0, noise), still, total / grid.count, motion)
+
+
+NOISE_ROWS = 500_000
+"""Rows from which sensor noise is taken; longer logs are judged by evenly spread ones."""
+
+
+def _states(
+    log: AnyLog,
+    grid: EvenGrid,
+    low_pass: LowPass,
+    found: Noticed,
+    options: FilterOptions,
+    first: int,
+    last: int,
+) -> States:
+    """Rows first to last of the even grid."""
+    position, effort = evenly_spaced(log, grid, first, last)
+    q = np.where(found.still, found.rest, low_pass(position))
+    qd, qdd = central_differences(q, grid.period)
+    usable = _usable(grid, options, log)
+    use = np.zeros(last - first, dtype=bool)
+    use[max(usable.start - first, 0) : max(usable.stop - first, 0)] = True
+    time = grid.time[first:last]
+    smooth = low_pass(effort)
+    return States(
+        time,
+        grid.period,
+        q,
+        qd,
+        qdd,
+        smooth,
+        use,
+        low_pass,
+        options.cutoff,
+        found.noise,
+        found.still,
+        found.motion,
+        first,
+        effort,
+    )
+
+
+def _usable(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> range:
+    """Rows that are left after the filter settled; InputError where there are none."""
+    margin = int(np.ceil(options.settle / options.cutoff / grid.period))
+    if grid.count <= 2 * margin:
         raise InputError(
             f"{log.name}: too short: {log.duration:.3g} s leave nothing after the {options.cutoff:g} Hz filter settled",
             "record a longer run",
         )
-    noise = np.where(still, 0.0, noise)
-    return States(time, period, q, qd, qdd, low_pass(effort), use, low_pass, options.cutoff, noise, still)
+    return range(margin, grid.count - margin)
 
 
-def evenly_spaced(log: Log) -> tuple[Array, Array, Array]:
-    """Time, position and effort on an even grid of the log's median period; rows that are even already stay as they are."""
-    time = log.time - log.time[0]
+def independent_rows(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> NDArray[np.intp]:
+    """Of the whole log: usable, one cut-off's independence apart."""
+    usable = _usable(grid, options, log)
+    return np.arange(usable.start, usable.stop, _independent(options, grid.period), dtype=np.intp)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EvenGrid:
+    """Times of a log's median period from its first row to its last, from zero.
+
+    same  whether the log's rows lie on them already
+    """
+
+    time: Array
+    same: bool
+
+    @property
+    def count(self) -> int:
+        return len(self.time)
+
+    @property
+    def period(self) -> float:
+        return float(self.time[1] - self.time[0])
+
+
+def even_grid(log: AnyLog) -> EvenGrid:
+    """A log's even grid."""
     count = round(log.duration / log.period) + 1
     even = np.linspace(0.0, log.duration, count)
-    if count == len(log) and np.abs(even - time).max() < 1e-6 * log.period:
-        return even, log.position, log.effort
+    same = count == len(log) and bool(np.abs(even - (log.time - log.time[0])).max() < 1e-6 * log.period)
+    return EvenGrid(even, same)
+
+
+NEIGHBOURS = 4
+"""Rows on either side that interpolation between rows may look at: its slopes take one."""
+
+
+def evenly_spaced(log: AnyLog, grid: EvenGrid, first: int, last: int) -> tuple[Array, Array]:
+    """Position and effort at rows first to last of the grid; rows that are even already stay as they are."""
+    if grid.same:
+        part = log.rows(first, last)
+        return part.position, part.effort
+    wanted = grid.time[first:last]
+    begin, end = np.searchsorted(log.time - log.time[0], wanted[[0, -1]])
+    part = log.rows(max(int(begin) - NEIGHBOURS, 0), int(end) + NEIGHBOURS)
+    time = part.time - log.time[0]
     return (
-        even,
-        np.asarray(interpolate.PchipInterpolator(time, log.position)(even)),
-        np.asarray(interpolate.PchipInterpolator(time, log.effort)(even)),
+        np.asarray(interpolate.PchipInterpolator(time, part.position)(wanted)),
+        np.asarray(interpolate.PchipInterpolator(time, part.effort)(wanted)),
     )
 
 
@@ -172,8 +327,12 @@ def thinned(states: States, options: FilterOptions) -> NDArray[np.intp]:
     Neighbouring filtered samples share their noise; counting each as new information would shrink standard
     deviations by the square root of the oversampling.
     """
-    step = max(1, int(np.floor(0.5 / (options.cutoff * states.period))))
-    return np.flatnonzero(states.use)[::step]
+    return np.flatnonzero(states.use)[:: _independent(options, states.period)]
+
+
+def _independent(options: FilterOptions, period: float) -> int:
+    """Rows from one sample to the next that shares no noise with it."""
+    return max(1, int(np.floor(0.5 / (options.cutoff * period))))
 
 
 BLOCK_ROWS = 16384
@@ -190,7 +349,7 @@ def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice]
     The same as filtering all rows at once, but for what the filter remembers beyond MEMORY_CYCLES.
     """
     count = len(states.time)
-    margin = int(np.ceil(MEMORY_CYCLES / states.cutoff / states.period))
+    margin = _memory(states.cutoff, states.period)
     parts = []
     for start in range(0, count, BLOCK_ROWS):
         wanted = at[(at >= start) & (at < start + BLOCK_ROWS)]
@@ -201,10 +360,18 @@ def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice]
     return np.concatenate(parts)
 
 
+def _memory(cutoff: float, period: float) -> int:
+    """Rows after which the filter has forgotten one."""
+    return int(np.ceil(MEMORY_CYCLES / cutoff / period))
+
+
 def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Array:
     """A filter's copies of one column are small, those of all columns are not."""
     flat = values.reshape(len(values), -1)
-    smooth = np.stack([low_pass(column)[rows] for column in np.ascontiguousarray(flat.T)], axis=-1)
+    columns = np.ascontiguousarray(flat.T)
+    smooth = np.stack(
+        [low_pass(column)[rows] if column.any() else np.zeros(len(rows)) for column in columns], axis=-1
+    )
     return smooth.reshape(len(rows), *values.shape[1:])
 
 

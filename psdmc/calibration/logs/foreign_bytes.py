@@ -14,6 +14,8 @@ from psdmc.errors import InputError, PsdmcError
 
 LARGEST_FILE = 2 * 1024**3
 """Bytes of a table or bag: two hours of seven joints at 1 kHz as text, and what a workstation's memory holds."""
+LARGEST_STORED = 64 * 1024**3
+"""Bytes of a table or bag that is read in pieces: a day of seven joints at 1 kHz as text."""
 LARGEST_TOML = 256 * 1024
 """Bytes of a campaign or plant: a thousand runs; beyond, the standard library's reader takes seconds."""
 

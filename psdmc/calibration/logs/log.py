@@ -71,13 +71,7 @@ class Log:
 
     def ordered(self, joint_names: tuple[str, ...]) -> Log:
         """The same log with its columns in the order of these joints; InputError names every joint that is missing."""
-        missing = [name for name in joint_names if name not in self.joint_names]
-        if missing:
-            raise InputError(
-                f"{self.name}: no columns for joint(s) {listed(missing)}",
-                f"the log has {listed(self.joint_names)}; joints are matched by name",
-            )
-        columns = [self.joint_names.index(name) for name in joint_names]
+        columns = places_of(self.name, self.joint_names, joint_names)
         velocity = None if self.velocity is None else self.velocity[:, columns]
         return replace(
             self,
@@ -85,6 +79,21 @@ class Log:
             position=self.position[:, columns],
             velocity=velocity,
             effort=self.effort[:, columns],
+        )
+
+    @property
+    def has_velocity(self) -> bool:
+        return self.velocity is not None
+
+    def rows(self, start: int, stop: int) -> Log:
+        """Some rows as a log of their own."""
+        velocity = None if self.velocity is None else self.velocity[start:stop]
+        return replace(
+            self,
+            time=self.time[start:stop],
+            position=self.position[start:stop],
+            velocity=velocity,
+            effort=self.effort[start:stop],
         )
 
     def between(self, start: float, end: float) -> Log:
@@ -98,6 +107,17 @@ class Log:
             velocity=velocity,
             effort=self.effort[rows],
         )
+
+
+def places_of(log: str, found: tuple[str, ...], wanted: tuple[str, ...]) -> list[int]:
+    """Index among a log's joints of each that is wanted; InputError names every joint that is missing."""
+    missing = [name for name in wanted if name not in found]
+    if missing:
+        raise InputError(
+            f"{log}: no columns for joint(s) {listed(missing)}",
+            f"the log has {listed(found)}; joints are matched by name",
+        )
+    return [found.index(name) for name in wanted]
 
 
 def _column(values: object, shape: tuple[int, ...], what: str) -> Array:

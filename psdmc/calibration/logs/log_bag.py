@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.logs.foreign_bytes import decoding, opened
-from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, LARGEST_STORED, decoding, opened
+from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.mcap_size import require_mcap_size
-from psdmc.calibration.logs.table_limits import LARGEST_COLUMNS, LARGEST_ROWS, LARGEST_VALUES
+from psdmc.calibration.logs.row_store import RowStore
+from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
+from psdmc.calibration.logs.table_limits import (
+    LARGEST_COLUMNS,
+    LARGEST_ROWS,
+    LARGEST_STORED_ROWS,
+    LARGEST_VALUES,
+)
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 
@@ -28,39 +35,71 @@ STEPS = 1_000_000
 """Instructions that any bag may take."""
 
 
-def read_bag(path: Path, topic: str = "/joint_states") -> Log:
+def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) -> AnyLog:
     """The joint states of one topic; effort is read as motor torque.
 
     path   a bag's folder, or a bare .db3 or .mcap file of it
+    held   bytes of rows in memory, beyond which they go to a temporary file and a StoredLog is returned; None: all
     Time is each message's header stamp. InputError where the bag is damaged, the topic is missing, or its messages
     disagree on joints.
     """
-    name = path.name or str(path)
     for file in _files(path):
-        with opened(file):
+        with opened(file, LARGEST_FILE if held is None else LARGEST_STORED):
             pass
         if file.suffix.lower() == ".mcap":
             require_mcap_size(file)
     with decoding(str(path), "a ROS 2 bag"):
-        rows = _messages(path, topic)
-    if not rows:
+        names, time, store, has_velocity = _kept(path, topic, held)
+    name = path.name or str(path)
+    n = len(names)
+    log = StoredLog(
+        name=name,
+        joint_names=names,
+        time=time,
+        store=store,
+        has_velocity=has_velocity,
+        quantity="motor_torque",
+        stored=n,
+        places=tuple(range(n)),
+        notes=(f"{name}: 'effort' is read as motor torque, friction included",),
+    )
+    return log if store.on_disk else log.held()
+
+
+def _kept(path: Path, topic: str, held: int | None) -> tuple[tuple[str, ...], Array, RowStore, bool]:
+    """Joints, time from the first message on, rows of position, velocity and effort, and whether all have a velocity."""
+    most = LARGEST_ROWS if held is None else LARGEST_STORED_ROWS
+    names: tuple[str, ...] = ()
+    store, has_velocity = RowStore(0), True
+    stamps: list[tuple[int, int]] = []
+    piece: list[Array] = []
+    for number, row in enumerate(_messages(path, topic), start=1):
+        if number == 1:
+            names = tuple(row.name)
+            store = RowStore(3 * len(names), 8 * LARGEST_VALUES if held is None else held)
+        _require_alike(row, number, names, str(path))
+        if number > most:
+            raise InputError(f"{path}: more than {most:,} messages", "cut the bag into several")
+        has_velocity = has_velocity and len(row.velocity) == len(names)
+        velocity = row.velocity if len(row.velocity) == len(names) else np.full(len(names), np.nan)
+        stamps.append((row.header.stamp.sec, row.header.stamp.nanosec))
+        piece.append(np.concatenate([row.position, velocity, row.effort]))
+        if len(piece) == PIECE_MESSAGES:
+            store.append(np.array(piece, dtype=np.float64))
+            piece = []
+    if not stamps:
         raise InputError(
             f"{path}: no {MESSAGE_TYPE} on topic '{topic}'", "the log's states are expected on that topic"
         )
-    names = tuple(rows[0].name)
-    _require_alike(rows, names, str(path))
-    stamps = np.array([row.header.stamp.sec + 1e-9 * row.header.stamp.nanosec for row in rows])
-    has_velocity = all(len(row.velocity) == len(names) for row in rows)
-    return Log(
-        name=name,
-        joint_names=names,
-        time=stamps - stamps[0],
-        position=_stacked(rows, "position"),
-        velocity=_stacked(rows, "velocity") if has_velocity else None,
-        effort=_stacked(rows, "effort"),
-        quantity="motor_torque",
-        notes=(f"{name}: 'effort' is read as motor torque, friction included",),
-    )
+    if piece:
+        store.append(np.array(piece, dtype=np.float64))
+    seconds, fraction = np.array(stamps, dtype=np.float64).T
+    time = seconds + 1e-9 * fraction
+    return names, time - time[0], store, has_velocity
+
+
+PIECE_MESSAGES = 4096
+"""Messages that are held one by one."""
 
 
 def _files(path: Path) -> tuple[Path, ...]:
@@ -86,49 +125,44 @@ def is_folder(path: Path) -> bool:
         return False
 
 
-def _require_alike(rows: Sequence[Any], names: tuple[str, ...], path: str) -> None:
-    """InputError names the first message that does not fit the first one."""
+def _require_alike(row: Any, number: int, names: tuple[str, ...], path: str) -> None:
+    """InputError where a message does not fit the first one."""
     if not names or len(names) != len(dict.fromkeys(names)) or 4 * len(names) > LARGEST_COLUMNS:
         raise InputError(
             f"{path}: message 1 names {len(names)} joints: {listed([quoted(x) for x in names])}",
             "record messages that name every joint once",
         )
-    for k, row in enumerate(rows, start=1):
-        if tuple(row.name) != names:
+    if tuple(row.name) != names:
+        raise InputError(
+            f"{path}: message {number} names joints {listed([quoted(x) for x in row.name])}, "
+            f"the first {listed([quoted(x) for x in names])}",
+            "record the joints of one publisher on a topic of their own",
+        )
+    for what in ("position", "effort"):
+        if len(getattr(row, what)) != len(names):
             raise InputError(
-                f"{path}: message {k} names joints {listed([quoted(x) for x in row.name])}, "
-                f"the first {listed([quoted(x) for x in names])}",
-                "record the joints of one publisher on a topic of their own",
+                f"{path}: message {number} has {len(getattr(row, what))} {what}s for {len(names)} joints",
+                "record a topic whose messages carry position and effort of every joint",
             )
-        for what in ("position", "effort"):
-            if len(getattr(row, what)) != len(names):
-                raise InputError(
-                    f"{path}: message {k} has {len(getattr(row, what))} {what}s for {len(names)} joints",
-                    "record a topic whose messages carry position and effort of every joint",
-                )
 
 
-def _stacked(rows: Sequence[Any], what: str) -> Array:
-    return np.array([getattr(row, what) for row in rows], dtype=np.float64)
-
-
-def _messages(path: Path, topic: str) -> list[Any]:
+def _messages(path: Path, topic: str) -> Iterator[Any]:
     try:
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise InputError("ROS 2 bags need rosbags", "pip install 'psdmc[calibrate]'") from error
     store = get_typestore(Stores.ROS2_HUMBLE)
-    rows: list[Any] = []
-    size = 0
     for raw in _raw_messages(path, topic):
-        rows.append(store.deserialize_cdr(raw, MESSAGE_TYPE))
-        size += len(raw)
-        if len(rows) > LARGEST_ROWS or size > 8 * LARGEST_VALUES:
+        if len(raw) > LARGEST_MESSAGE:
             raise InputError(
-                f"{path}: more than {LARGEST_ROWS:,} messages or {8 * LARGEST_VALUES:,} bytes of them",
-                "cut the bag into several",
+                f"{path}: a message of {len(raw):,} bytes, expected at most {LARGEST_MESSAGE:,}",
+                "record the joints' states alone on that topic",
             )
-    return rows
+        yield store.deserialize_cdr(raw, MESSAGE_TYPE)
+
+
+LARGEST_MESSAGE = 1024**2
+"""Bytes of one joint state: a thousand joints."""
 
 
 def _raw_messages(path: Path, topic: str) -> Iterator[bytes]:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import zip_longest
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from psdmc.calibration.logs.check_options import CheckOptions
-from psdmc.calibration.logs.log import LARGEST_NUMBER, Array, Log
-from psdmc.calibration.logs.log_time import position_slope, time_faults, velocity_ratios
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_survey import NoNumber, Survey, surveyed
+from psdmc.calibration.logs.log_time import time_faults
+from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
 from psdmc.calibration.logs.wording import first_faults, listed
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
+
+LogKind = TypeVar("LogKind", Log, StoredLog, AnyLog)
 
 
 class Fault(NamedTuple):
@@ -24,7 +28,7 @@ class Fault(NamedTuple):
     remedy: str
 
 
-def checked(log: Log, chain: Chain, cutoff: float, options: CheckOptions | None = None) -> Log:
+def checked(log: LogKind, chain: Chain, cutoff: float, options: CheckOptions | None = None) -> LogKind:
     """The log with its joints in the chain's order and what was noticed in its notes.
 
     cutoff   Hz, of the filter that the log is meant for
@@ -36,52 +40,40 @@ def checked(log: Log, chain: Chain, cutoff: float, options: CheckOptions | None 
             f"{log.name}: too short: {len(log)} row(s)", f"at least {options.shortest:g} s are needed"
         )
     log = log.ordered(chain.joint_names)
+    survey = surveyed(log)
     for stage in _FAULTS:
-        found = [check(log, chain, cutoff, options) for check in stage]
+        found = [check(log, survey, chain, cutoff, options) for check in stage]
         # the first of each kind before the others: one wrong unit gives a fault for every joint
         faults = [fault for same_rank in zip_longest(*found) for fault in same_rank if fault is not None]
         if faults:
             raise InputError(
                 f"{log.name}: {first_faults([fault.text for fault in faults])}", faults[0].remedy
             )
-    notes = [text for check in _REMARKS for text in check(log, chain, cutoff, options)]
-    return replace(log, notes=(*log.notes, *(f"{log.name}: {note}" for note in notes)))
+    notes = [text for check in _REMARKS for text in check(log, survey, chain, cutoff, options)]
+    return _with_notes(log, tuple(f"{log.name}: {note}" for note in notes))
 
 
-def still_joints(log: Log, options: CheckOptions | None = None) -> tuple[bool, ...]:
-    """Per joint, whether it does not move."""
-    smallest = (options or CheckOptions()).smallest_motion
-    return tuple(bool(motion < smallest) for motion in np.ptp(log.position, axis=0))
+def _with_notes(log: LogKind, notes: tuple[str, ...]) -> LogKind:
+    said: tuple[str, ...] = log.notes
+    return replace(log, notes=(*said, *notes))
 
 
-def _no_numbers(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
-    faults = [_no_number("time", log.time, log)]
-    for what, values in (("position", log.position), ("velocity", log.velocity), ("effort", log.effort)):
-        if values is None:
-            continue
-        called = f"effort ({log.quantity})" if what == "effort" else what
-        faults += [_no_number(f"{called} of joint {name}", values[:, k], log) for k, name in _numbered(log)]
-    return [fault for fault in faults if fault is not None]
+def _no_numbers(
+    log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions
+) -> list[Fault]:
+    return [_no_number(found, log) for found in survey.no_numbers]
 
 
-def _no_number(what: str, values: Array, log: Log) -> Fault | None:
+def _no_number(found: NoNumber, log: AnyLog) -> Fault:
     """A column's first value that is not finite, or so large that it is no measurement."""
-    rows = np.flatnonzero(~(np.abs(values) < LARGEST_NUMBER))
-    if not len(rows):
-        return None
-    first = values[rows[0]]
-    word = "is not finite" if not np.isfinite(first) else f"reaches {first:.3g}"
+    word = "is not finite" if not np.isfinite(found.value) else f"reaches {found.value:.3g}"
     return Fault(
-        f"{what} {word} in {len(rows)} row(s), the first is row {rows[0] + 1} of {len(log)}",
+        f"{found.what} {word} in {found.rows} row(s), the first is row {found.first + 1} of {len(log)}",
         "cut the log to a clean stretch, or leave a damaged velocity out",
     )
 
 
-def _numbered(log: Log) -> Iterator[tuple[int, str]]:
-    return enumerate(log.joint_names)
-
-
-def _units(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _units(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
     """Columns in rad for joints that slide, or in m for joints that turn."""
     if log.sliding is None:
         return []
@@ -98,10 +90,12 @@ def _units(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list
     return faults
 
 
-def _positions(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _positions(
+    log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions
+) -> list[Fault]:
     faults = []
     for k, joint in enumerate(chain.joints):
-        reach = float(np.abs(log.position[:, k]).max(initial=0.0))
+        reach = float(survey.reach[k])
         bound = max(abs(joint.limits.lower), abs(joint.limits.upper))
         bound = options.free_position if not np.isfinite(bound) else bound * (1 + options.limit_slack)
         if not reach > bound:
@@ -119,11 +113,10 @@ def _positions(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> 
     return faults
 
 
-def _speeds(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _speeds(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
     faults = []
-    slope = position_slope(log)
     for k, joint in enumerate(chain.joints):
-        speed = float(np.quantile(np.abs(slope[:, k]), 0.99))
+        speed = float(survey.speed[k])
         bound = joint.limits.speed
         bound = options.free_speed if not np.isfinite(bound) else bound * (1 + options.limit_slack)
         if speed > bound:
@@ -136,10 +129,10 @@ def _speeds(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> lis
     return faults
 
 
-def _rates(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _rates(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
     """The logged velocity against the position's slope: a ratio far from one is a wrong unit."""
     faults = []
-    for k, ratio in velocity_ratios(log).items():
+    for k, ratio in survey.velocity_ratios.items():
         if abs(ratio - 1.0) <= options.rate_disagreement:
             continue
         degrees = 40 < abs(ratio) < 70 or 0.014 < abs(ratio) < 0.025
@@ -154,11 +147,13 @@ def _rates(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list
     return faults
 
 
-def _nothing_there(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _nothing_there(
+    log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions
+) -> list[Fault]:
     faults = []
-    if all(still_joints(log, options)):
+    if np.all(survey.motion < options.smallest_motion):
         faults.append(Fault("no joint moves", "give a log of a motion; `psdmc excite` plans one"))
-    if not log.effort.any():
+    if not survey.largest_effort.any():
         faults.append(
             Fault(
                 f"{log.quantity} is zero throughout, for every joint",
@@ -168,40 +163,43 @@ def _nothing_there(log: Log, chain: Chain, cutoff: float, options: CheckOptions)
     return faults
 
 
-def _jitter(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _jitter(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
     steps = np.diff(log.time)
     jitter = float(np.abs(steps - log.period).max() / log.period)
     return [f"sample times jitter by {jitter:.0%}: resampled"] if jitter > options.largest_jitter else []
 
 
-def _saturation(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _saturation(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
     notes = []
     for k, name in enumerate(log.joint_names):
-        size = np.abs(log.effort[:, k])
-        share = float(np.mean(size >= size.max() * (1 - 1e-9)))
-        if size.max() > 0 and share > options.saturated_share:
-            notes.append(
-                f"joint {name}: {share:.0%} of its {log.quantity} sits at {size.max():.4g}: saturated?"
-            )
+        largest, share = float(survey.largest_effort[k]), float(survey.saturated[k])
+        if largest > 0 and share > options.saturated_share:
+            notes.append(f"joint {name}: {share:.0%} of its {log.quantity} sits at {largest:.4g}: saturated?")
     return notes
 
 
-def _still(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
-    still = [name for name, rests in zip(log.joint_names, still_joints(log, options), strict=True) if rests]
+def _still(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+    still = [
+        name
+        for name, motion in zip(log.joint_names, survey.motion, strict=True)
+        if motion < options.smallest_motion
+    ]
     return [f"joint(s) {listed(still)} stand still"] if still else []
 
 
-def _dead_effort(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
-    dead = [name for k, name in enumerate(log.joint_names) if not log.effort[:, k].any()]
+def _dead_effort(
+    log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions
+) -> list[str]:
+    dead = [name for k, name in enumerate(log.joint_names) if not survey.largest_effort[k] > 0]
     return [f"joint(s) {listed(dead)}: {log.quantity} is zero throughout"] if dead else []
 
 
-Check = Callable[[Log, Chain, float, CheckOptions], list[Fault]]
-Remark = Callable[[Log, Chain, float, CheckOptions], list[str]]
+Check = Callable[[AnyLog, Survey, Chain, float, CheckOptions], list[Fault]]
+Remark = Callable[[AnyLog, Survey, Chain, float, CheckOptions], list[str]]
 
 
-def _times(log: Log, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
-    return [Fault(*fault) for fault in time_faults(log, cutoff, options)]
+def _times(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+    return [Fault(*fault) for fault in time_faults(log, survey, cutoff, options)]
 
 
 _FAULTS: tuple[tuple[Check, ...], ...] = (

@@ -7,7 +7,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -46,16 +47,41 @@ def read_log(path: str | Path) -> Log:
     path = Path(path)
     kind = path.suffix.lower()
     if kind in BAGS or is_folder(path):
-        return read_bag(path)
-    if kind not in TABLES:
-        raise InputError(
-            f"{path}: '{path.suffix}' is no log format", f"known are {', '.join((*TABLES, *BAGS))}"
-        )
+        bag = read_bag(path)
+        return bag if isinstance(bag, Log) else bag.held()
+    require_format(path)
     return log_from_columns(path.name, read_columns(path))
 
 
-def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
-    """A log from named columns of equal length; InputError says which column is missing and what would do."""
+def require_format(path: Path) -> None:
+    """InputError where a file's ending is no log format's."""
+    if path.suffix.lower() not in TABLES:
+        raise InputError(
+            f"{path}: '{path.suffix}' is no log format", f"known are {', '.join((*TABLES, *BAGS))}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Which columns of a table are a log's, and what they hold. n joints."""
+
+    name: str
+    joint_names: tuple[str, ...]
+    positions: tuple[str, ...]
+    velocities: tuple[str, ...] | None
+    efforts: tuple[str, ...]
+    quantity: Quantity
+    notes: tuple[str, ...]
+    sliding: tuple[str, ...] | None
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns that are read, beside time."""
+        return (*self.positions, *(self.velocities or ()), *self.efforts)
+
+
+def layout_of(name: str, columns: Sequence[str]) -> Layout:
+    """The layout of a table with these columns; InputError says which column is missing and what would do."""
     if "time_s" not in columns:
         raise InputError(f"{name}: no column 'time_s'", f"it has {listed(tuple(columns))}")
     joints = _joints(name, columns, POSITIONS)
@@ -67,20 +93,39 @@ def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
     if velocities and lacking:
         notes = (*notes, f"{name}: no velocity of joint(s) {listed(lacking)}: velocities are not used")
     _require_units(name, joints, {} if lacking else velocities, effort_names)
-    return Log(
+    return Layout(
         name=name,
         joint_names=tuple(joints),
-        time=columns["time_s"],
-        position=np.column_stack([columns[column] for column in joints.values()]),
-        velocity=None if lacking else np.column_stack([columns[velocities[joint]] for joint in joints]),
-        effort=np.column_stack([columns[column] for column in effort_names]),
+        positions=tuple(joints.values()),
+        velocities=None if lacking else tuple(velocities[joint] for joint in joints),
+        efforts=tuple(effort_names),
         quantity=quantity,
         notes=notes,
         sliding=tuple(joint for joint, column in joints.items() if _slides(column)),
     )
 
 
-def _joints(name: str, columns: Mapping[str, Array], prefixes: tuple[str, ...]) -> dict[str, str]:
+def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
+    """A log from named columns of equal length; InputError says which column is missing and what would do."""
+    found = layout_of(name, tuple(columns))
+
+    def stacked(names: tuple[str, ...]) -> Array:
+        return np.column_stack([columns[column] for column in names])
+
+    return Log(
+        name=name,
+        joint_names=found.joint_names,
+        time=columns["time_s"],
+        position=stacked(found.positions),
+        velocity=None if found.velocities is None else stacked(found.velocities),
+        effort=stacked(found.efforts),
+        quantity=found.quantity,
+        notes=found.notes,
+        sliding=found.sliding,
+    )
+
+
+def _joints(name: str, columns: Sequence[str], prefixes: tuple[str, ...]) -> dict[str, str]:
     """Column by joint, in the file's order."""
     found: dict[str, str] = {}
     for column in columns:
@@ -98,7 +143,7 @@ def _joints(name: str, columns: Mapping[str, Array], prefixes: tuple[str, ...]) 
 
 
 def _efforts(
-    name: str, columns: Mapping[str, Array], joints: tuple[str, ...]
+    name: str, columns: Sequence[str], joints: tuple[str, ...]
 ) -> tuple[Quantity, list[str], tuple[str, ...]]:
     present = {column.partition(".")[0] for column in columns}
     kinds = {quantity: prefix for prefix, quantity in EFFORTS if prefix in present}

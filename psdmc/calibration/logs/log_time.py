@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from psdmc.calibration.logs.check_options import CheckOptions
-from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_survey import Survey
+from psdmc.calibration.logs.stored_log import AnyLog
 
 UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
 """That loggers write instead of seconds, and how many make one."""
@@ -14,16 +16,13 @@ PERIODS = (0.9, 100.0, 1e5)
 or microseconds, 10 Hz in the unit before, lie at the others."""
 UNIT_MATCH = 0.1
 """Share by which velocity over slope may differ from a unit's factor."""
-SEEN_MOTION = 1e-2
-"""rad or m, peak to peak, from which a joint's slope is compared with its velocity."""
-
 SMALLEST_STEP = 1e-9
 """s between any two rows: the resolution of time stamps."""
 
 FaultAndRemedy = tuple[str, str]
 
 
-def time_faults(log: Log, cutoff: float, options: CheckOptions) -> list[FaultAndRemedy]:
+def time_faults(log: AnyLog, survey: Survey, cutoff: float, options: CheckOptions) -> list[FaultAndRemedy]:
     """What is wrong with the time of a log whose numbers are finite, each with its remedy; at most one of a kind."""
     steps = np.diff(log.time)
     order = _order(log, steps)
@@ -36,15 +35,15 @@ def time_faults(log: Log, cutoff: float, options: CheckOptions) -> list[FaultAnd
         )
         text = f"time_s grows by {step:.3g} s from row to row, expected at least {smallest:g} s"
         return [(text, "write time_s in seconds")]
-    unit = suspected_unit(log)
+    unit = suspected_unit(log, survey)
     if unit:
         return [(f"time_s looks like {unit}: {log.period:.4g} from row to row", "write time_s in seconds")]
     return _gaps(log, steps, options) + _length(log, options) + _too_slow(log, cutoff, options)
 
 
-def suspected_unit(log: Log) -> str:
+def suspected_unit(log: AnyLog, survey: Survey) -> str:
     """Name of the unit that time seems to have, where it is not seconds: by velocity over slope, else by the period."""
-    ratios = list(velocity_ratios(log).values())
+    ratios = list(survey.velocity_ratios.values())
     if ratios:
         middle = float(np.median(ratios))
         return next((name for name, factor in UNITS if abs(middle / factor - 1.0) < UNIT_MATCH), "")
@@ -52,26 +51,7 @@ def suspected_unit(log: Log) -> str:
     return fitting[-1] if fitting else ""
 
 
-def velocity_ratios(log: Log) -> dict[int, float]:
-    """Logged velocity over the position's slope, by the index of each joint that moves."""
-    if log.velocity is None:
-        return {}
-    slope = position_slope(log)
-    found: dict[int, float] = {}
-    for k in range(len(log.joint_names)):
-        power = float(slope[:, k] @ slope[:, k])
-        if np.ptp(log.position[:, k]) >= SEEN_MOTION and power > 0:
-            found[k] = float(slope[:, k] @ log.velocity[:, k]) / power
-    return found
-
-
-def position_slope(log: Log) -> Array:
-    """Central differences over two periods: too coarse for dynamics, enough to tell units apart."""
-    slope: Array = (log.position[2:] - log.position[:-2]) / (log.time[2:] - log.time[:-2])[:, None]
-    return np.vstack([slope[:1], slope, slope[-1:]])
-
-
-def _order(log: Log, steps: Array) -> list[FaultAndRemedy]:
+def _order(log: AnyLog, steps: Array) -> list[FaultAndRemedy]:
     backwards = np.flatnonzero(steps <= 0)
     if not len(backwards):
         return []
@@ -86,7 +66,7 @@ def _order(log: Log, steps: Array) -> list[FaultAndRemedy]:
     ]
 
 
-def _gaps(log: Log, steps: Array, options: CheckOptions) -> list[FaultAndRemedy]:
+def _gaps(log: AnyLog, steps: Array, options: CheckOptions) -> list[FaultAndRemedy]:
     gaps = np.flatnonzero(steps > options.largest_gap * log.period)
     if not len(gaps):
         return []
@@ -99,7 +79,7 @@ def _gaps(log: Log, steps: Array, options: CheckOptions) -> list[FaultAndRemedy]
     ]
 
 
-def _length(log: Log, options: CheckOptions) -> list[FaultAndRemedy]:
+def _length(log: AnyLog, options: CheckOptions) -> list[FaultAndRemedy]:
     if log.duration < options.shortest:
         text = f"too short: {log.duration:.3g} s, expected at least {options.shortest:g} s"
         return [(text, "record a longer motion")]
@@ -109,7 +89,7 @@ def _length(log: Log, options: CheckOptions) -> list[FaultAndRemedy]:
     return []
 
 
-def _too_slow(log: Log, cutoff: float, options: CheckOptions) -> list[FaultAndRemedy]:
+def _too_slow(log: AnyLog, cutoff: float, options: CheckOptions) -> list[FaultAndRemedy]:
     rate = 1.0 / log.period
     if rate >= options.samples_per_cycle * cutoff:
         return []

@@ -43,14 +43,26 @@ def smallest_steps(position: Array) -> Array:
 
 
 def resting(
-    position: Array, filtered: Array, noise: Array, in_band: float, smallest: float
+    position: Array, motion: Array, filtered_motion: Array, noise: Array, in_band: float, smallest: float
 ) -> NDArray[np.bool_]:
-    """(n,) whether a joint's motion is no more than its sensor's noise, a few encoder steps, or `smallest` (rad or m)."""
-    by_noise = np.ptp(filtered, axis=0) < REST_DEVIATIONS * noise * np.sqrt(in_band)
-    motion = np.ptp(position, axis=0)
+    """(n,) whether a joint's motion is no more than its sensor's noise, a few encoder steps, or `smallest` (rad or m).
+
+    motion, filtered_motion  (n,)  peak to peak, before and after the filter
+    """
+    by_noise = filtered_motion < REST_DEVIATIONS * noise * np.sqrt(in_band)
     return np.asarray(by_noise | (motion <= REST_STEPS * smallest_steps(position)) | (motion < smallest))
 
 
-def noise_like(noise: Array, count: int) -> Array:
-    """(count, n) raw position noise of these standard deviations: seeded, the same on every call."""
-    return np.asarray(noise * np.random.default_rng(SEED).standard_normal((count, len(noise))))
+NOISE_CHUNK = 65_536
+"""Rows that one seed draws: any row can then be drawn without those before it."""
+
+
+def noise_like(noise: Array, first: int, last: int) -> Array:
+    """(last - first, n) raw position noise of these standard deviations at some rows: the same on every call."""
+    parts = []
+    for chunk in range(first // NOISE_CHUNK, (last - 1) // NOISE_CHUNK + 1):
+        start = chunk * NOISE_CHUNK
+        rng = np.random.default_rng(SEED if chunk == 0 else [SEED, chunk])
+        drawn = rng.standard_normal((min(last - start, NOISE_CHUNK), len(noise)))
+        parts.append(drawn[max(first - start, 0) :])
+    return np.asarray(noise * np.concatenate(parts))

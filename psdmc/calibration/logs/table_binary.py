@@ -75,17 +75,25 @@ def write_npz(columns: Mapping[str, Array], path: Path) -> None:
         np.savez(file, **dict(columns))  # type: ignore[arg-type]
 
 
-def columns_from_parquet(file: BinaryIO, name: str) -> dict[str, Array]:
-    """Named columns of a Parquet file; a missing value (null) is NaN."""
+def open_parquet(file: BinaryIO, name: str) -> tuple[Any, list[str]]:
+    """pyarrow's file and its column names; InputError where columns hold anything but numbers."""
     parquet = _parquet()
-    size = _size(file)
     with decoding(name, "a Parquet file"):
         stored = parquet.ParquetFile(file)
-        require_size(stored.metadata.num_rows, stored.metadata.num_columns, size, name)
         fields = list(stored.schema_arrow)
         require_names([field.name for field in fields], name)
         for field in fields:
             _require_numbers(field, name)
+        return stored, [field.name for field in fields]
+
+
+def columns_from_parquet(file: BinaryIO, name: str) -> dict[str, Array]:
+    """Named columns of a Parquet file; a missing value (null) is NaN."""
+    size = _size(file)
+    stored, _ = open_parquet(file, name)
+    with decoding(name, "a Parquet file"):
+        require_size(stored.metadata.num_rows, stored.metadata.num_columns, size, name)
+        fields = list(stored.schema_arrow)
         table = stored.read(use_threads=False)
         return {
             field.name: np.asarray(table.column(k).to_numpy(), dtype=np.float64)

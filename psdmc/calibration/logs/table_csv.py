@@ -46,6 +46,57 @@ def columns_from_csv(data: bytes, name: str) -> dict[str, Array]:
     return {column: values[:, k] for k, column in enumerate(names)}
 
 
+class CsvReader:
+    """A CSV file piece by piece: its header, then whole lines in order; faults carry the line's number in the file."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._line = 0
+        self._separator = SEPARATORS[0]
+        self._names: list[str] = []
+        self._decimal = ""
+
+    def header(self, line: bytes) -> list[str]:
+        """The column names of the next line; none where it is empty."""
+        self._line += 1
+        text = _text(line, self.name).strip("\n")
+        if not text.strip():
+            return []
+        self._separator = _separator(text)
+        with decoding(f"{self.name}: line {self._line}", "a header"):
+            self._names = _cells(text, self._separator)
+        _require_header(self._names, self.name)
+        require_names(self._names, self.name)
+        return self._names
+
+    def no_header(self) -> list[str]:
+        """InputError: the file ended before a header."""
+        _header_and_body("", self.name)
+        return []
+
+    def rows(self, lines: bytes) -> Array:
+        """(rows, columns) of whole lines."""
+        body = _text(lines, self.name, self._line)
+        first, self._line = self._line + 1, self._line + body.count("\n")
+        if not body.strip():
+            return np.zeros((0, len(self._names)))
+        body = self._pointed(body)
+        values = _numbers(body, self._separator)
+        if values is None or values.shape[1] != len(self._names):
+            raise _first_fault(body, self._names, self._separator, first, self.name)
+        return values
+
+    def _pointed(self, body: str) -> str:
+        """Decimal commas as points, where all pieces agree."""
+        if self._separator == ",":
+            return body
+        found = "".join(mark for mark in ",." if mark in body)
+        if "".join(sorted({*found, *self._decimal})) == ",.":
+            return _with_points(",.", self._separator, self.name)
+        self._decimal = found or self._decimal
+        return body.replace(",", ".")
+
+
 def header_names(line: bytes, name: str) -> tuple[str, ...]:
     """The column names of a CSV file's first line."""
     _, header, _ = _header_and_body(_text(line, name), name)
@@ -53,7 +104,8 @@ def header_names(line: bytes, name: str) -> tuple[str, ...]:
         return tuple(_cells(header, _separator(header)))
 
 
-def _text(data: bytes, name: str) -> str:
+def _text(data: bytes, name: str, before: int = 0) -> str:
+    """Bytes as text with plain line ends; `before` lines came before them."""
     for mark, encoding in _OTHER_MARKS:
         if data.startswith(mark):
             raise InputError(f"{name}: is {encoding} text, expected UTF-8", "save it as CSV in UTF-8")
@@ -65,7 +117,7 @@ def _text(data: bytes, name: str) -> str:
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
+        line = before + data.count(b"\n", 0, error.start) + 1
         raise InputError(
             f"{name}: line {line}: byte 0x{data[error.start]:02x} is no UTF-8", "save it as CSV in UTF-8"
         ) from error

@@ -10,6 +10,8 @@ from psdmc.errors import InputError
 
 LARGEST_ROWS = 20_000_000
 """Five hours at 1 kHz."""
+LARGEST_STORED_ROWS = 100_000_000
+"""Of a log that is read in pieces: a day at 1 kHz."""
 LARGEST_COLUMNS = 1_000
 """Ten per joint of the longest chains, and as many again that are not read."""
 LARGEST_VALUES = 100_000_000

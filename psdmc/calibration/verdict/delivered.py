@@ -8,6 +8,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,9 +26,10 @@ from psdmc.calibration.identify.prediction import Prediction, prediction_from_js
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import StepOptions, StepQuality, judged
 from psdmc.calibration.logs.check_options import CheckOptions
-from psdmc.calibration.logs.filter import States, filtered, held_out, smoothed_rows, thinned
-from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.filter import States, held_out, smoothed_rows, stretches
+from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.errors import InputError
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
@@ -86,7 +88,7 @@ def reread(model: DynamicsModel) -> DynamicsModel:
 
 
 def delivered_quality(
-    model: DynamicsModel, source: Sequence[Log] | Runs, check: CheckOptions | None = None
+    model: DynamicsModel, source: Sequence[AnyLog] | Runs, check: CheckOptions | None = None
 ) -> tuple[StepQuality, ...]:
     """R^2 and RMSE of a calibrated model on logs, or on a campaign's runs, by what its file holds.
 
@@ -98,7 +100,7 @@ def delivered_quality(
     return (_log_quality(found, source, check or CheckOptions()),)
 
 
-def _log_quality(found: Delivered, logs: Sequence[Log], check: CheckOptions) -> StepQuality:
+def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) -> StepQuality:
     chain, step = found.model.chain, found.prediction.steps["all"]
     parts = [_log_parts(found, log, step, check) for log in logs]
     time, measured, predicted = (np.concatenate([part[k] for part in parts]) for k in range(3))
@@ -107,13 +109,16 @@ def _log_quality(found: Delivered, logs: Sequence[Log], check: CheckOptions) -> 
 
 
 def _log_parts(
-    found: Delivered, log: Log, step: StepOptions, check: CheckOptions
+    found: Delivered, log: AnyLog, step: StepOptions, check: CheckOptions
 ) -> tuple[Array, Array, Array]:
     """Time, measured and predicted torque of one log's independent samples."""
-    states = filtered(checked(log, found.model.chain, step.filter.cutoff, check), step.filter, check)
-    at = thinned(states, step.filter)
-    measured = found.motors.torque(states.effort)[at]
-    return states.time[at], measured, smoothed_rows(states, at, lambda rows: _torque(found, states, rows))
+    parts = []
+    for stretch in stretches(checked(log, found.model.chain, step.filter.cutoff, check), step.filter, check):
+        states, at = stretch.states, stretch.at
+        predicted = smoothed_rows(states, at, partial(_torque, found, states))
+        parts.append((states.time[at], found.motors.torque(states.effort)[at], predicted))
+    time, measured, predicted = (np.concatenate(values) for values in zip(*parts, strict=True))
+    return time, measured, predicted
 
 
 def _torque(found: Delivered, states: States, rows: slice) -> Array:

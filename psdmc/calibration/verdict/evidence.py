@@ -10,9 +10,10 @@ import numpy as np
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.logs.filter import FilterOptions, States, evenly_spaced, filtered, thinned
-from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.filter import FilterOptions, stretches
+from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.model.dynamics_model import DynamicsModel
 
 SIGN_SPEED = 0.03
@@ -25,7 +26,7 @@ MOST_ROWS = 4000
 class Motion:
     """A run to judge by: its log and what the tip carried."""
 
-    log: Log
+    log: AnyLog
     tool: Load | None = None
 
 
@@ -98,20 +99,21 @@ def evidence_of(
 def _samples(
     model: DynamicsModel, motion: Motion, motors: Motors, options: FilterOptions
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Of one motion: q, qd, qdd, sign and torque of its samples, and the RMS noise that passes the filter, were noise as
+    dense there as above the cut-off."""
     log = checked(motion.log, model.chain, options.cutoff)
-    states = filtered(log, options)
-    at = thinned(states, options)
-    sign = states.low_pass(np.tanh(states.qd / SIGN_SPEED))
-    torque = motors.torque(states.effort)[at]
-    if motion.tool is not None:
-        torque = torque - payload_torque(model.chain, states.q[at], motion.tool.mass, motion.tool.com)
-    noise = motors.torque(_noise(log, states, options))
-    return states.q[at], states.qd[at], states.qdd[at], sign[at], torque, np.abs(noise)
-
-
-def _noise(log: Log, states: States, options: FilterOptions) -> Array:
-    """(n,) RMS in the pass band, were the noise as dense there as above the cut-off."""
-    above = (evenly_spaced(log)[2] - states.effort)[states.use]
-    nyquist = 0.5 / states.period
-    share = options.cutoff / (nyquist - options.cutoff)
-    return np.asarray(np.sqrt(share * np.mean(above**2, axis=0)))
+    parts, above, count = [], np.zeros(model.n), 0
+    for stretch in stretches(log, options):
+        states, at = stretch.states, stretch.at
+        sign = states.low_pass(np.tanh(states.qd / SIGN_SPEED))
+        torque = motors.torque(states.effort)[at]
+        if motion.tool is not None:
+            torque = torque - payload_torque(model.chain, states.q[at], motion.tool.mass, motion.tool.com)
+        own = slice(at[0], at[-1] + 1)
+        above += np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
+        count += at[-1] + 1 - at[0]
+        parts.append((states.q[at], states.qd[at], states.qdd[at], sign[at], torque))
+    q, qd, qdd, sign, torque = (np.concatenate(values) for values in zip(*parts, strict=True))
+    share = options.cutoff / (0.5 / states.period - options.cutoff)
+    noise = motors.torque(np.sqrt(share * above / count))
+    return q, qd, qdd, sign, torque, np.abs(noise)

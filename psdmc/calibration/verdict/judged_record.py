@@ -8,7 +8,7 @@ from dataclasses import replace
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.steps import StepQuality
 from psdmc.calibration.logs.check_options import CheckOptions
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.delivered import delivered_quality, reread
 from psdmc.calibration.verdict.record import Calibration, with_model
 from psdmc.model.mass_check import check_mass_matrix
@@ -19,7 +19,7 @@ WHOLE = "All"
 
 def judged_record(
     record: Calibration,
-    source: Sequence[Log] | Runs,
+    source: Sequence[AnyLog] | Runs,
     plain: Calibration | None = None,
     distance: float | None = None,
     check: CheckOptions | None = None,

@@ -8,7 +8,7 @@ from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.filter import FilterOptions
-from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.evidence import Motion, evidence_of
 from psdmc.calibration.verdict.findings import Demand
 from psdmc.calibration.verdict.judge import judge
@@ -21,7 +21,7 @@ def with_verdict_on_logs(
     record: Calibration,
     model: DynamicsModel,
     regressor: Regressor,
-    logs: Sequence[Log],
+    logs: Sequence[AnyLog],
     motors: Motors,
     options: FilterOptions,
     limits: VerdictOptions,

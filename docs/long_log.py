@@ -1,0 +1,77 @@
+"""Time and memory of `psdmc calibrate` on a long log: the figures of docs/calibration.md.
+
+python docs/long_log.py ROWS [csv|parquet|npz] [--rate HZ]     seven joints, 1 kHz; user CPU time and peak resident memory of the command
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import write_log
+from psdmc.compiler import derive
+from psdmc.model import evaluate
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.store import save
+
+ROBOT = Path(__file__).resolve().parents[1] / "examples" / "robots" / "lbr7.toml"
+AT_ONCE = 100_000
+"""Rows whose torques are computed at once."""
+
+
+def synthetic_log(model: DynamicsModel, rows: int, rate: float) -> Log:
+    """Three sines a joint, torques by Newton-Euler, friction and noise; positions rounded to 1e-6 rad."""
+    time = np.arange(rows) / rate
+    n = model.n
+    q, qd, qdd = (np.zeros((rows, n)) for _ in range(3))
+    for size, low in ((0.5, 0.11), (0.25, 0.31), (0.1, 0.73)):
+        w = 2 * np.pi * low * (1 + 0.13 * np.arange(n))
+        angle = w * time[:, None] + np.arange(n)
+        q += size * np.sin(angle)
+        qd += size * w * np.cos(angle)
+        qdd -= size * w**2 * np.sin(angle)
+    assert model.theta_b is not None
+    tau = np.concatenate(
+        [
+            evaluate.newton_euler_torques(model, model.theta_b, [part[k : k + AT_ONCE] for part in (q, qd, qdd)])
+            for k in range(0, rows, AT_ONCE)
+        ]
+    )
+    tau += 2.0 * np.tanh(qd / 0.03) + 3.0 * qd + 0.3 * np.random.default_rng(1).standard_normal(tau.shape)
+    return Log("long", model.joint_names, time, np.round(q / 1e-6) * 1e-6, None, tau, "motor_torque")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("rows", type=int)
+    parser.add_argument("table", nargs="?", default="csv", choices=("csv", "parquet", "npz"))
+    parser.add_argument("--rate", type=float, default=1000.0, help="Hz")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        model, log = Path(folder) / "m.npz", Path(folder) / f"log.{options.table}"
+        known = derive(ROBOT, drive_inertia=True)
+        save(known, model)
+        write_log(synthetic_log(known, options.rows, options.rate), log)
+        size = log.stat().st_size
+        words = ["-m", "psdmc", "calibrate", str(model), str(log), "-o", str(Path(folder) / "out.npz")]
+        done = subprocess.run([sys.executable, *words], env=os.environ, capture_output=True, text=True)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    print(done.stdout[:400] or done.stderr)
+    print(
+        f"{options.rows:,} rows, {size / 2**20:.0f} MiB {options.table}: exit {done.returncode}, {used.ru_utime:.1f} s "
+        f"user, {used.ru_stime:.1f} s system, {used.ru_maxrss / 1024:.0f} MiB at most"
+    )
+
+
+if __name__ == "__main__":
+    main()

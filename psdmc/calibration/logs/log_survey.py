@@ -1,0 +1,133 @@
+"""What the checks of a log look at, gathered in one pass over its rows, a stretch at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psdmc.calibration.logs.log import LARGEST_NUMBER, Array, Log
+from psdmc.calibration.logs.stored_log import AnyLog
+
+STRETCH_ROWS = 32_768
+"""Rows that are looked at, filtered and fitted at once."""
+MOST_SLOPES = 1_000_000
+"""Rows of which slopes are ranked; longer logs are judged by evenly spread ones."""
+FAST_SHARE = 0.99
+"""Of the slopes; those above are noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class NoNumber:
+    """A column with values that are not finite, or beyond any measurement: how many, and the first."""
+
+    what: str
+    rows: int
+    first: int
+    value: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Survey:
+    """A log's columns in figures. n joints.
+
+    no_numbers      columns that hold any;  with them, the other figures mean nothing
+    reach, motion   (n,)  largest |position|; peak to peak
+    speed           (n,)  slope of the position below which FAST_SHARE of the rows lie
+    slope_power     (n,)  sum of squared slopes;  slope_velocity  of slope times logged velocity, None where there is none
+    largest_effort  (n,)  |effort|;  saturated  (n,) share of rows that have it
+    """
+
+    no_numbers: tuple[NoNumber, ...]
+    reach: Array
+    motion: Array
+    speed: Array
+    slope_power: Array
+    slope_velocity: Array | None
+    largest_effort: Array
+    saturated: Array
+
+    @property
+    def velocity_ratios(self) -> dict[int, float]:
+        """Logged velocity over the position's slope, by the index of each joint that moves."""
+        if self.slope_velocity is None:
+            return {}
+        moves = (self.motion >= SEEN_MOTION) & (self.slope_power > 0)
+        return {int(k): float(self.slope_velocity[k] / self.slope_power[k]) for k in np.flatnonzero(moves)}
+
+
+SEEN_MOTION = 1e-2
+"""rad or m, peak to peak, from which a joint's slope is compared with its velocity."""
+
+
+def surveyed(log: AnyLog) -> Survey:
+    """The survey of a log of two rows or more."""
+    n = len(log.joint_names)
+    bad: dict[str, NoNumber] = {}
+    low, high, reach = np.full(n, np.inf), np.full(n, -np.inf), np.zeros(n)
+    power, by_velocity, has_velocity = np.zeros(n), np.zeros(n), False
+    largest, at_largest = np.zeros(n), np.zeros(n)
+    every = max(1, len(log) // MOST_SLOPES)
+    slopes: list[Array] = []
+    with np.errstate(all="ignore"):
+        for start in range(0, len(log), STRETCH_ROWS):
+            part = log.rows(max(start - 1, 0), start + STRETCH_ROWS + 1)
+            low, high = (
+                np.minimum(low, part.position.min(axis=0)),
+                np.maximum(high, part.position.max(axis=0)),
+            )
+            reach = np.maximum(reach, np.abs(part.position).max(axis=0))
+            slope = position_slope(part)
+            power += np.sum(slope**2, axis=0)
+            if part.velocity is not None:
+                has_velocity = True
+                by_velocity += np.sum(slope * part.velocity[1:-1], axis=0)
+            first = max(start, 1)
+            slopes.append(slope[(-first) % every :: every])
+            own = part.rows(start - max(start - 1, 0), start - max(start - 1, 0) + STRETCH_ROWS)
+            _note_no_numbers(bad, own, start)
+            largest, at_largest = _saturation(np.abs(own.effort), largest, at_largest)
+        ranked = np.concatenate(slopes)
+        speed = np.quantile(np.abs(ranked), FAST_SHARE, axis=0) if len(ranked) else np.zeros(n)
+        return Survey(
+            tuple(bad.values()),
+            reach,
+            high - low,
+            np.asarray(speed),
+            power,
+            by_velocity if has_velocity else None,
+            largest,
+            at_largest / len(log),
+        )
+
+
+def position_slope(log: Log) -> Array:
+    """(N - 2, n) central differences over two periods: too coarse for dynamics, enough to tell units apart."""
+    return np.asarray((log.position[2:] - log.position[:-2]) / (log.time[2:] - log.time[:-2])[:, None])
+
+
+SAME = 1e-9
+"""Relative difference of two efforts that are one value."""
+
+
+def _saturation(effort: Array, largest: Array, count: Array) -> tuple[Array, Array]:
+    """The largest effort so far, and rows that have it."""
+    now = np.maximum(largest, effort.max(axis=0))
+    kept = np.where(largest >= now * (1 - SAME), count, 0.0)
+    return now, kept + np.sum(effort >= now * (1 - SAME), axis=0)
+
+
+def _note_no_numbers(bad: dict[str, NoNumber], part: Log, start: int) -> None:
+    """Add a stretch's values that are no measurements; `start` is its first row."""
+    columns = [("time", part.time)]
+    for what, values in (("position", part.position), ("velocity", part.velocity), ("effort", part.effort)):
+        if values is None:
+            continue
+        called = f"effort ({part.quantity})" if what == "effort" else what
+        columns += [(f"{called} of joint {name}", values[:, k]) for k, name in enumerate(part.joint_names)]
+    for what, column in columns:
+        rows = start + np.flatnonzero(~(np.abs(column) < LARGEST_NUMBER))
+        if not len(rows):
+            continue
+        before = bad.get(what, NoNumber(what, 0, int(rows[0]), float(column[rows[0] - start])))
+        bad[what] = replace(before, rows=before.rows + len(rows))
