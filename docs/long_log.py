@@ -1,6 +1,8 @@
 """Time and memory of `psdmc calibrate` on a long log: the figures of docs/calibration.md.
 
-python docs/long_log.py ROWS [csv|parquet|npz] [--rate HZ]     seven joints, 1 kHz; user CPU time and peak resident memory of the command
+python docs/long_log.py ROWS [csv|parquet|npz] [--rate HZ]
+
+Seven joints at 1 kHz: CPU time and peak resident memory of the whole command.
 """
 
 from __future__ import annotations
@@ -41,7 +43,9 @@ def synthetic_log(model: DynamicsModel, rows: int, rate: float) -> Log:
     assert model.theta_b is not None
     tau = np.concatenate(
         [
-            evaluate.newton_euler_torques(model, model.theta_b, [part[k : k + AT_ONCE] for part in (q, qd, qdd)])
+            evaluate.newton_euler_torques(
+                model, model.theta_b, [part[k : k + AT_ONCE] for part in (q, qd, qdd)]
+            )
             for k in range(0, rows, AT_ONCE)
         ]
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from psdmc.calibration.campaign_file import is_campaign, read_campaign
-from psdmc.calibration.identify.four_steps import FourSteps, Runs, calibrate_four_steps
+from psdmc.calibration.identify.four_steps import FourSteps, Runs, calibrate_four_steps, checked_runs
 from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibration.identify.motor_constants import motors_of_logs
 from psdmc.calibration.identify.physical import (
@@ -24,7 +24,7 @@ from psdmc.calibration.logs.open_log import open_log
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.judged_record import judged_record
 from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
-from psdmc.calibration.verdict.record import Calibration, four_step_record, linear_record
+from psdmc.calibration.verdict.record import Calibration, four_step_record, linear_record, with_data
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.calibration.verdict.verdict_on import with_verdict_on_campaign, with_verdict_on_logs
 from psdmc.errors import InputError
@@ -96,12 +96,14 @@ def calibrate_campaign(
     progress: Progress,
 ) -> Calibration:
     """The four steps; what they found, or the nearest that is physical, as their uncertainties and the prior measure."""
+    progress("checking logs")
+    logs = checked_runs(model.chain, runs, options.campaign)
     found = calibrate_four_steps(
         model.chain, regressor, model.l, runs, options.campaign, progress, torque_constants, model.theta_b
     )
 
     def record(steps: FourSteps, theta_b: Array) -> Calibration:
-        return four_step_record(model, steps, theta_b, options.campaign)
+        return with_data(four_step_record(model, steps, theta_b, options.campaign), logs)
 
     progress("reading the result back")
     plain = judged_record(record(found, found.inertial.theta_b), runs)
@@ -144,12 +146,14 @@ def calibrate_logs(
     found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b, progress)
     solved = found.estimate
     progress("reading the result back")
-    plain = judged_record(linear_record(model, found, solved.values, linear), logs, check=linear.check)
+    plain = judged_record(
+        with_data(linear_record(model, found, solved.values, linear), logs), logs, check=linear.check
+    )
 
     def consistent() -> Calibration:
         bounded = found.problem.never_negative
         near = nearest_physical(model, solved.values, solved.whitening, bounded, options.consistency)
-        record = linear_record(model, found, near.values, linear)
+        record = with_data(linear_record(model, found, near.values, linear), logs)
         return judged_record(record, logs, plain, near.distance, linear.check)
 
     result = _physical(plain, consistent, options, progress)

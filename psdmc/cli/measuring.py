@@ -19,6 +19,7 @@ from psdmc.calibration.logs.filter import FilterOptions
 from psdmc.calibration.motions.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
 from psdmc.calibration.simulate_campaign import SimulateOptions
 from psdmc.calibration.verdict.record import verdict_of
+from psdmc.calibration.verdict.said_once import unsaid_warnings
 from psdmc.cli.one_line import one_line
 from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
@@ -168,7 +169,7 @@ def calibrate(
         print("note: --physical is the default now and need not be given")
     for note in record.notes:
         print(f"note: {one_line(note)}")
-    for warning in record.warnings:
+    for warning in unsaid_warnings(record):
         print(f"warning: {one_line(warning)}")
     if not verdict.usable:
         raise typer.Exit(verdict.exit_status)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from psdmc.cli.one_line import one_line
+from psdmc.cli.show_calibration import print_calibration, standard_deviations
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
@@ -37,13 +38,16 @@ def print_model(model: DynamicsModel) -> None:
     """The model at a glance: robot, joints, sizes, base parameters, certificate, notes."""
     found = summary(model)
     out = console()
+    calibrated = model.provenance.get("calibration")
+    if calibrated is not None:
+        print_calibration(out, calibrated)
     out.print(
         f"[bold]{escape(found.name)}[/bold]  {escape(found.base)} to {escape(found.tip)}, {found.convention} frames"
     )
     out.print(f"gravity {_numbers(found.gravity)} m/s^2 in the base frame")
     out.print(_sizes(found))
     out.print(_joints(found.joints, found.certificate))
-    out.print(_parameters(found))
+    out.print(_parameters(found, calibrated or {}))
     out.print(f"largest torque error against Newton-Euler, relative: {max(found.certificate):.1e}")
     for note in found.notes:
         out.print(f"note: {escape(note)}")
@@ -79,11 +83,14 @@ def _joints(joints: Sequence[Joint], errors: Sequence[float]) -> Table:
     return table
 
 
-def _parameters(found: Summary) -> Table:
-    table = Table("theta_b", "value", "unit", "equation, about the link frames")
-    for index, parameter in enumerate(found.base_parameters, start=1):
+def _parameters(found: Summary, calibrated: Mapping[str, Any]) -> Table:
+    stds = standard_deviations(calibrated, len(found.base_parameters))
+    heads = ["theta_b", "value", *(["+-"] if calibrated else []), "unit", "equation, about the link frames"]
+    table = Table(*heads)
+    for index, (parameter, std) in enumerate(zip(found.base_parameters, stds, strict=True), start=1):
         value = "unknown" if parameter.value is None else f"{parameter.value:.6g}"
-        table.add_row(str(index), value, parameter.unit, escape(parameter.equation))
+        given = [std] if calibrated else []
+        table.add_row(str(index), value, *given, parameter.unit, escape(parameter.equation))
     return table
 
 

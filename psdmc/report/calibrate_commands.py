@@ -16,6 +16,7 @@ from psdmc.calibration.campaign import (
     write_campaign,
 )
 from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite import Excitation
 from psdmc.calibration.motions.trajectory import write_trajectory
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
@@ -93,7 +94,7 @@ def calibrate_command(
         known,
         list(sources),
         options,
-        regressor=regressor_of(known, progress),
+        regressor=CompiledWhenAsked(known, progress),
         torque_constants=torque_constants,
         progress=progress,
     )
@@ -116,6 +117,19 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
     files = actuator_files(view)
     write_together(Path(folder), files)
     return [Path(folder) / path for path in files]
+
+
+class CompiledWhenAsked:
+    """A model's regressor that is compiled when it is first asked for: a log that cannot be used is refused before."""
+
+    def __init__(self, model: DynamicsModel, progress: Progress) -> None:
+        self._model, self._progress = model, progress
+        self._compiled: Regressor | None = None
+
+    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+        if self._compiled is None:
+            self._compiled = regressor_of(self._model, self._progress)
+        return self._compiled.regressor(q, qd, qdd)
 
 
 def regressor_of(model: DynamicsModel, progress: Progress = silent) -> Regressor:

@@ -15,6 +15,7 @@ from psdmc.calibration.identify.quality import Quality
 from psdmc.calibration.identify.visibility import WEAK
 from psdmc.calibration.motions.excite import Excitation
 from psdmc.calibration.verdict.record import Calibration, NumberRow
+from psdmc.calibration.verdict.said_once import unsaid_warnings
 from psdmc.calibration.verdict.verdict import Verdict
 from psdmc.emit.render import environment
 from psdmc.report.calibrate_plots import excitation_figure, step_figure
@@ -89,7 +90,7 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
         robot=record.robot,
         summary=_summary(record),
         verdict=None if record.verdict is None else verdict_view(record.verdict),
-        warnings=record.warnings,
+        warnings=unsaid_warnings(record),
         notes=record.notes,
         accuracy_table=accuracy_table(record),
         parameter_table=parameter_table(record),
@@ -139,12 +140,22 @@ def _or_dash(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "–"
 
 
+def _logs(record: Calibration) -> str:
+    """Names, lengths and dates of the logs."""
+    rows = record.facts.get("data", [])
+    each = [
+        ", ".join(filter(None, [row["log"], f"{row['rows']:,} rows", f"{row['seconds']:.4g} s", row["date"]]))
+        for row in rows
+    ]
+    return f" Logs: {'; '.join(each)}." if each else ""
+
+
 def _summary(record: Calibration) -> str:
     seen = sum(row.identifiable for row in record.parameters)
     weak = sum(row.visibility == WEAK for row in record.parameters)
     return (
         f"Method: {record.method}. {seen} of {len(record.parameters)} base parameters identified, {weak} weakly visible, "
-        f"{len(record.joint_names)} joints."
+        f"{len(record.joint_names)} joints.{_logs(record)}"
     )
 
 
@@ -207,7 +218,7 @@ def fact_table(record: Calibration) -> str:
     """Ranks, condition numbers and the like."""
     return table(
         ["Quantity", "Value"],
-        [[name.replace("_", " "), _plain(value)] for name, value in record.facts.items()],
+        [[name.replace("_", " "), _plain(value)] for name, value in record.facts.items() if name != "data"],
     )
 
 

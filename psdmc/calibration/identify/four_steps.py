@@ -21,7 +21,8 @@ from psdmc.calibration.identify.steps import (
     InertialRun,
     MotorRun,
 )
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.log_checks import checked
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 
@@ -52,6 +53,16 @@ class FourSteps:
     def warnings(self) -> tuple[str, ...]:
         found = self.motor.warnings if self.motor is not None else ()
         return (*found, *self.gravity.warnings, *self.friction.warnings, *self.inertial.warnings)
+
+
+def checked_runs(chain: Chain, runs: Runs, options: CalibrationOptions) -> tuple[Log, ...]:
+    """All logs of a campaign; InputError where there are too few runs or a log cannot be used, before anything is fitted."""
+    _require_runs(runs)
+    logs = [(log, options.motor) for run in runs.motor for log in (run.unloaded, run.loaded)]
+    logs += [(run.log, options.gravity) for run in runs.gravity]
+    logs += [(run.log, options.friction) for run in runs.friction]
+    logs += [(run.log, options.inertial) for run in runs.inertial]
+    return tuple(checked(log, chain, step.filter.cutoff) for log, step in logs)
 
 
 def calibrate_four_steps(

@@ -33,6 +33,7 @@ class Log:
     quantity     current: of the motor; motor_torque: with friction; joint_torque: without
     notes        what reading it assumed
     sliding      names of joints whose position is in m, the others' being in rad; None: the log does not say
+    date         of the data, as far as the file tells; empty where it does not
     """
 
     name: str
@@ -44,6 +45,7 @@ class Log:
     quantity: Quantity
     notes: tuple[str, ...] = ()
     sliding: tuple[str, ...] | None = None
+    date: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joint_names", tuple(self.joint_names))

@@ -12,6 +12,7 @@ import numpy as np
 
 from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, LARGEST_STORED, decoding, opened
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_date import date_of
 from psdmc.calibration.logs.mcap_size import require_mcap_size
 from psdmc.calibration.logs.row_store import RowStore
 from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
@@ -49,25 +50,26 @@ def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) 
         if file.suffix.lower() == ".mcap":
             require_mcap_size(file)
     with decoding(str(path), "a ROS 2 bag"):
-        names, time, store, has_velocity = _kept(path, topic, held)
+        names, stamps, store, has_velocity = _kept(path, topic, held)
     name = path.name or str(path)
     n = len(names)
     log = StoredLog(
         name=name,
         joint_names=names,
-        time=time,
+        time=stamps - stamps[0],
         store=store,
         has_velocity=has_velocity,
         quantity="motor_torque",
         stored=n,
         places=tuple(range(n)),
         notes=(f"{name}: 'effort' is read as motor torque, friction included",),
+        date=date_of(float(stamps[0]), path),
     )
     return log if store.on_disk else log.held()
 
 
 def _kept(path: Path, topic: str, held: int | None) -> tuple[tuple[str, ...], Array, RowStore, bool]:
-    """Joints, time from the first message on, rows of position, velocity and effort, and whether all have a velocity."""
+    """Joints, time stamps, rows of position, velocity and effort, and whether all have a velocity."""
     most = LARGEST_ROWS if held is None else LARGEST_STORED_ROWS
     names: tuple[str, ...] = ()
     store, has_velocity = RowStore(0), True
@@ -95,7 +97,7 @@ def _kept(path: Path, topic: str, held: int | None) -> tuple[tuple[str, ...], Ar
         store.append(np.array(piece, dtype=np.float64))
     seconds, fraction = np.array(stamps, dtype=np.float64).T
     time = seconds + 1e-9 * fraction
-    return names, time - time[0], store, has_velocity
+    return names, time, store, has_velocity
 
 
 PIECE_MESSAGES = 4096

@@ -8,13 +8,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from psdmc.calibration.logs.log import Array, Log, Quantity
 from psdmc.calibration.logs.log_bag import BAGS, is_folder, read_bag
+from psdmc.calibration.logs.log_date import date_of
 from psdmc.calibration.logs.table_files import TABLES, read_columns, write_columns
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
@@ -50,7 +51,8 @@ def read_log(path: str | Path) -> Log:
         bag = read_bag(path)
         return bag if isinstance(bag, Log) else bag.held()
     require_format(path)
-    return log_from_columns(path.name, read_columns(path))
+    found = log_from_columns(path.name, read_columns(path))
+    return replace(found, date=date_of(float(found.time[0]) if len(found) else 0.0, path))
 
 
 def require_format(path: Path) -> None:

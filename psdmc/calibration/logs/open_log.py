@@ -10,6 +10,7 @@ import numpy as np
 from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED, opened
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_bag import BAGS, is_folder, read_bag
+from psdmc.calibration.logs.log_date import date_of
 from psdmc.calibration.logs.log_files import Layout, layout_of, read_log, require_format
 from psdmc.calibration.logs.row_store import HELD_BYTES, RowStore
 from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
@@ -51,7 +52,8 @@ def _stored(path: Path, size: int, progress: Progress, held: int) -> AnyLog:
             store.append(np.ascontiguousarray(piece[:, places]))
     if not times:
         raise InputError(f"{path}: no rows under its header", "record or export it again")
-    return log_of_store(layout, np.concatenate(times), store)
+    time = np.concatenate(times)
+    return log_of_store(layout, time, store, date_of(float(time[0]), path))
 
 
 def _counted(
@@ -69,7 +71,7 @@ def _counted(
         yield piece
 
 
-def log_of_store(layout: Layout, time: Array, store: RowStore) -> AnyLog:
+def log_of_store(layout: Layout, time: Array, store: RowStore, date: str) -> AnyLog:
     """The log whose positions, velocities and efforts are in a store; in memory where the store is."""
     log = StoredLog(
         name=layout.name,
@@ -82,5 +84,6 @@ def log_of_store(layout: Layout, time: Array, store: RowStore) -> AnyLog:
         places=tuple(range(len(layout.joint_names))),
         notes=layout.notes,
         sliding=layout.sliding,
+        date=date,
     )
     return log if store.on_disk else log.held()

@@ -29,6 +29,7 @@ class StoredLog:
     places: tuple[int, ...]
     notes: tuple[str, ...] = ()
     sliding: tuple[str, ...] | None = None
+    date: str = ""
 
     def __len__(self) -> int:
         return len(self.time)
@@ -67,7 +68,7 @@ class StoredLog:
 
     def held(self) -> Log:
         """The same log in memory."""
-        return replace(self.rows(0, len(self)), notes=self.notes)
+        return replace(self.rows(0, len(self)), notes=self.notes, date=self.date)
 
 
 AnyLog = Log | StoredLog

@@ -112,8 +112,13 @@ def _lacking(found: Findings) -> Iterator[str]:
     if named:
         yield (
             f"the model lacks an effect at joint(s) {listed(named)}: the residual is no sensor noise, "
-            "and standard deviations are widened for it"
+            f"and standard deviations are widened for it{_by_factor(found)}"
         )
+
+
+def _by_factor(found: Findings) -> str:
+    factor = found.record.facts.get("noise_factor")
+    return "" if factor is None else f", by a factor of up to {factor:.1f}"
 
 
 def _not_carried_over(found: Findings) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -22,6 +23,7 @@ from psdmc.calibration.identify.visibility import (
     weak_notes,
 )
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.verdict import Verdict
 from psdmc.errors import InternalError
 from psdmc.model.dynamics_model import DynamicsModel
@@ -166,6 +168,7 @@ def four_step_record(
         "inertial_condition": inertial.estimate.condition,
         "inertial_singular_values": inertial.estimate.singular_values.tolist(),
         "residual_correlation": _by_joint(model, inertial.estimate.correlation),
+        "noise_factor": max(gravity.estimate.noise_factor, inertial.estimate.noise_factor),
     }
     steps = {
         "motor": options.motor,
@@ -209,6 +212,7 @@ def linear_record(
         "condition": solved.condition,
         "singular_values": solved.singular_values.tolist(),
         "residual_correlation": _by_joint(model, solved.correlation),
+        "noise_factor": solved.noise_factor,
     }
     each = [(joint, name) for joint in model.joint_names for name in problem.friction]
     friction = tuple(
@@ -250,6 +254,12 @@ def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration
     provenance = {**record.model.provenance, "calibration": record.as_json()}
     theta = record.model.theta_b if theta_b is None else theta_b
     return replace(record, model=replace(record.model, theta_b=theta, provenance=provenance))
+
+
+def with_data(record: Calibration, logs: Sequence[AnyLog]) -> Calibration:
+    """The record that says which logs it is of."""
+    data = [{"log": log.name, "rows": len(log), "seconds": log.duration, "date": log.date} for log in logs]
+    return replace(record, facts={**record.facts, "data": data})
 
 
 def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:
