@@ -15,7 +15,7 @@ from psdmc.calibration.calibrate import CalibrateOptions
 from psdmc.calibration.campaign import CampaignOptions
 from psdmc.calibration.campaign_file import is_campaign
 from psdmc.calibration.identify.linear_fit import LinearOptions
-from psdmc.calibration.logs.filter import FilterOptions
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.motions.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
 from psdmc.calibration.simulate_campaign import SimulateOptions
 from psdmc.calibration.verdict.record import verdict_of

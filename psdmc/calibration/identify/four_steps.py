@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.calibration.identify.friction import FrictionResult, calibrate_friction
+from psdmc.calibration.identify.friction import FrictionResult, calibrate_friction, prepared_runs
 from psdmc.calibration.identify.gravity import GravityResult, calibrate_gravity, gravity_split
 from psdmc.calibration.identify.inertial import InertialResult, calibrate_inertial
 from psdmc.calibration.identify.motor import MotorResult, calibrate_motors
@@ -96,9 +96,8 @@ def calibrate_four_steps(
         )
         say("friction")
         known = split.from_phi() @ gravity.estimate.values
-        friction = calibrate_friction(
-            chain, model, motors, known, runs.friction, options.friction, options.lugre, friction
-        )
+        alone = prepared_runs(chain, model, motors, known, runs.friction, options.friction)
+        friction = calibrate_friction(alone, options.lugre, friction)
         say("inertia")
         inertial = calibrate_inertial(
             chain, model, motors, gravity, friction, runs.inertial, options.inertial, file_theta

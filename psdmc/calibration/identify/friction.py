@@ -40,23 +40,15 @@ class FrictionResult:
 
 
 def calibrate_friction(
-    chain: Chain,
-    model: Regressor,
-    motors: Motors,
-    theta_gravity: Array,
-    runs: Sequence[FrictionRun],
-    options: StepOptions,
-    lugre: FrictionOptions,
-    start: FrictionResult | None = None,
+    runs: Mapping[str, JointRun], lugre: FrictionOptions, start: FrictionResult | None = None
 ) -> FrictionResult:
     """LuGre friction of every joint that has a run.
 
-    theta_gravity  (l,)  a theta_b with the identified gravity parameters
-    start          an earlier pass, to start from instead of searching
+    runs    by joint, as `prepared_runs` makes them
+    start   an earlier pass, to start from instead of searching
     """
-    data = _prepared(chain, model, motors, theta_gravity, runs, options)
     earlier = start.joints if start is not None else {}
-    tasks = [(name, data[name], lugre, earlier.get(name)) for name in data]
+    tasks = [(name, run, lugre, earlier.get(name)) for name, run in runs.items()]
     found = {joint.joint: joint for joint in _fitted(tasks, lugre.workers)}
     warnings = tuple(
         f"joint {name}: friction parameter(s) not seen in the data: {', '.join(joint.unseen)}"
@@ -81,25 +73,17 @@ def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
     )
 
 
-def judge_friction(
-    chain: Chain,
-    model: Regressor,
-    motors: Motors,
-    theta_b: Array,
-    runs: Sequence[FrictionRun],
-    options: StepOptions,
-    joints: Mapping[str, JointFriction],
-) -> StepQuality:
-    """Friction of each joint alone against its run, relieved of these base parameters' gravity."""
+def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFriction]) -> StepQuality:
+    """Friction of each joint alone against its run, relieved of the base parameters' gravity that it was prepared with."""
     qualities, samples = {}, []
-    for name, data in _prepared(chain, model, motors, theta_b, runs, options).items():
+    for name, data in runs.items():
         if name in joints:
             qualities[name], sample = _judged(name, data, joints[name])
             samples.append(sample)
     return StepQuality("Friction", qualities, tuple(samples))
 
 
-def _prepared(
+def prepared_runs(
     chain: Chain,
     model: Regressor,
     motors: Motors,
@@ -107,7 +91,7 @@ def _prepared(
     runs: Sequence[FrictionRun],
     options: StepOptions,
 ) -> dict[str, JointRun]:
-    """The runs by joint, in the chain's order."""
+    """The runs by joint, in the chain's order, each beside its gravity by these base parameters."""
     places = {name: k for k, name in enumerate(chain.joint_names)}
     own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
     return {

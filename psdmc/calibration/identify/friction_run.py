@@ -11,9 +11,10 @@ from psdmc.calibration.identify.lugre import Lugre, friction_torque
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
 from psdmc.calibration.identify.steps import FrictionRun, StepOptions
-from psdmc.calibration.logs.filter import LowPass, States, filtered, held_out, thinned
+from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.low_pass import LowPass
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 

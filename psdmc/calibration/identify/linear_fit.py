@@ -19,17 +19,11 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.prior import base_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.logs.check_options import CheckOptions
-from psdmc.calibration.logs.filter import (
-    FilterOptions,
-    SplitOptions,
-    States,
-    held_out,
-    smoothed_rows,
-    stretches,
-)
+from psdmc.calibration.logs.filter import SplitOptions, States, held_out, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.row_store import HELD_BYTES
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.robot.chain import Chain

@@ -12,9 +12,10 @@ from psdmc.calibration.identify.predictor import payload_torque
 from psdmc.calibration.identify.quality import quality
 from psdmc.calibration.identify.residuals import widening
 from psdmc.calibration.identify.steps import JointQuality, MotorRun, Sample, StepOptions, StepQuality
-from psdmc.calibration.logs.filter import FilterOptions, away_from, filtered, held_out
+from psdmc.calibration.logs.filter import away_from, filtered, held_out
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.errors import InputError
 from psdmc.robot.chain import Chain
 

@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from psdmc.calibration.identify.steps import StepOptions
-from psdmc.calibration.logs.filter import FilterOptions, SplitOptions
+from psdmc.calibration.logs.filter import SplitOptions
+from psdmc.calibration.logs.low_pass import FilterOptions
 
 Law = Literal["linear", "lugre"]
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.least_squares import FitOptions
 from psdmc.calibration.identify.quality import Quality, quality
-from psdmc.calibration.logs.filter import FilterOptions, SplitOptions
+from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log import Array, Log
+from psdmc.calibration.logs.low_pass import FilterOptions
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,38 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import interpolate, signal
 
 from psdmc.calibration.logs.check_options import CheckOptions
+from psdmc.calibration.logs.even_grid import EvenGrid, even_grid, evenly_spaced
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
-from psdmc.calibration.logs.position_noise import noise_like, position_noise, resting
+from psdmc.calibration.logs.low_pass import FilterOptions, LowPass, memory
+from psdmc.calibration.logs.noticed import Noticed, noticed
+from psdmc.calibration.logs.position_noise import noise_like
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.errors import InputError
-
-SMALLEST_CUTOFF, LARGEST_CUTOFF = 0.01, 10_000.0
-"""Hz: a filter slower than minutes, or faster than any log of a robot, is a slip."""
-
-
-@dataclass(frozen=True, slots=True)
-class FilterOptions:
-    """Low-pass filtering as in Denso-2022 3.1: forwards and backwards, so that no phase is lost.
-
-    cutoff   Hz; the paper's: motor and gravity 4, friction 40, inertial 15
-    order    of the Butterworth filter that runs once each way
-    settle   cut-off periods dropped at either end, where the filter starts up
-    """
-
-    cutoff: float = 15.0
-    order: int = 8
-    settle: float = 3.0
-
-    def __post_init__(self) -> None:
-        if not SMALLEST_CUTOFF <= self.cutoff <= LARGEST_CUTOFF:
-            raise InputError(
-                f"cut-off is {self.cutoff:g} Hz, expected {SMALLEST_CUTOFF:g} to {LARGEST_CUTOFF:g} Hz",
-                "choose a value in that range",
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,28 +71,6 @@ class States:
         return self.q + draw, self.qd + rate, self.qdd + acceleration
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LowPass:
-    """A zero-phase Butterworth filter along axis 0, for one sample period."""
-
-    sections: Array
-
-    @staticmethod
-    def design(options: FilterOptions, period: float) -> LowPass:
-        nyquist = 0.5 / period
-        if options.cutoff >= nyquist:
-            raise InputError(
-                f"cut-off {options.cutoff:g} Hz is not below half the sampling rate, {nyquist:g} Hz",
-                "filter lower, or sample faster",
-            )
-        return LowPass(signal.butter(options.order, options.cutoff, fs=1.0 / period, output="sos"))
-
-    def __call__(self, values: Array) -> Array:
-        pad = min(len(values) - 1, 3 * (2 * len(self.sections) + 1) * 8)
-        filtered: Array = signal.sosfiltfilt(self.sections, values, axis=0, padlen=pad)
-        return filtered
-
-
 def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None) -> States:
     """States of a checked log, held whole; a joint that does no more than its sensor's noise gets exactly zero rates, so
     that it excites nothing."""
@@ -144,62 +100,13 @@ def stretches(
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
     found = noticed(log, grid, low_pass, options, check, rows)
-    reach = 2 * _memory(options.cutoff, grid.period)
+    reach = 2 * memory(options.cutoff, grid.period)
     every = independent_rows(grid, options, log)
     for start in range(0, grid.count, rows):
         wanted = every[(every >= start) & (every < start + rows)]
         if len(wanted):
             first, last = max(start - reach, 0), min(start + rows + reach, grid.count)
             yield Stretch(_states(log, grid, low_pass, found, options, first, last), wanted - first)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Noticed:
-    """Of a log's joints: sensor noise of a raw sample, zero where it rests; whether it rests, and where; and its motion,
-    peak to peak. (n,) each, rad or m."""
-
-    noise: Array
-    still: NDArray[np.bool_]
-    rest: Array
-    motion: Array
-
-
-def noticed(
-    log: AnyLog,
-    grid: EvenGrid,
-    low_pass: LowPass,
-    options: FilterOptions,
-    check: CheckOptions | None = None,
-    rows: int = STRETCH_ROWS,
-) -> Noticed:
-    """Noise and rest of every joint, from one pass over the log; the noise of long logs from evenly spread rows."""
-    reach, every = _memory(options.cutoff, grid.period), max(1, grid.count // NOISE_ROWS)
-    raw, smooth = [], []
-    n = len(log.joint_names)
-    total, bounds = np.zeros(n), np.array([[np.inf] * n, [-np.inf] * n, [np.inf] * n, [-np.inf] * n])
-    for start in range(0, grid.count, rows):
-        first, last = max(start - reach, 0), min(start + rows + reach, grid.count)
-        position, _ = evenly_spaced(log, grid, first, last)
-        own = slice(start - first, min(start + rows, grid.count) - first)
-        filtered_position = low_pass(position)[own]
-        position = position[own]
-        total += position.sum(axis=0)
-        for k, values in ((0, position), (2, filtered_position)):
-            bounds[k] = np.minimum(bounds[k], values.min(axis=0))
-            bounds[k + 1] = np.maximum(bounds[k + 1], values.max(axis=0))
-        raw.append(position[-start % every :: every])
-        smooth.append(filtered_position[-start % every :: every])
-    in_band = min(2.0 * options.cutoff * grid.period, 1.0)
-    position = np.concatenate(raw)
-    noise = position_noise(position, np.concatenate(smooth), in_band)
-    smallest = (check or CheckOptions()).smallest_motion
-    motion = bounds[1] - bounds[0]
-    still = resting(position, motion, bounds[3] - bounds[2], noise, in_band, smallest)
-    return Noticed(np.where(still, 0.0, noise), still, total / grid.count, motion)
-
-
-NOISE_ROWS = 500_000
-"""Rows from which sensor noise is taken; longer logs are judged by evenly spread ones."""
 
 
 def _states(
@@ -255,52 +162,6 @@ def independent_rows(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> NDA
     return np.arange(usable.start, usable.stop, _independent(options, grid.period), dtype=np.intp)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class EvenGrid:
-    """Times of a log's median period from its first row to its last, from zero.
-
-    same  whether the log's rows lie on them already
-    """
-
-    time: Array
-    same: bool
-
-    @property
-    def count(self) -> int:
-        return len(self.time)
-
-    @property
-    def period(self) -> float:
-        return float(self.time[1] - self.time[0])
-
-
-def even_grid(log: AnyLog) -> EvenGrid:
-    """A log's even grid."""
-    count = round(log.duration / log.period) + 1
-    even = np.linspace(0.0, log.duration, count)
-    same = count == len(log) and bool(np.abs(even - (log.time - log.time[0])).max() < 1e-6 * log.period)
-    return EvenGrid(even, same)
-
-
-NEIGHBOURS = 4
-"""Rows on either side that interpolation between rows may look at: its slopes take one."""
-
-
-def evenly_spaced(log: AnyLog, grid: EvenGrid, first: int, last: int) -> tuple[Array, Array]:
-    """Position and effort at rows first to last of the grid; rows that are even already stay as they are."""
-    if grid.same:
-        part = log.rows(first, last)
-        return part.position, part.effort
-    wanted = grid.time[first:last]
-    begin, end = np.searchsorted(log.time - log.time[0], wanted[[0, -1]])
-    part = log.rows(max(int(begin) - NEIGHBOURS, 0), int(end) + NEIGHBOURS)
-    time = part.time - log.time[0]
-    return (
-        np.asarray(interpolate.PchipInterpolator(time, part.position)(wanted)),
-        np.asarray(interpolate.PchipInterpolator(time, part.effort)(wanted)),
-    )
-
-
 def central_differences(q: Array, period: float) -> tuple[Array, Array]:
     """Speed and acceleration without phase: (q[k+1] - q[k-1]) / 2T and (q[k+1] - 2 q[k] + q[k-1]) / T^2."""
     qd, qdd = np.zeros_like(q), np.zeros_like(q)
@@ -337,9 +198,6 @@ def _independent(options: FilterOptions, period: float) -> int:
 
 BLOCK_ROWS = 16384
 """Rows that are filtered at once."""
-MEMORY_CYCLES = 30.0
-"""Cut-off periods after which the filter has forgotten a sample to rounding: its slowest pole decays by
-exp(-2 pi sin(pi / (2 order))) a period, which is to 0.29 at order 8."""
 
 
 def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice], Array]) -> Array:
@@ -349,7 +207,7 @@ def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice]
     The same as filtering all rows at once, but for what the filter remembers beyond MEMORY_CYCLES.
     """
     count = len(states.time)
-    margin = _memory(states.cutoff, states.period)
+    margin = memory(states.cutoff, states.period)
     parts = []
     for start in range(0, count, BLOCK_ROWS):
         wanted = at[(at >= start) & (at < start + BLOCK_ROWS)]
@@ -358,11 +216,6 @@ def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice]
         first, last = max(start - margin, 0), min(start + BLOCK_ROWS + margin, count)
         parts.append(_by_column(states.low_pass, values(slice(first, last)), wanted - first))
     return np.concatenate(parts)
-
-
-def _memory(cutoff: float, period: float) -> int:
-    """Rows after which the filter has forgotten one."""
-    return int(np.ceil(MEMORY_CYCLES / cutoff / period))
 
 
 def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Array:

@@ -20,8 +20,28 @@ LARGEST_NUMBER = 1e20
 """In any unit: what is beyond it is no time, angle or torque, and its square would soon overflow."""
 
 
+class Timed:
+    """What rows with a time have: their number, and how long and how far apart they are."""
+
+    __slots__ = ()
+    time: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def duration(self) -> float:
+        """s from the first row to the last."""
+        return float(self.time[-1] - self.time[0]) if len(self) else 0.0
+
+    @property
+    def period(self) -> float:
+        """s between rows: the median."""
+        return float(np.median(np.diff(self.time))) if len(self) > 1 else np.inf
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Log:
+class Log(Timed):
     """Samples of one run. N rows, n joints.
 
     name         how messages call it
@@ -58,19 +78,6 @@ class Log:
         if self.quantity not in QUANTITIES:
             raise InputError(f"{self.name}: quantity {self.quantity!r}", f"known are {', '.join(QUANTITIES)}")
 
-    def __len__(self) -> int:
-        return len(self.time)
-
-    @property
-    def duration(self) -> float:
-        """s from the first row to the last."""
-        return float(self.time[-1] - self.time[0]) if len(self) else 0.0
-
-    @property
-    def period(self) -> float:
-        """s between rows: the median."""
-        return float(np.median(np.diff(self.time))) if len(self) > 1 else np.inf
-
     def ordered(self, joint_names: tuple[str, ...]) -> Log:
         """The same log with its columns in the order of these joints; InputError names every joint that is missing."""
         columns = places_of(self.name, self.joint_names, joint_names)
@@ -89,18 +96,10 @@ class Log:
 
     def rows(self, start: int, stop: int) -> Log:
         """Some rows as a log of their own."""
-        velocity = None if self.velocity is None else self.velocity[start:stop]
-        return replace(
-            self,
-            time=self.time[start:stop],
-            position=self.position[start:stop],
-            velocity=velocity,
-            effort=self.effort[start:stop],
-        )
+        return self.at(slice(start, stop))
 
-    def between(self, start: float, end: float) -> Log:
-        """The rows with start <= time < end, s."""
-        rows = (self.time >= start) & (self.time < end)
+    def at(self, rows: slice | NDArray[np.bool_]) -> Log:
+        """The rows that a slice or a mask names."""
         velocity = None if self.velocity is None else self.velocity[rows]
         return replace(
             self,
@@ -109,6 +108,10 @@ class Log:
             velocity=velocity,
             effort=self.effort[rows],
         )
+
+    def between(self, start: float, end: float) -> Log:
+        """The rows with start <= time < end, s."""
+        return self.at((self.time >= start) & (self.time < end))
 
 
 def places_of(log: str, found: tuple[str, ...], wanted: tuple[str, ...]) -> list[int]:

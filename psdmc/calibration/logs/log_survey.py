@@ -11,7 +11,7 @@ from psdmc.calibration.logs.stored_log import AnyLog
 
 STRETCH_ROWS = 32_768
 """Rows that are looked at, filtered and fitted at once."""
-MOST_SLOPES = 1_000_000
+MOST_SLOPES = 200_000
 """Rows of which slopes are ranked; longer logs are judged by evenly spread ones."""
 FAST_SHARE = 0.99
 """Of the slopes; those above are noise."""
@@ -67,7 +67,7 @@ def surveyed(log: AnyLog) -> Survey:
     low, high, reach = np.full(n, np.inf), np.full(n, -np.inf), np.zeros(n)
     power, by_velocity, has_velocity = np.zeros(n), np.zeros(n), False
     largest, at_largest = np.zeros(n), np.zeros(n)
-    every = max(1, len(log) // MOST_SLOPES)
+    every = -(-len(log) // MOST_SLOPES)
     slopes: list[Array] = []
     with np.errstate(all="ignore"):
         for start in range(0, len(log), STRETCH_ROWS):

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from psdmc.calibration.logs.log import Array, Log, Quantity, places_of
+from psdmc.calibration.logs.log import Array, Log, Quantity, Timed, places_of
 from psdmc.calibration.logs.row_store import RowStore
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StoredLog:
+class StoredLog(Timed):
     """A Log's fields; position, velocity and effort are read with `rows`. N rows, n joints.
 
     time    (N,)  s, held in memory
@@ -30,19 +28,6 @@ class StoredLog:
     notes: tuple[str, ...] = ()
     sliding: tuple[str, ...] | None = None
     date: str = ""
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-    @property
-    def duration(self) -> float:
-        """s from the first row to the last."""
-        return float(self.time[-1] - self.time[0]) if len(self) else 0.0
-
-    @property
-    def period(self) -> float:
-        """s between rows: the median."""
-        return float(np.median(np.diff(self.time))) if len(self) > 1 else np.inf
 
     def ordered(self, joint_names: tuple[str, ...]) -> StoredLog:
         """The same log with its columns in the order of these joints; InputError names every joint that is missing."""

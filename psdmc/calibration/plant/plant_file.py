@@ -47,17 +47,17 @@ LARGEST_PLANT = 100
 
 @dataclass(frozen=True, slots=True)
 class JointTruth:
-    """One joint's motor and friction: K_t (N m/A) and the seven LuGre parameters of (12) to (14), SI."""
+    """One joint's motor and friction: K_t (N m/A) and the seven LuGre parameters in the order of (12) to (14), SI."""
 
     name: str
     torque_constant: float
+    stiffness: float
     coulomb: float
     static: float
     stribeck_velocity: float
+    damping: float
     viscous: float
     viscous_exponent: float
-    stiffness: float
-    damping: float
 
     def bristle_limit(self, v: float) -> float:
         """g(v), (13)."""

@@ -34,14 +34,7 @@ def swapped(log: Log, first: int, second: int, columns: Sequence[str]) -> Log:
 
 def decimated(log: Log, every: int) -> Log:
     """Each so many-th row."""
-    velocity = None if log.velocity is None else log.velocity[::every]
-    return replace(
-        log,
-        time=log.time[::every],
-        position=log.position[::every],
-        velocity=velocity,
-        effort=log.effort[::every],
-    )
+    return log.at(slice(None, None, every))
 
 
 def noise_only(log: Log, seed: int = 0) -> Log:

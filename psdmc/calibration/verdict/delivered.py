@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.calibration.identify.four_steps import Runs
-from psdmc.calibration.identify.friction import FrictionResult, judge_friction
+from psdmc.calibration.identify.friction import FrictionResult, judge_friction, prepared_runs
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import judge_gravity
 from psdmc.calibration.identify.inertial import judge_inertial
@@ -138,11 +138,12 @@ def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
     regressor = ChainRegressor(found.model)
     friction = _lugre(found)
     joints = friction.joints
+    alone = prepared_runs(chain, regressor, motors, theta, runs.friction, steps["friction"])
     motor = (judge_motors(chain, runs.motor, steps["motor"], _identified(found)),) if runs.motor else ()
     return (
         *motor,
         judge_gravity(chain, regressor, motors, runs.gravity, steps["gravity"], theta),
-        judge_friction(chain, regressor, motors, theta, runs.friction, steps["friction"], joints),
+        judge_friction(alone, joints),
         *judge_inertial(chain, regressor, motors, theta, friction, runs.inertial, steps["inertial"]),
     )
 

@@ -10,9 +10,10 @@ import numpy as np
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.logs.filter import FilterOptions, stretches
+from psdmc.calibration.logs.filter import stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.model.dynamics_model import DynamicsModel
 

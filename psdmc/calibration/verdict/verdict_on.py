@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.logs.filter import FilterOptions
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.evidence import Motion, evidence_of
 from psdmc.calibration.verdict.findings import Demand

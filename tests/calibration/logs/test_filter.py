@@ -7,16 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psdmc.calibration.logs.filter import (
-    FilterOptions,
-    LowPass,
-    SplitOptions,
-    central_differences,
-    filtered,
-    held_out,
-    thinned,
-)
+from psdmc.calibration.logs.filter import SplitOptions, central_differences, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
 from psdmc.errors import InputError
 
 PERIOD = 1e-3

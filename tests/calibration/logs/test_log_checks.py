@@ -10,6 +10,7 @@ import pytest
 
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.plant.spoiled import decimated
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot
@@ -106,27 +107,13 @@ def test_a_wrong_unit_of_time_is_named_and_so_is_the_remedy(
 
 
 def test_a_wrong_unit_of_time_is_told_from_real_slowness_by_the_velocity(arm, log: Log):
-    rows = slice(None, None, 250)
-    slow = replace(
-        log,
-        time=log.time[rows],
-        position=log.position[rows],
-        velocity=log.velocity[rows],
-        effort=log.effort[rows],
-    )
+    slow = decimated(log, 250)
 
     assert "sampling at 1 Hz is too slow" in message(arm, slow)
 
 
 def test_thirty_hertz_are_enough_where_the_cut_off_suits(arm, log: Log):
-    rows = slice(None, None, 8)
-    slow = replace(
-        log,
-        time=log.time[rows],
-        position=log.position[rows],
-        velocity=log.velocity[rows],
-        effort=log.effort[rows],
-    )
+    slow = decimated(log, 8)
 
     assert len(checked(slow, arm.model.chain, 7.5)) == 375
     with pytest.raises(InputError) as raised:

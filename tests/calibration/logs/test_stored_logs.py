@@ -12,10 +12,12 @@ from calibration.conftest import smooth_log
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
 from psdmc.calibration.identify.linear_fit import LinearOptions
 from psdmc.calibration.logs import table_pieces
-from psdmc.calibration.logs.filter import FilterOptions, even_grid, filtered, independent_rows, stretches
+from psdmc.calibration.logs.even_grid import even_grid
+from psdmc.calibration.logs.filter import filtered, independent_rows, stretches
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_files import read_log, write_log
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.open_log import open_log
 from psdmc.calibration.logs.row_store import RowStore
 from psdmc.calibration.logs.stored_log import StoredLog

@@ -14,14 +14,16 @@ from shared_data import UR10_LOG
 from test_four_steps import with_logs
 from test_ur10 import model as ur10_model  # noqa: F401  a fixture
 
-from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_campaign
+from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_campaign, calibrate_logs
 from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.identify.linear_fit import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import InertialRun
 from psdmc.calibration.logs.filter import filtered, smoothed_rows, thinned
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.logs.log_files import read_log, write_log
+from psdmc.calibration.logs.open_log import open_log
+from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.cli import main
@@ -203,3 +205,19 @@ def test_a_campaign_that_shows_little_keeps_the_files_values(
     assert record.parameters[2].identifiable
     assert any("theta_7: not visible" in warning for warning in record.warnings)
     require_delivered(record, poor, tmp_path, capsys)
+    require_package(record, tmp_path)
+
+
+def test_a_log_of_currents_in_pieces(arm, log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    constants = {"shoulder": 12.0, "elbow": 5.0}
+    currents = replace(log, effort=log.effort / [12.0, 5.0], quantity="current")
+    write_log(currents, tmp_path / "currents.csv")
+    stored = open_log(tmp_path / "currents.csv", held=10_000)
+    assert isinstance(stored, StoredLog)
+
+    options = CalibrateOptions()
+    record = calibrate_logs(arm.model, [stored], options, arm.regressor, constants, lambda step: None)
+
+    require_delivered(record, [stored], tmp_path, capsys)
+    require_delivered(record, [currents], tmp_path, capsys)
+    require_package(record, tmp_path)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.identify.motor_model import Motors
-from psdmc.calibration.logs.filter import FilterOptions
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.plant.spoiled import noise_only, scaled, turned
 from psdmc.calibration.verdict.evidence import Evidence, Motion, evidence_of
 from psdmc.calibration.verdict.gains import Gain, friction_powers, joint_gains

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from psdmc.calibration.identify.motor_model import Motors
-from psdmc.calibration.logs.filter import FilterOptions
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.plant.spoiled import ALL, MOVED, noise_only, scaled, swapped, turned
 from psdmc.calibration.verdict.evidence import Motion, evidence_of
 from psdmc.calibration.verdict.suspect_words import cycles, exchanges, in_words

@@ -1,0 +1,67 @@
+"""The zero-phase low-pass: its options, its design for a sampling rate, and how long it remembers a sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from psdmc.calibration.logs.log import Array
+from psdmc.errors import InputError
+
+SMALLEST_CUTOFF, LARGEST_CUTOFF = 0.01, 10_000.0
+"""Hz: a filter slower than minutes, or faster than any log of a robot, is a slip."""
+
+
+@dataclass(frozen=True, slots=True)
+class FilterOptions:
+    """Low-pass filtering as in Denso-2022 3.1: forwards and backwards, so that no phase is lost.
+
+    cutoff   Hz; the paper's: motor and gravity 4, friction 40, inertial 15
+    order    of the Butterworth filter that runs once each way
+    settle   cut-off periods dropped at either end, where the filter starts up
+    """
+
+    cutoff: float = 15.0
+    order: int = 8
+    settle: float = 3.0
+
+    def __post_init__(self) -> None:
+        if not SMALLEST_CUTOFF <= self.cutoff <= LARGEST_CUTOFF:
+            raise InputError(
+                f"cut-off is {self.cutoff:g} Hz, expected {SMALLEST_CUTOFF:g} to {LARGEST_CUTOFF:g} Hz",
+                "choose a value in that range",
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LowPass:
+    """A zero-phase Butterworth filter along axis 0, for one sample period."""
+
+    sections: Array
+
+    @staticmethod
+    def design(options: FilterOptions, period: float) -> LowPass:
+        nyquist = 0.5 / period
+        if options.cutoff >= nyquist:
+            raise InputError(
+                f"cut-off {options.cutoff:g} Hz is not below half the sampling rate, {nyquist:g} Hz",
+                "filter lower, or sample faster",
+            )
+        return LowPass(signal.butter(options.order, options.cutoff, fs=1.0 / period, output="sos"))
+
+    def __call__(self, values: Array) -> Array:
+        pad = min(len(values) - 1, 3 * (2 * len(self.sections) + 1) * 8)
+        filtered: Array = signal.sosfiltfilt(self.sections, values, axis=0, padlen=pad)
+        return filtered
+
+
+MEMORY_CYCLES = 30.0
+"""Cut-off periods after which the filter has forgotten a sample to rounding: its slowest pole decays by
+exp(-2 pi sin(pi / (2 order))) a period, which is to 0.29 at order 8."""
+
+
+def memory(cutoff: float, period: float) -> int:
+    """Rows after which the filter has forgotten one."""
+    return int(np.ceil(MEMORY_CYCLES / cutoff / period))
