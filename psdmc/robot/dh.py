@@ -198,7 +198,7 @@ def _limits(value: object, joint: JointType, where: str, problems: list[str]) ->
     convert = partial(angle, accepted=limits.ANY) if joint.position_unit == "rad" else finite
     lower, upper = table.read("position", _range_of(convert), (-math.inf, math.inf))
     speed, acceleration, effort = (
-        table.read(key, reader, math.inf)
+        table.read(key, _not_negative(reader), math.inf)
         for key, reader in (("speed", convert), ("acceleration", convert), ("effort", finite))
     )
     return Limits(lower, upper, speed, acceleration, effort)
@@ -208,7 +208,7 @@ def _link(value: object, where: str, problems: list[str]) -> DhLink:
     table = _Table(value, where, LINK_KEYS, problems)
     inertia = _Table(table.read("inertia_com", _same, {}), f"{where} inertia_com", INERTIA_NAMES, problems)
     return DhLink(
-        mass=table.read("mass", _not_negative(limits.MASS), UNKNOWN),
+        mass=table.read("mass", _not_negative(within(limits.MASS)), UNKNOWN),
         com=table.read("com", _triple_of(LENGTH), (UNKNOWN,) * 3),
         inertia_com=tuple(inertia.read(name, within(limits.INERTIA), UNKNOWN) for name in INERTIA_NAMES),
         zero=table.read("zero", _zero_names, ()),
@@ -250,9 +250,9 @@ def _triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]
     return read
 
 
-def _not_negative(accepted: Range) -> Callable[[object], float]:
+def _not_negative(convert: Callable[[object], float]) -> Callable[[object], float]:
     def read(value: object) -> float:
-        number = within(accepted)(value)
+        number = convert(value)
         if number < 0.0:
             raise ValueError(f"found {number:g}, expected no less than zero")
         return number
@@ -261,7 +261,7 @@ def _not_negative(accepted: Range) -> Callable[[object], float]:
 
 
 def _drive_inertia(value: object) -> float:
-    return UNKNOWN if value == "unknown" else _not_negative(limits.DRIVE_INERTIA)(value)
+    return UNKNOWN if value == "unknown" else _not_negative(within(limits.DRIVE_INERTIA))(value)
 
 
 def _zero_names(value: object) -> tuple[str, ...]:

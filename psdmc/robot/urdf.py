@@ -254,7 +254,8 @@ def _limits(joint: Element, kind: str) -> Limits:
     if element is None:
         return Limits()
     speed, effort, acceleration = (
-        number(element, name, math.inf, limits.ANY) for name in ("velocity", "effort", "acceleration")
+        number(element, name, math.inf, limits.ANY, is_magnitude=True)
+        for name in ("velocity", "effort", "acceleration")
     )
     written = element.get("lower") is not None or element.get("upper") is not None
     lower, upper = (number(element, name, 0.0, limits.ANY) for name in ("lower", "upper"))

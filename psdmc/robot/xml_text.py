@@ -65,8 +65,14 @@ def numbers(
     return tuple(finite)
 
 
-def number(element: Element | None, attribute: str, default: float, accepted: Range) -> float:
-    return numbers(element, attribute, (default,), accepted)[0]
+def number(
+    element: Element | None, attribute: str, default: float, accepted: Range, *, is_magnitude: bool = False
+) -> float:
+    """One number; with `is_magnitude`, ValueError where it is negative."""
+    value = numbers(element, attribute, (default,), accepted)[0]
+    if is_magnitude and value < 0.0 and element is not None:
+        raise ValueError(f"<{element.tag}> {attribute}='{value:g}' is negative, expected no less than zero")
+    return value
 
 
 def required_number(element: Element | None, tag: str, attribute: str, accepted: Range) -> float:

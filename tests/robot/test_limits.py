@@ -67,6 +67,16 @@ def refused(call, *arguments, **options) -> str:
         ('rpy="0 0 0"', 'rpy="0 1e155 0"', "joint 'shoulder': <origin> rpy='0 1e155 0' is out of range"),
         ('xyz="0 0 1"', 'xyz="0 0 1e155"', "joint 'shoulder': <axis> xyz='0 0 1e155' is out of range"),
         ('xyz="0 0 1"', 'xyz="0 0 1e-160"', "joint 'shoulder': length of <axis>, 1e-160, is out of range"),
+        (
+            'velocity="3"',
+            'velocity="-3"',
+            "joint 'shoulder': <limit> velocity='-3' is negative, expected no less than zero",
+        ),
+        (
+            'effort="40"',
+            'effort="-40"',
+            "joint 'shoulder': <limit> effort='-40' is negative, expected no less than zero",
+        ),
     ],
 )
 def test_absurd_numbers_of_a_urdf(plain: str, changed: str, said: str):
@@ -93,6 +103,16 @@ def test_absurd_numbers_of_a_urdf(plain: str, changed: str, said: str):
         ),
         ("link = { com = [0, 1e155, 0] }", "joint 'j' link: com: 1e+155 is out of range"),
         ("link = { inertia_com = { xx = 1e300 } }", "joint 'j' link inertia_com: xx: 1e+300 is out of range"),
+        ("limits = { speed = -1 }", "joint 'j' limits: speed: found -1, expected no less than zero"),
+        (
+            'limits = { speed = "-90 deg" }',
+            "joint 'j' limits: speed: found -1.5708, expected no less than zero",
+        ),
+        ("limits = { effort = -1.5 }", "joint 'j' limits: effort: found -1.5, expected no less than zero"),
+        (
+            "limits = { acceleration = -2 }",
+            "joint 'j' limits: acceleration: found -2, expected no less than zero",
+        ),
         ("limits = { speed = nan }", "joint 'j' limits: speed: found nan, expected a finite number"),
         ("a = " + "9" * 400, "joint 'j': a: found 99999"),
         ("a = " + "9" * 5000, "not a TOML file: Exceeds the limit"),
