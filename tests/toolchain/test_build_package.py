@@ -127,8 +127,29 @@ def test_a_self_test_that_dies_is_not_called_failed_checks(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name", ["inverse_dynamics", "forward_dynamics_theta"])
 def test_a_self_test_does_not_let_a_nan_pass(name: str, tmp_path: Path) -> None:
-    with pytest.raises(ToolchainError, match=rf"{name}, rows: error inf"):
+    with pytest.raises(ToolchainError, match=rf"{name}, rows: error nan"):
         build_package(_emit(tmp_path / "arm", _spoilt(name, np.nan)))
+
+
+@pytest.mark.parametrize("flags", ["-O2", "-Ofast"])
+@pytest.mark.parametrize("value", ["NAN", "INFINITY"])
+def test_a_function_that_gives_no_number_fails_whatever_the_compiler_assumes(
+    value: str, flags: str, tmp_path: Path
+) -> None:
+    """-ffast-math makes isnan false, and comparisons with a NaN anything."""
+    folder = _emit(tmp_path / "arm")
+    source = folder / "src" / "inverse_dynamics.c"
+    body = '#include "inverse_dynamics.inc"\n'
+    text = source.read_text().replace(body, f"{body}    tau[0] = (double){value};\n", 1)
+    source.write_text(f"#include <math.h>\n{text}")
+    done = subprocess.run(
+        ["make", "-s", "-C", str(folder), "check", f"CFLAGS={flags}"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "inverse_dynamics, one state: error nan, tolerance 1e-10: FAILED" in done.stdout
 
 
 def test_the_self_test_checks_whatever_was_emitted(tmp_path: Path) -> None:
