@@ -97,7 +97,9 @@ def test_lowered_trees_are_pinocchios(name: str, kinds: str, parallel: bool) -> 
     tree = RandomTree(14, TREES[name], kinds, parallel)
     model = derived(tree, expand=False)
     made = lower(
-        model, "factored", ("inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian", "regressor")
+        model,
+        "factored",
+        ("inverse_dynamics", "forward_dynamics", "mass_matrix", "nonlinear_effects", "jacobian", "regressor"),
     )
     q, qd, qdd = tree.states(20, 3)
     tau = tree.each(pin.rnea, q, qd, qdd)
@@ -121,6 +123,10 @@ def test_lowered_trees_are_pinocchios(name: str, kinds: str, parallel: bool) -> 
     np.testing.assert_allclose(run("inverse_dynamics", "tau", n), tau, atol=1e-10)
     np.testing.assert_allclose(run("inverse_dynamics_theta", "tau", n), tau, atol=1e-10)
     np.testing.assert_allclose(run("forward_dynamics", "qdd", n), qdd, atol=1e-7)
+    M = run("mass_matrix", "M", n * n).reshape(20, n, n)
+    h = run("nonlinear_effects", "h", n)
+    np.testing.assert_allclose(np.einsum("sij,sj->si", M, qdd) + h, tau, atol=1e-10)
+    np.testing.assert_allclose(h, tree.each(pin.nonLinearEffects, q, qd), atol=1e-10)
     rows = run("regressor", "Y", n * model.l).reshape(20, n, model.l)
     np.testing.assert_allclose(rows @ model.theta_b, tau, atol=1e-10)
     chain = model.chain
