@@ -22,8 +22,9 @@ from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, joint_frame_map
+from psdmc.functions import RECIPES
 from psdmc.lower import expanded
-from psdmc.lower.factored import Arrangement, trace_dynamics, trace_regressor
+from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.reframe import reframe
 from psdmc.lower.search import SINGLE, Search, all_feet
 from psdmc.model.dynamics_model import DynamicsModel
@@ -36,6 +37,7 @@ from psdmc.program.trace import Tracer
 from psdmc.robot.chain import Chain
 
 TEN = slice(0, 10)
+INVERSE = RECIPES["inverse_dynamics"]
 Row = tuple[str, Sequence[int | str]]
 
 
@@ -56,8 +58,7 @@ def choices(robot: str) -> Iterator[Row]:
     search = Search(chain, model.representative, model.theta_b)
 
     def best(candidates: Iterator[Arrangement]) -> int:
-        assert model.theta_b is not None
-        return min(operations(trace_dynamics("inverse_dynamics", one, model.theta_b)) for one in candidates)
+        return min(operations(trace_dynamics(INVERSE, one, search.robot)) for one in candidates)
 
     first = next(search.starts(("previous",) * len(chain)))
     compound, fold = Choices(compound=True), Choices(compound=True, fold=True)
@@ -71,11 +72,10 @@ def choices(robot: str) -> Iterator[Row]:
         "where frames sit on their axes",
         [best(one for feet in all_feet(chain) for one in search.starts(feet))],
     )
-    found = search.best("inverse_dynamics", SINGLE)
-    assert model.theta_b is not None
+    found = search.best(INVERSE, SINGLE)
     yield (
         "unit of length, carriers exchanged by cost",
-        [operations(trace_dynamics("inverse_dynamics", found, model.theta_b))],
+        [operations(trace_dynamics(INVERSE, found, search.robot))],
     )
 
 
@@ -110,17 +110,17 @@ def programs_of(robot: str) -> dict[str, Program]:
     model = derive_model(standard_chains()[robot]())
     assert model.theta_b is not None
     search = Search(model.chain, model.representative, model.theta_b)
-    found = search.best("inverse_dynamics", SINGLE)
+    found = search.best(INVERSE, SINGLE)
     programs = {
-        "inverse": trace_dynamics("inverse_dynamics", found, model.theta_b),
-        "with theta": trace_dynamics("inverse_dynamics", found, None),
-        "forward": trace_dynamics("forward_dynamics", found, model.theta_b),
-        "mass": trace_dynamics("mass_matrix", found, model.theta_b),
-        "regressor": trace_regressor("regressor", found.reframed, model.representative),
+        "inverse": trace_dynamics(RECIPES["inverse_dynamics"], found, search.robot),
+        "with theta": trace_dynamics(INVERSE, found, replace(search.robot, theta_b=None)),
+        "forward": trace_dynamics(RECIPES["forward_dynamics"], found, search.robot),
+        "mass": trace_dynamics(RECIPES["mass_matrix"], found, search.robot),
+        "regressor": trace_geometry(RECIPES["regressor"], found.reframed, search.robot),
     }
     if model.p is not None and model.p <= EXPANDED_LIMIT:
         with patch.object(expanded, "optimize", lambda program: program):
-            programs["expanded"] = expanded.lower_expanded(model, "inverse_dynamics", False)
+            programs["expanded"] = expanded.lower_expanded(model, INVERSE, False)
     return programs
 
 

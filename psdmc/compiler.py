@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions, Real, Trig
 from psdmc.emit.package import PackageView, package_files, package_view
+from psdmc.emit.reference_states import reference_states
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError
-from psdmc.lower.admitted import require_forward_dynamics
-from psdmc.lower.kernels import Lowering, lower
+from psdmc.lower.admitted import require
+from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.reference_states import reference_states
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.kept_kernels import lowered_once
@@ -100,8 +100,8 @@ def emit_c(
     """Write the model's C package; returns the files that changed.
 
     lowering   which arithmetic: "auto" takes the cheaper per function
-    functions  names of functions to generate; None: all. InputError where theta_b is known and the mass matrix is
-               not positive definite within the joint limits, unless forward_dynamics is left out
+    functions  names of functions to generate; None: psdmc.functions.DEFAULT. InputError where theta_b is known and the
+               mass matrix is not positive definite within the joint limits, unless forward_dynamics is left out
     real       precision of the package
     trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"
     name       the robot's name in C; None: the robot's own
@@ -128,7 +128,7 @@ def compile(
         progress("compiling")
         return package
 
-    parts = (model.content_hash, lowering, real, trig, *_wanted(functions))
+    parts = (model.content_hash, lowering, real, trig, *wanted(functions))
     return CompiledRobot(*compiled_once(parts, make))
 
 
@@ -140,18 +140,13 @@ def _package(
     name: str | None,
     progress: Progress,
 ) -> PackageView:
-    require_forward_dynamics(model, functions)
+    names = wanted(functions)
+    require(model, names)
     kernels = lowered_once(
-        (model.content_hash, lowering, *_wanted(functions)),
-        lambda: lower(model, lowering, functions, progress),
+        (model.content_hash, lowering, *names), lambda: lower(model, lowering, names, progress)
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
-    return package_view(package_info(model, name, shown), kernels, options, reference_states(model))
-
-
-def _wanted(functions: Sequence[str] | None) -> tuple[str, ...]:
-    """The functions as part of a cache key."""
-    return ("all",) if functions is None else ("some", *functions)
+    return package_view(package_info(model, name, shown), kernels, options, reference_states(model, names))
 
 
 def _options(lowering: str, real: Real, trig: Trig) -> EmitOptions:

@@ -16,11 +16,13 @@ MAY_IMPORT = {
     "dynamics": {"robot"},
     "model": {"robot", "dynamics"},
     "derivation": {"robot", "dynamics", "model"},
-    "verification": {"robot", "dynamics", "model"},
     "program": set(),
-    "lower": {"robot", "dynamics", "model", "program"},
-    "emit": {"program", "model"},
-    "toolchain": {"emit", "program"},
+    "recipes": {"robot", "dynamics", "model", "program"},
+    "functions": {"robot", "dynamics", "model", "program", "recipes"},
+    "verification": {"robot", "dynamics", "model", "program", "recipes", "functions"},
+    "lower": {"robot", "dynamics", "model", "program", "recipes", "functions"},
+    "emit": {"robot", "program", "model", "recipes", "functions"},
+    "toolchain": {"emit", "program", "functions"},
 }
 LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {
@@ -38,6 +40,8 @@ OUTSIDE = {
     "derivation": {"numpy", "scipy"},
     "verification": {"numpy"},
     "program": {"numpy"},
+    "recipes": {"numpy"},
+    "functions": {"numpy", "pinocchio"},
     "lower": {"numpy", "scipy"},
     "emit": {"jinja2", "numpy"},
     "toolchain": {"cffi", "numpy"},

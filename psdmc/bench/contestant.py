@@ -43,7 +43,7 @@ class Contestant:
     """One function of one library.
 
     rival         who: 'psdmc factored', 'Pinocchio' ...
-    function      name in psdmc/program/functions.py
+    function      name in psdmc/functions
     library       shared library that exports `symbol`_throughput and so on
     outputs       numbers per state that it puts out
     variant       which of its ways, '' where there is one

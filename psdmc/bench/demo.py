@@ -15,14 +15,14 @@ from psdmc.bench.case import Case
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import Settings, run
 from psdmc.errors import exit_status_of
+from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
-from psdmc.robot.chain import Array
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.verification.check import source_of
 
-FUNCTIONS = ("inverse_dynamics", "forward_dynamics", "mass_matrix", "nonlinear_effects", "gravity")
+FUNCTIONS = tuple(name for name, recipe in RECIPES.items() if recipe.benched and not recipe.times_theta)
 OURS, THEIRS = "psdmc factored", "Pinocchio"
 SETTINGS = Settings(rounds=3, rivals=(OURS, THEIRS), functions=FUNCTIONS)
 """Fewer trials than `make bench`: a look, not a record."""
@@ -48,20 +48,14 @@ def errors_against_pinocchio(model: DynamicsModel, robot: CompiledRobot) -> dict
     pinocchio = reference(source_of(model))
     rng = np.random.default_rng(SEED)
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (STATES, model.n)) for limit in RANGES)
-    arguments: dict[str, tuple[Array, ...]] = {
-        "inverse_dynamics": (q, qd, qdd),
-        "forward_dynamics": (q, qd, pinocchio.inverse_dynamics(q, qd, qdd)),
-        "mass_matrix": (q,),
-        "nonlinear_effects": (q, qd),
-        "gravity": (q,),
-    }
-    return {
-        name: relative_error(
-            getattr(robot, name)(*given).reshape(STATES, -1),
-            getattr(pinocchio, name)(*given).reshape(STATES, -1),
-        )
-        for name, given in arguments.items()
-    }
+    given = {"q": q, "qd": qd, "qdd": qdd, "tau": pinocchio.inverse_dynamics(q, qd, qdd)}
+    errors: dict[str, float] = {}
+    for name in FUNCTIONS:
+        signature = RECIPES[name].signature
+        found = robot.call(signature, [given[quantity.name] for quantity in signature.inputs])
+        (expected,) = RECIPES[name].pinocchio(pinocchio, given).values()
+        errors[name] = relative_error(found.reshape(STATES, -1), expected.reshape(STATES, -1))
+    return errors
 
 
 def _lines(model: DynamicsModel, errors: dict[str, float], result: BenchResult) -> Iterator[str]:

@@ -12,7 +12,7 @@ from psdmc.bench.contestant import Contestant, Runner, Unavailable
 from psdmc.bench.machine import this_machine
 from psdmc.bench.measure import measure
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
-from psdmc.bench.rivals import EVERYONE, Entrant
+from psdmc.bench.rivals import EVERYONE, Entrant, psdmc_c
 from psdmc.bench.states import COUNT, States
 from psdmc.bench.threads import measure_threads
 from psdmc.bench.versions import versions
@@ -21,7 +21,7 @@ SEED = 20_260
 ROUNDS = 10
 """Trials that count; with 1,024 blocks each the 99.99th percentile rests on more than 10,000 blocks."""
 
-SCALED = ("inverse_dynamics", "forward_dynamics")
+SCALED = psdmc_c.EXPANDED
 SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")
 SCALED_ROUNDS = 3
 """What is shown against the number of joints."""

@@ -7,10 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from psdmc.dynamics.frames import base_acceleration, frames_of
-from psdmc.dynamics.newton_euler import inverse_dynamics
-from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
-from psdmc.dynamics.scalar import ZERO, Vector
+from psdmc.functions import RECIPES
+from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.robot.chain import Array, Chain
 
 COUNT = 65_536
@@ -67,30 +65,26 @@ class States:
     @cached_property
     def tau(self) -> Array:
         """(count, n) torques at these states."""
-        return self._torques(self.q, self.qd, self.qdd, base_acceleration(self.chain))
+        return self._robot.torques(self.q, self.qd, self.qdd, self._robot.base)
+
+    @cached_property
+    def _robot(self) -> RobotOnArrays:
+        return RobotOnArrays(self.chain, self.chain.parameters.reshape(-1), np.zeros((0, 0)))
 
     def expected(self, function: str) -> Array:
         """(count, outputs) what a function must put out, by psdmc's own Newton-Euler on arrays.
 
         Regressors: the torques, which each one's parameters must turn it into.
         """
-        zero, base = np.zeros_like(self.q), base_acceleration(self.chain)
-        if function in ("inverse_dynamics", "regressor"):
+        if RECIPES[function].times_theta:
             return self.tau
-        if function == "forward_dynamics":
-            return self.qdd
-        if function == "nonlinear_effects":
-            return self._torques(self.q, self.qd, zero, base)
-        if function == "gravity":
-            return self._torques(self.q, zero, zero, base)
-        if function == "mass_matrix":
-            units = (np.broadcast_to(unit, self.q.shape) for unit in np.eye(self.n))
-            return np.hstack([self._torques(self.q, zero, unit, ZERO) for unit in units])
-        raise ValueError(f"nothing to check {function} against")
+        given = {"q": self.q, "qd": self.qd, "qdd": self.qdd, "tau": self.tau}
+        (values,) = RECIPES[function].reference(self._robot, given).values()
+        return values.reshape(self.count, -1)
 
     def inputs(self, function: str, lanes: int = 1) -> tuple[Array, Array, Array]:
-        """q, qd and qdd (forward dynamics: tau), flat; with lanes > 1 in blocks [variable][lane]."""
-        x = "tau" if function == "forward_dynamics" else "qdd"
+        """q, qd and what the function reads third (qdd or tau), flat; with lanes > 1 in blocks [variable][lane]."""
+        x = next((q.name for q in RECIPES[function].signature.inputs[2:]), "qdd")
         return self._laid_out("q", lanes), self._laid_out("qd", lanes), self._laid_out(x, lanes)
 
     def move(self) -> None:
@@ -108,10 +102,3 @@ class States:
             flat[:] = blocks.ravel()
             self._layouts[name, lanes] = flat
         return self._layouts[name, lanes]
-
-    def _torques(self, q: Array, qd: Array, qdd: Array, base: Vector) -> Array:
-        bodies = bodies_of(self.chain, self.chain.parameters)
-        drives = drive_inertia_of(self.chain.parameters)
-        q_, qd_, qdd_ = (list(values.T) for values in (q, qd, qdd))
-        torques = inverse_dynamics(frames_of(self.chain), bodies, drives, q_, qd_, qdd_, base)
-        return np.stack([np.broadcast_to(torque, len(q)) for torque in torques], axis=1)

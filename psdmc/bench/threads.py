@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.bench.contestant import Contestant, Runner
+from psdmc.bench.rivals import psdmc_c
 from psdmc.bench.states import States
 
 THREADS = (1, 2)
-FUNCTIONS = ("inverse_dynamics", "forward_dynamics")
+FUNCTIONS = psdmc_c.EXPANDED
 TRIALS = 5
 PASSES = 30
 """Times that each thread goes through all states in a trial: some 20 ms, long against starting threads."""

@@ -169,7 +169,9 @@ def emit_c(
     model: ModelFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR")],
     lowering: Annotated[str, typer.Option(help="auto, expanded or factored")] = "auto",
-    functions: Annotated[str, typer.Option(metavar="NAME,...", help="generate these functions only")] = "",
+    functions: Annotated[
+        str, typer.Option(metavar="NAME,...", help="generate these functions; 'default', 'all'")
+    ] = "",
     real: Annotated[str, typer.Option(help="float64 or float32")] = "float64",
     trig: Annotated[
         str, typer.Option(help="inline, freestanding (no libm, NaN beyond 1e5 rad) or libm")

@@ -5,22 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.kinematics import forward_kinematics
-from psdmc.dynamics.scalar import Scalar, Vector, add, dot, transform
-
-
-def potential_energy(
-    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base: Vector
-) -> Scalar:
-    """J, zero where every body's centre is at the base's origin; `base` is minus gravity, m/s^2 in the base frame."""
-    total: Scalar = 0.0
-    for body, (rotation, origin) in zip(bodies, forward_kinematics(frames, q), strict=True):
-        m = body.mass
-        moment = add(transform(rotation, body.moment), (m * origin[0], m * origin[1], m * origin[2]))
-        total = total + dot(base, moment)
-    return total
+from psdmc.dynamics.frames import BASE, Frame, inward, joint_angle, joint_offset, to_previous
+from psdmc.dynamics.momentum import momentum_of, twists
+from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, dot
 
 
 def kinetic_energy(
@@ -30,9 +17,39 @@ def kinetic_energy(
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
 ) -> Scalar:
-    """J, drive inertias included."""
-    total: Scalar = 0.0
-    for rate, row in zip(qd, mass_matrix(frames, bodies, drive_inertia, q), strict=True):
-        for other, entry in zip(qd, row, strict=True):
-            total = total + 0.5 * rate * entry * other
+    """qd^T M(q) qd / 2, J, drive inertias included; bodies need only have the torques of the real ones."""
+    twice: Scalar = 0.0
+    for twist, body in zip(twists(frames, q, qd), bodies, strict=True):
+        linear, angular = momentum_of(body, twist)
+        twice = twice + (dot(twist[0], linear) + dot(twist[1], angular))
+    for drive, rate in zip(drive_inertia, qd, strict=True):
+        twice = twice + drive * rate * rate
+    return 0.5 * twice
+
+
+def potential_energy(
+    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base: Vector
+) -> Scalar:
+    """J, zero at q = 0; `base` is minus gravity, m/s^2 in the base frame.
+
+    The energy at q = 0 shows in no torque: bodies that have the torques of the real ones give the same differences.
+    """
+    rest = [0.0] * len(frames)
+    return dot(base, first_moment(frames, bodies, q)) - dot(base, first_moment(frames, bodies, rest))
+
+
+def first_moment(frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]) -> Vector:
+    """kg m: total mass times its centre, along and about the frame that the first joint frame turns from."""
+    masses, moments = [body.mass for body in bodies], [body.moment for body in bodies]
+    total = ZERO
+    for i in reversed(range(len(frames))):
+        frame, mass = frames[i], masses[i]
+        turned = to_previous(frame, inward(joint_angle(frame, q[i]).turn(), moments[i]))
+        x, y, z = joint_offset(frame, q[i])
+        moment = add(turned, (mass * x, mass * y, mass * z))
+        if frame.parent == BASE:
+            total = add(total, moment)
+        else:
+            masses[frame.parent] = masses[frame.parent] + mass
+            moments[frame.parent] = add(moments[frame.parent], moment)
     return total

@@ -46,11 +46,11 @@ def jacobian(
     point = add(origin, transform(rotation, as_vector(place.translation.tolist())))
     columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * len(frames)
     for i in path_to(frames, body):
-        columns[i] = _column(frames[i], placed[i], point)
+        columns[i] = column(frames[i], placed[i], point)
     return tuple(tuple(column[row] for column in columns) for row in range(6))
 
 
-def _column(frame: Frame, placed: tuple[Matrix, Vector], point: Vector) -> tuple[Scalar, ...]:
+def column(frame: Frame, placed: tuple[Matrix, Vector], point: Vector) -> tuple[Scalar, ...]:
     """Velocity of a point and angular velocity that the joint's unit rate gives what it carries."""
     rotation, origin = placed
     along, about = axis_twist(frame.joint)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from psdmc.dynamics.body import Body, turned
 from psdmc.dynamics.frames import BASE, Frame, Turn, inward, joint_angle, to_previous
@@ -10,8 +11,13 @@ from psdmc.dynamics.motion import PLAIN, Choices, Forward, LinkMotion, sweep_out
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, transform
 from psdmc.dynamics.twist import effort
 
+Wrench = tuple[Vector, Vector]
+"""Force (N) and moment about a frame's origin (N m), along its axes."""
 
-def wrench(motion: LinkMotion, body: Body) -> tuple[Vector, Vector]:
+NO_WRENCHES: Mapping[int, Wrench] = MappingProxyType({})
+
+
+def wrench(motion: LinkMotion, body: Body) -> Wrench:
     """Force (N) and moment about the frame's origin (N m) that give a body the field a + U r.
 
     force = m a + U h,  moment = h x a + integral of r x (U r), the latter linear in the second moments.
@@ -37,8 +43,11 @@ def inverse_dynamics(
     base: Vector,
     choices: Choices = PLAIN,
     qd_r: Sequence[Scalar] | None = None,
+    external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
     """Joint torques (N m; N for sliding joints), n of them: M(q) qdd + C(q, qd) qd_r + g(q), qd_r = qd if not given.
+
+    external   force and moment that the world exerts on link i, about its joint frame's origin along that frame's axes
 
     Luh, Walker, Paul 1980, with the body's wrench written on its pseudo-inertia.
     """
@@ -49,12 +58,21 @@ def inverse_dynamics(
             frames, bodies, q, forward.states, forward.folded, strict=True
         )
     ]
-    return sweep_inward(frames, seen, drive_inertia, qdd, forward, choices)
+    return sweep_inward(frames, seen, drive_inertia, qdd, forward, choices, external)
 
 
 def _folded_body(frame: Frame, body: Body, q: Scalar, turn: Turn | None, choices: Choices) -> Body:
     angle = joint_angle(frame, q)
     return turned(body, turn, (angle + angle).turn() if choices.fold_double_angle else None)
+
+
+def _relieved(force: Vector, moment: Vector, external: Wrench, turn: Turn | None) -> Wrench:
+    """What a joint has left to give of a wrench; `turn`: the body's frame is that before its joint's turn."""
+    (fx, fy, fz), (mx, my, mz) = (inward(turn, part) for part in external)
+    return (
+        (force[0] - fx, force[1] - fy, force[2] - fz),
+        (moment[0] - mx, moment[1] - my, moment[2] - mz),
+    )
 
 
 def sweep_inward(
@@ -64,6 +82,7 @@ def sweep_inward(
     qdd: Sequence[Scalar],
     forward: Forward,
     choices: Choices = PLAIN,
+    external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
     """Wrenches down to the base, children before parents; each axis takes its component. With compound turns the moments'
     x and y of a group of parallel axes are gathered in the frame before its first turn, their z and the forces joint by
@@ -74,6 +93,9 @@ def sweep_inward(
     for i in reversed(range(n)):
         frame, state, parent = frames[i], forward.states[i], frames[i].parent
         own_force, own_moment = wrench(forward.motions[i], bodies[i])
+        if i in external:
+            turn = state.turn if forward.folded[i] else None
+            own_force, own_moment = _relieved(own_force, own_moment, external[i], turn)
         force, moment = add(forces[i], own_force), add(moments[i], own_moment)
         torques[i] = effort(frame.joint, force, moment) + drive_inertia[i] * qdd[i]
         if parent == BASE:

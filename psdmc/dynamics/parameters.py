@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -74,10 +75,15 @@ def bodies_of(chain: Chain, x: Array) -> tuple[Body, ...]:
 
     x   (n, 11) or (11 n,)   SI, none NaN
     """
-    rows = np.asarray(x, dtype=np.float64).reshape(len(chain), PARAMETERS_PER_LINK)
+    return bodies_about([joint.link_frame for joint in chain.joints], x)
+
+
+def bodies_about(link_frames: Sequence[Placement], x: Array) -> tuple[Body, ...]:
+    """The same for link frames placed in any joint frames."""
+    rows = np.asarray(x, dtype=np.float64).reshape(len(link_frames), PARAMETERS_PER_LINK)
     return tuple(
-        body_from_parameters(times(joint_frame_map(joint.link_frame), row[:BODY_PARAMETERS]).tolist())
-        for joint, row in zip(chain.joints, rows, strict=True)
+        body_from_parameters(times(joint_frame_map(place), row[:BODY_PARAMETERS]).tolist())
+        for place, row in zip(link_frames, rows, strict=True)
     )
 
 

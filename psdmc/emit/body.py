@@ -6,6 +6,7 @@ vectors.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from psdmc.emit.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
@@ -43,16 +44,17 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """`vector[index] = text`, where a uniform text must be spread over the lanes first."""
+    """`vector[index] = text`, where a uniform text must be spread over the lanes first; `macro` is what stores it."""
 
     vector: str
     index: int
     text: str
     uniform: bool
+    macro: str = "STORE"
 
     @property
     def line(self) -> str:
-        return f"STORE({self.vector}, {self.index}, {spread(self.text, self.uniform)})"
+        return f"{self.macro}({self.vector}, {self.index}, {spread(self.text, self.uniform)})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +112,7 @@ def make_body(
     sizes: dict[str, int],
     suffix: str,
     stores_early: bool,
-    in_groups: bool = False,
+    in_groups: Collection[str] = (),
 ) -> Body:
     """Lay out a PROGRAM.
 
@@ -118,10 +120,12 @@ def make_body(
     sizes         output vectors and their lengths; entries that the PROGRAM does not store become zero
     suffix        of constants: '' or 'f'
     stores_early  store a value as soon as it is known (large outputs) or all at the end (small ones)
-    in_groups     also store groups of four, as soon as the last of them is known
+    in_groups     vectors that are also stored in groups of four, as soon as the last of them is known; where there are
+                  others beside them, STORE_BLOCK stores those
     """
-    groups = StoreGroups(sizes if in_groups else {})
-    writer = _Writer(program, suffix, stores_early, groups)
+    groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
+    beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
+    writer = _Writer(program, suffix, stores_early, groups, frozenset(beside.difference(in_groups)))
     sections = writer.sections(sizes)
     read = {slot.vector for slot in program.inputs()}
     return Body(sections, tuple(name for name in inputs if name not in read))
@@ -130,9 +134,11 @@ def make_body(
 class _Writer:
     """Texts of a PROGRAM's values, made in the order in which they are printed."""
 
-    def __init__(self, program: Program, suffix: str, stores_early: bool, groups: StoreGroups) -> None:
+    def __init__(
+        self, program: Program, suffix: str, stores_early: bool, groups: StoreGroups, beside: frozenset[str]
+    ) -> None:
         self.program, self.suffix, self.stores_early = program, suffix, stores_early
-        self.groups = groups
+        self.groups, self.beside = groups, beside
         self.stored: dict[Slot, Store] = {}
         self.names = Names.of(program)
         self.stores: dict[int, list[Slot]] = {}
@@ -182,7 +188,11 @@ class _Writer:
         return [line for slot, i in self.program.outputs for line in self._store(slot, i)]
 
     def _store(self, slot: Slot, i: int) -> list[Line]:
-        return self._stored(Store(slot.vector, slot.index, self._value(i).text, self.names.uniform[i]))
+        return self._stored(self._store_of(slot, self._value(i).text, self.names.uniform[i]))
+
+    def _store_of(self, slot: Slot, text: str, uniform: bool) -> Store:
+        macro = "STORE_BLOCK" if slot.vector in self.beside else "STORE"
+        return Store(slot.vector, slot.index, text, uniform, macro)
 
     def _zeros(self, sizes: dict[str, int]) -> list[Line]:
         taken = {slot for slot, _ in self.program.outputs}
@@ -192,7 +202,7 @@ class _Writer:
             for vector, size in sizes.items()
             for index in range(size)
             if Slot(vector, index) not in taken
-            for line in self._stored(Store(vector, index, zero, True))
+            for line in self._stored(self._store_of(Slot(vector, index), zero, True))
         ]
 
     def _stored(self, store: Store) -> list[Line]:

@@ -29,7 +29,10 @@ class CppMethod:
 
 @dataclass(frozen=True, slots=True)
 class CppArrayMethod:
-    """The same on std::array: the result is returned, or put beside a status."""
+    """The same on std::array.
+
+    output  what is returned, of type result_type; '' where several results, or a result beside a status, are parameters
+    """
 
     name: str
     returns: str
@@ -37,7 +40,6 @@ class CppArrayMethod:
     arguments: str
     result_type: str
     output: str
-    can_fail: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,18 +65,22 @@ class CppClass:
         return " const noexcept" if self.theta else " noexcept"
 
 
-def cpp_classes(functions: Iterable[FunctionView]) -> tuple[CppClass, CppClass, CppClass]:
+def cpp_classes(functions: Iterable[FunctionView], n: int) -> tuple[CppClass, CppClass, CppClass]:
     """Description, Robot and RobotWithParameters, in this order."""
     shown = tuple(functions)
     free = [f.kernels[0] for f in shown if not f.needs_parameters]
     own = [k for f in shown if f.needs_parameters for k in f.kernels if not k.theta]
     given = [k for f in shown if f.needs_parameters for k in f.kernels if k.theta]
-    return _class("Description", free), _class("Robot", own), _class("RobotWithParameters", given, theta=True)
+    return (
+        _class("Description", free, n),
+        _class("Robot", own, n),
+        _class("RobotWithParameters", given, n, theta=True),
+    )
 
 
-def _class(name: str, kernels: list[KernelView], theta: bool = False) -> CppClass:
+def _class(name: str, kernels: list[KernelView], n: int, theta: bool = False) -> CppClass:
     methods = [_method(k, p) for k in kernels for p in k.prototypes.values()]
-    return CppClass(name, theta, tuple(methods), tuple(map(_array_method, kernels)))
+    return CppClass(name, theta, tuple(methods), tuple(_array_method(k, n) for k in kernels))
 
 
 def _method(kernel: KernelView, prototype: Prototype) -> CppMethod:
@@ -102,18 +108,22 @@ def _cpp_type(kind: str) -> str:
     )
 
 
-def _array_method(kernel: KernelView) -> CppArrayMethod:
-    """Of one state; a function that can fail leaves its result in its last parameter and returns the status."""
-    inputs = [f"const Vector &{vector.name}" for vector in kernel.inputs]
-    output = kernel.output.name
-    can_fail = bool(kernel.pivot_order)
-    result = f"std::array<Real, {kernel.output.size}>"
+def _array_method(kernel: KernelView, n: int) -> CppArrayMethod:
+    """Of one state; several results are left in the last parameters, as is one that comes with a status."""
+    inputs = [f"const {_array(vector.size, n)} &{vector.name}" for vector in kernel.inputs]
+    outputs = [f"{_array(output.size)} &{output.name}" for output in kernel.outputs]
+    status = "int" if kernel.positive else "void"
+    returned = kernel.outputs[0] if status == "void" and len(outputs) == 1 else None
+    result = _array(returned.size) if returned else ""
     return CppArrayMethod(
         name=kernel.name.removesuffix("_theta"),
-        returns="int" if can_fail else result,
-        parameters=", ".join([*inputs, f"{result} &{output}"] if can_fail else inputs),
-        arguments=", ".join(f"{vector.name}.data()" for vector in (*kernel.inputs, kernel.output)),
+        returns=result or status,
+        parameters=", ".join(inputs if returned else [*inputs, *outputs]),
+        arguments=", ".join(f"{vector.name}.data()" for vector in (*kernel.inputs, *kernel.outputs)),
         result_type=result,
-        output=output,
-        can_fail=can_fail,
+        output=returned.name if returned else "",
     )
+
+
+def _array(size: int, n: int | None = None) -> str:
+    return "Vector" if size == n else f"std::array<Real, {size}>"

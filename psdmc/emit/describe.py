@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 
 from psdmc.emit.info import JointInfo, PackageInfo
+from psdmc.emit.kernel_view import FunctionView
 from psdmc.emit.options import EmitOptions
+from psdmc.program.signature import Signature
 
 
-def description(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
+def description(
+    info: PackageInfo, options: EmitOptions, functions: Sequence[FunctionView]
+) -> tuple[str, ...]:
     """Joints, limits, gravity, parameters, model and options, one line each; untrusted names still
     unescaped."""
     gx, gy, gz = info.gravity
@@ -31,10 +36,29 @@ def description(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
         "  _batch      one state per row",
         "  _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too",
         "  _theta      with the base parameters theta_b given at run time (_theta_batch: one theta_b for all rows)",
-        "forward_dynamics returns 0, or 1 + the joint whose pivot is not positive, or (batch) 1 + the first",
-        "row that has one; the accelerations of such a state are NaN.",
     ]
+    if any(len(function.signature.outputs) > 1 for function in functions):
+        lines += ["Several outputs of one call must not overlap each other."]
+    lines += [line for function in functions for line in _failure(function.signature)]
+    if uses_frames(functions):
+        lines += ["", "Frames, in the order of every array over them:"]
+        lines += [f"  {i}  {name}" for i, name in enumerate(info.frames)]
     return tuple(lines)
+
+
+def _failure(function: Signature) -> tuple[str, ...]:
+    if function.positive is None:
+        return ()
+    return (
+        f"{function.name} returns 0, or 1 + {function.positive.which}, or (batch) 1 + the first",
+        f"row that has one; the {function.positive.spoilt} of such a state are NaN.",
+    )
+
+
+def uses_frames(functions: Iterable[FunctionView]) -> bool:
+    """Whether some of these functions is about the named frames."""
+    signatures = (function.signature for function in functions)
+    return any("frames" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
 
 
 def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.signature import Sizes
 from psdmc.version import psdmc_version
 
 
@@ -45,6 +46,7 @@ class PackageInfo:
     parameters  l base parameters, in the order of theta_b
     model_hash  content hash of the MODEL
     options     what the user chose, as printed in header and manifest
+    frames      names of the named frames, untrusted text; empty: the tip alone
     """
 
     name: str
@@ -56,15 +58,22 @@ class PackageInfo:
     model_hash: str
     psdmc_version: str
     options: Mapping[str, str] = field(default_factory=dict)
+    frames: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.joints:
             raise ValueError("a package needs at least one joint")
+        object.__setattr__(self, "frames", self.frames or (self.tip,))
 
     @property
     def n(self) -> int:
         """Number of joints."""
         return len(self.joints)
+
+    @property
+    def sizes(self) -> Sizes:
+        """What the words of signatures mean for this robot."""
+        return Sizes.of_chain(self.n, self.l, len(self.frames))
 
     @property
     def l(self) -> int:  # noqa: E743
@@ -102,6 +111,7 @@ def package_info(
         model_hash=str(getattr(model, "content_hash", "") or ""),
         psdmc_version=psdmc_version(),
         options=dict(options or {}),
+        frames=tuple(frame.name for frame in chain.frames),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from psdmc.emit.body import Body, make_body
@@ -11,17 +11,25 @@ from psdmc.emit.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, protot
 from psdmc.emit.store_groups import GROUP
 from psdmc.errors import InternalError
 from psdmc.program.cost import Cost, cost
-from psdmc.program.functions import BY_NAME, FUNCTIONS, Function
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Program
+from psdmc.program.signature import Quantity, Signature, Sizes, in_order
 
 
 @dataclass(frozen=True, slots=True)
 class VectorView:
-    """A vector of a signature, `size` reals per state (a uniform one: the same for all states)."""
+    """A quantity of a signature, `size` reals per state, with its axes' lengths."""
 
     name: str
     size: int
+    shape: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class OutputView(VectorView):
+    """An output; `direct`: a batch call writes its rows straight from registers, without a block of them on the stack."""
+
+    direct: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,28 +37,53 @@ class KernelView:
     """One kernel: the file(s) that hold its body, its C functions and their signatures.
 
     single_file  body file, included once per instantiation; lanes_file, too, where one order serves both
-    pivot_order  joints in the order in which their pivots are found, empty where there are none
-    direct       a batch call writes its rows straight from registers, without a block of them on the stack
+    positive     what must be positive and is not put out; None where there is no such thing
+    pivot_order  its entries in the order in which they are found
     """
 
     name: str
-    meaning: str
+    function: Signature
     theta: bool
     inputs: tuple[VectorView, ...]
-    output: VectorView
+    outputs: tuple[OutputView, ...]
+    positive: VectorView | None
     prototypes: Mapping[str, Prototype]
     single_file: str
     lanes_file: str
     single_body: Body
     lanes_body: Body
     pivot_order: tuple[int, ...]
-    direct: bool
     cost: Cost
     lowering: str
 
     @property
+    def direct(self) -> bool:
+        """Whether a batch call writes rows of some output straight from registers."""
+        return any(output.direct for output in self.outputs)
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether some outputs are written so and others are not."""
+        return self.direct and not all(output.direct for output in self.outputs)
+
+    @property
+    def fails_alone(self) -> bool:
+        """Whether what becomes NaN is one vector as long as what must be positive."""
+        sizes = {output.size for output in self.outputs}
+        return self.positive is not None and len(self.outputs) == 1 and sizes == {self.positive.size}
+
+    @property
+    def mark_rows(self) -> str:
+        """C: the first row of a block that fails."""
+        assert self.positive is not None
+        block = f"{self.positive.name}_block"
+        if self.fails_alone:
+            return f"mark_failed(rows, {block}, {self.outputs[0].name}_block)"
+        return f"first_failed({self.positive.size}, rows, {block})"
+
+    @property
     def needs_lanes(self) -> bool:
-        """Whether anything calls the form that leaves its output lane by lane."""
+        """Whether anything calls the form that leaves its outputs lane by lane."""
         return not self.direct or "batch_soa" in self.prototypes
 
     @property
@@ -60,37 +93,42 @@ class KernelView:
 
     @property
     def lanes_signature(self) -> str:
-        return self._signature(f"real *{self.output.name}")
+        return self._signature(f"real *{output.name}" for output in self.outputs)
 
     @property
     def rows(self) -> str:
-        """The static function that computes one state per lane and writes its output into rows."""
+        """The static function that computes one state per lane and writes direct outputs into rows."""
         return f"{self.name}_rows"
 
     @property
     def rows_signature(self) -> str:
-        return self._signature(f"real *const *{self.output.name}_row")
+        return self._signature(
+            f"real *const *{output.name}_row" if output.direct else f"real *{output.name}"
+            for output in self.outputs
+        )
 
-    def _signature(self, output: str) -> str:
+    def _signature(self, outputs: Iterable[str]) -> str:
         names = [f"const real *{vector.name}" for vector in self.inputs]
         names += ["const real *theta_b"] if self.theta else []
-        names += [output]
-        names += ["real *pivot"] if self.pivot_order else []
+        names += outputs
+        names += [f"real *{self.positive.name}"] if self.positive else []
         return ", ".join(names)
 
     @property
     def lanes_arguments(self) -> str:
-        return self._arguments(f"{self.output.name}_block + lane")
+        return self._arguments(f"{output.name}_block + lane" for output in self.outputs)
 
     @property
     def rows_arguments(self) -> str:
-        return self._arguments(f"{self.output.name}_row + lane")
+        return self._arguments(
+            f"{output.name}_{'row' if output.direct else 'block'} + lane" for output in self.outputs
+        )
 
-    def _arguments(self, output: str) -> str:
+    def _arguments(self, outputs: Iterable[str]) -> str:
         names = [f"{vector.name}_block + lane" for vector in self.inputs]
         names += ["theta_b"] if self.theta else []
-        names += [output]
-        names += ["pivot_block + lane"] if self.pivot_order else []
+        names += outputs
+        names += [f"{self.positive.name}_block + lane"] if self.positive else []
         return ", ".join(names)
 
     @property
@@ -100,22 +138,22 @@ class KernelView:
 
     @property
     def blocks(self) -> tuple[VectorView, ...]:
-        """Buffers of a batch call: every vector lane by lane."""
-        pivots = (VectorView("pivot", self.inputs[0].size),) if self.pivot_order else ()
-        output = () if self.direct else (self.output,)
-        return (*self.inputs, *output, *pivots)
+        """Buffers of a batch call: every vector lane by lane, but those whose rows are written directly."""
+        outputs = (output for output in self.outputs if not output.direct)
+        return (*self.inputs, *outputs, *((self.positive,) if self.positive else ()))
 
 
 @dataclass(frozen=True, slots=True)
 class FunctionView:
     """A function with its kernels, baked first: one C file.
 
-    shape  of the output, in words
+    shape  of what it puts out, and of inputs that are no vectors of all joints, in words
     """
 
     name: str
     meaning: str
     shape: str
+    signature: Signature
     kernels: tuple[KernelView, ...]
 
     @property
@@ -124,71 +162,110 @@ class FunctionView:
 
     @property
     def needs_parameters(self) -> bool:
-        return BY_NAME[self.name].theta
+        return self.signature.theta
 
 
 def function_views(
-    kernels: Mapping[str, Kernel], n: int, l: int, robot: str, options: EmitOptions
+    kernels: Mapping[str, Kernel], sizes: Sizes, robot: str, options: EmitOptions
 ) -> tuple[FunctionView, ...]:
-    """The functions that `kernels` hold, in the order of FUNCTIONS, whatever the mapping's order."""
-    known = {name for f in FUNCTIONS for name in (f.name, f"{f.name}_theta")}
-    unknown = [name for name, kernel in kernels.items() if name not in known or name != kernel.name]
-    if unknown:
-        raise InternalError(f"kernel {unknown[0]!r} is filed under a name that is not its own")
+    """The functions that `kernels` hold, in the order of their signatures, whatever the mapping's order."""
+    wrong = [name for name, kernel in kernels.items() if name != kernel.name]
+    if wrong:
+        raise InternalError(f"kernel {wrong[0]!r} is filed under a name that is not its own")
+    functions = {kernel.function.name: kernel.function for kernel in kernels.values()}
     views = []
-    for function in FUNCTIONS:
+    for function in in_order(tuple(functions.values())):
         own = [kernels[name] for name in (function.name, f"{function.name}_theta") if name in kernels]
-        if own:
-            shown = tuple(kernel_view(kernel, n, l, robot, options) for kernel in own)
-            views.append(FunctionView(function.name, function.meaning, _shape(function, n, l), shown))
+        shown = tuple(kernel_view(kernel, sizes, robot, options) for kernel in own)
+        views.append(FunctionView(function.name, function.meaning, _shape(function, sizes), function, shown))
     return tuple(views)
 
 
-def kernel_view(kernel: Kernel, n: int, l: int, robot: str, options: EmitOptions) -> KernelView:
-    function = kernel.function
-    single_body = _body(kernel, kernel.single, n, l, options)
-    lanes_body = _body(kernel, kernel.batch, n, l, options)
+def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
+    function = _checked(kernel.function)
+    outputs = tuple(
+        OutputView(q.name, sizes.size(q), sizes.shape(q.axes), _is_direct(q, sizes)) for q in function.outputs
+    )
+    single_body = _body(kernel, kernel.single, outputs, options)
+    lanes_body = _body(kernel, kernel.batch, outputs, options)
     shared = single_body == lanes_body
+    positive = _vector(function.positive.quantity, sizes) if function.positive else None
     return KernelView(
         name=kernel.name,
-        meaning=function.meaning,
+        function=function,
         theta=kernel.theta,
-        inputs=tuple(VectorView(name, n) for name in function.inputs),
-        output=VectorView(function.output, function.size(n, l)),
+        inputs=tuple(_vector(q, sizes) for q in function.inputs),
+        outputs=outputs,
+        positive=positive,
         prototypes=_prototypes(function, kernel.theta, robot, options.c_real),
         single_file=f"{kernel.name}.inc",
         lanes_file=f"{kernel.name}.inc" if shared else f"{kernel.name}_lanes.inc",
         single_body=single_body,
         lanes_body=lanes_body,
-        pivot_order=tuple(slot.index for slot, _ in kernel.single.outputs if slot.vector == "pivot"),
-        direct=_is_direct(function, n, l),
+        pivot_order=tuple(
+            slot.index for slot, _ in kernel.single.outputs if positive and slot.vector == positive.name
+        ),
         cost=cost(kernel.single),
         lowering=kernel.lowering,
     )
 
 
-def _shape(function: Function, n: int, l: int) -> str:
-    lengths = {"n": n, "l": l, "6": 6, "1": 1}
-    rows, columns = lengths[function.rows], lengths[function.columns]
-    size = str(rows) if function.columns == "1" else f"{rows} x {columns}, row-major"
-    return f"{function.output} is {size}"
+TAKEN = {
+    *(
+        "V",
+        "LOAD",
+        "STORE",
+        "STORE_GROUP",
+        "STORE_BLOCK",
+        "SPLAT",
+        "SINCOS",
+        "LANES",
+        "WIDTH",
+        "real",
+        "lanes",
+    ),
+    *("theta_b", "count", "block", "blocks", "lane", "first", "rows", "failed", "bad"),
+}
+"""What the emitted C calls something else wherever a quantity's name stands."""
 
 
-def _body(kernel: Kernel, program: Program, n: int, l: int, options: EmitOptions) -> Body:
+def _checked(function: Signature) -> Signature:
+    """InternalError where a quantity's name means something else in the emitted C."""
+    for quantity in (*function.inputs, *function.stored):
+        if quantity.name in TAKEN:
+            raise InternalError(f"{function.name}: C takes {quantity.name!r} for something else")
+    return function
+
+
+def _vector(quantity: Quantity, sizes: Sizes) -> VectorView:
+    return VectorView(quantity.name, sizes.size(quantity), sizes.shape(quantity.axes))
+
+
+def _shape(function: Signature, sizes: Sizes) -> str:
+    told = [q for q in function.inputs if len(q.axes) != 1] + list(function.outputs)
+    return "; ".join(f"{q.name} is {_lengths(sizes.shape(q.axes))}" for q in told)
+
+
+def _lengths(shape: tuple[int, ...]) -> str:
+    if not shape:
+        return "1"
+    return str(shape[0]) if len(shape) == 1 else f"{' x '.join(map(str, shape))}, row-major"
+
+
+def _body(kernel: Kernel, program: Program, outputs: tuple[OutputView, ...], options: EmitOptions) -> Body:
     """Large outputs are stored as they are found: keeping them all until the end would spill them first."""
-    function = kernel.function
-    inputs = (*function.inputs, *(("theta_b",) if kernel.theta else ()))
-    sizes = {function.output: function.size(n, l)}
+    sizes = {output.name: output.size for output in outputs}
     suffix = "" if options.real == "float64" else "f"
-    is_matrix = function.columns != "1"
-    return make_body(program, inputs, sizes, suffix, is_matrix, _is_direct(function, n, l))
+    has_matrix = any(len(output.shape) > 1 for output in outputs)
+    direct = tuple(output.name for output in outputs if output.direct)
+    return make_body(program, kernel.inputs, sizes, suffix, has_matrix, direct)
 
 
-def _is_direct(function: Function, n: int, l: int) -> bool:
-    return function.columns != "1" and function.size(n, l) >= GROUP
+def _is_direct(output: Quantity, sizes: Sizes) -> bool:
+    return len(output.axes) > 1 and sizes.size(output) >= GROUP
 
 
-def _prototypes(function: Function, theta: bool, robot: str, real: str) -> dict[str, Prototype]:
+def _prototypes(function: Signature, theta: bool, robot: str, real: str) -> dict[str, Prototype]:
     variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
     names = ("single", "batch", "batch_soa")
     made = [prototype(function, variant, robot, real) for variant in variants]

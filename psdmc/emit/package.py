@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from psdmc.emit.cpp import CppClass, cpp_classes
-from psdmc.emit.describe import description
+from psdmc.emit.describe import description, uses_frames
 from psdmc.emit.info import PackageInfo
 from psdmc.emit.kernel_view import FunctionView, KernelView, function_views
 from psdmc.emit.lanes import VectorWidth, vector_widths
@@ -15,9 +15,10 @@ from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
 from psdmc.emit.reals import check_range
+from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.references import ReferenceView, reference_view
 from psdmc.emit.render import render
-from psdmc.emit.self_test import SelfCheck, given_vectors, self_checks
+from psdmc.emit.self_test import GivenVector, SelfCheck, given_vectors, labels, self_checks
 from psdmc.emit.tables import Table, tables
 from psdmc.emit.trig import (
     HAS_VECTORS,
@@ -29,7 +30,6 @@ from psdmc.emit.trig import (
     vector_trig,
 )
 from psdmc.errors import InputError
-from psdmc.model.reference_states import ReferenceStates
 from psdmc.program.kernel import Kernel
 
 
@@ -94,11 +94,11 @@ class PackageView:
 
     @property
     def description(self) -> tuple[str, ...]:
-        return description(self.info, self.options)
+        return description(self.info, self.options, self.functions)
 
     @property
     def tables(self) -> tuple[Table, ...]:
-        return tables(self.info, self.robot, self.real)
+        return tables(self.info, self.robot, self.real, self.uses_frames)
 
     @property
     def table_declarations(self) -> tuple[str, ...]:
@@ -106,7 +106,13 @@ class PackageView:
 
     @property
     def cpp_classes(self) -> tuple[CppClass, ...]:
-        return cpp_classes(self.functions)
+        return cpp_classes(self.functions, self.n)
+
+    @property
+    def cpp_sizes(self) -> dict[str, int]:
+        """Constants of the C++ classes."""
+        sizes = {"dof": self.n, "base_parameters": self.l, "lanes": self.lanes}
+        return sizes | ({"frames": len(self.info.frames)} if self.uses_frames else {})
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -124,8 +130,10 @@ class PackageView:
         return tuple(kernel.name for kernel in self.kernels)
 
     @property
-    def has_forward(self) -> bool:
-        return any(function.has_pivots for function in self.functions)
+    def pivot_size(self) -> int:
+        """Entries that must be positive, where what becomes NaN is one vector as long."""
+        found = (k.positive.size for k in self.kernels if k.positive and k.fails_alone)
+        return next(found, self.n)
 
     @property
     def kernels(self) -> tuple[KernelView, ...]:
@@ -140,21 +148,55 @@ class PackageView:
     @property
     def checked_kernels(self) -> int:
         """How many of them are compared."""
-        return sum(bool(check.expected) for check in self.self_checks)
+        return len({check.kernel for check in self.self_checks if check.expected})
 
     @property
-    def given_vectors(self) -> tuple[str, ...]:
+    def given_vectors(self) -> tuple[GivenVector, ...]:
         """Inputs of all kernels, by the reference states' names."""
-        return given_vectors(self.kernels)
+        return given_vectors(self.kernels, self.n)
 
     @property
     def largest_output(self) -> int:
-        return max(kernel.output.size for kernel in self.kernels)
+        return max(output.size for kernel in self.kernels for output in kernel.outputs)
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether some kernel writes one output's rows from registers and another's from a block."""
+        return any(kernel.is_mixed for kernel in self.kernels)
+
+    @property
+    def fails_in_several(self) -> bool:
+        """Whether some kernel that fails has more to spoil than one vector of all joints."""
+        return any(kernel.positive and not kernel.fails_alone for kernel in self.kernels)
+
+    @property
+    def has_several_outputs(self) -> bool:
+        return any(len(kernel.outputs) > 1 for kernel in self.kernels)
+
+    @property
+    def most_outputs(self) -> int:
+        return max(len(kernel.outputs) for kernel in self.kernels)
+
+    @property
+    def given_otherwise(self) -> bool:
+        """Whether some input is no vector of all joints."""
+        return not all(vector.of_joints for vector in self.given_vectors)
+
+    @property
+    def failing(self) -> tuple[FunctionView, ...]:
+        """Functions that can fail."""
+        return tuple(function for function in self.functions if function.has_pivots)
+
+    @property
+    def uses_frames(self) -> bool:
+        """Whether some function is about the named frames."""
+        return uses_frames(self.functions)
 
     @property
     def cdef(self) -> str:
         """What cffi needs to know: tables and functions, without macros."""
         macros = {f"{self.robot}_DOF": str(self.n), f"{self.robot}_BASE_PARAMETERS": str(self.l)}
+        macros[f"{self.robot}_FRAMES"] = str(len(self.info.frames))
         lines = list(self.table_declarations)
         for name, value in macros.items():
             lines = [line.replace(f"[{name}]", f"[{value}]") for line in lines]
@@ -177,12 +219,13 @@ def package_view(
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
     check_range(info, kernels, options.c_real)
     robot = identifier(info.name)
-    functions = function_views(kernels, info.n, info.l, robot, options)
+    functions = function_views(kernels, info.sizes, robot, options)
     package = PackageView(robot, info, options, functions, None)
     if references is None:
         return package
-    vectors, names = package.given_vectors, package.kernel_names
-    return replace(package, references=reference_view(references, info.n, options.c_real, vectors, names))
+    vectors, takes_theta = package.given_vectors, any(kernel.theta for kernel in package.kernels)
+    view = reference_view(references, options.c_real, vectors, labels(package.kernels), takes_theta)
+    return replace(package, references=view)
 
 
 def package_files(package: PackageView) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from psdmc.program.functions import Function
+from psdmc.program.signature import Signature
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,17 +39,18 @@ class Prototype:
         return f"{self.returns} {self.symbol}({', '.join(self.arguments)})"
 
 
-def prototype(function: Function, variant: Variant, robot: str, real: str) -> Prototype:
+def prototype(function: Signature, variant: Variant, robot: str, real: str) -> Prototype:
     """The signature of `robot`_`function``variant` in C."""
-    inputs = (*function.inputs, *(("theta_b",) if variant.theta else ()))
-    arguments = (*(f"const {real} *{name}" for name in inputs), f"{real} *{function.output}")
+    inputs = (*(q.name for q in function.inputs), *(("theta_b",) if variant.theta else ()))
+    outputs = (f"{real} *{q.name}" for q in function.outputs)
+    arguments = (*(f"const {real} *{name}" for name in inputs), *outputs)
     if variant.is_batch:
         arguments = ("size_t count", *arguments)
     return Prototype(_returns(function, variant), f"{robot}_{function.name}{variant.suffix}", arguments)
 
 
-def _returns(function: Function, variant: Variant) -> str:
-    """Forward dynamics can fail: which joint (one state), or which row (many)."""
-    if not function.pivots:
+def _returns(function: Signature, variant: Variant) -> str:
+    """A function that can fail says which entry failed (one state), or which row (many)."""
+    if function.positive is None:
         return "void"
     return "size_t" if variant.is_batch else "int"

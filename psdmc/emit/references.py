@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.emit.reference_states import ReferenceStates
+from psdmc.emit.self_test import GivenVector
 from psdmc.emit.tables import number
-from psdmc.model.reference_states import ReferenceStates
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +26,8 @@ class ReferenceTable:
 class ReferenceView:
     """References as C text.
 
-    tables    the states' vectors, then what each kernel must give
-    expected  the kernels that have such a table
+    tables    the states' vectors, then what each output must be
+    expected  labels of the outputs that have such a table
     theta_b   the run-time parameters, one constant each; empty where no kernel takes any
     """
 
@@ -37,21 +38,28 @@ class ReferenceView:
 
 
 def reference_view(
-    references: ReferenceStates, n: int, real: str, vectors: Collection[str], kernels: Collection[str]
+    references: ReferenceStates,
+    real: str,
+    vectors: Collection[GivenVector],
+    labels: Collection[str],
+    takes_theta: bool,
 ) -> ReferenceView:
-    """The states as C constants: the vectors that the package's kernels take, and what these kernels must give.
+    """The states as C constants: the vectors that the package's kernels take, and what their outputs (by label) must be.
 
-    ValueError where the states are not of n joints.
+    ValueError where the states are of another robot.
     """
-    columns = next(iter(references.given.values())).shape[1]
-    if columns != n:
-        raise ValueError(f"reference states have {columns} joints, expected {n}")
-    given = [
-        _table(f"{name}_given", array, real) for name, array in references.given.items() if name in vectors
-    ]
-    known = tuple(name for name in kernels if name in references.expected)
-    expected = [_table(f"{name}_expected", references.expected[name], real) for name in known]
-    takes_theta = any(name.endswith("_theta") for name in kernels)
+    sizes = {vector.name: vector.size for vector in vectors}
+    given = []
+    for name, array in references.given.items():
+        if name not in sizes:
+            continue
+        if array.shape[1] != sizes[name]:
+            raise ValueError(
+                f"reference states have {array.shape[1]} entries of {name}, expected {sizes[name]}"
+            )
+        given.append(_table(f"{name}_given", array, real))
+    known = tuple(label for label in labels if label in references.expected)
+    expected = [_table(f"{label}_expected", references.expected[label], real) for label in known]
     theta_b = tuple(number(value, real) for value in references.theta_b.tolist()) if takes_theta else ()
     return ReferenceView(len(next(iter(references.given.values()))), (*given, *expected), known, theta_b)
 

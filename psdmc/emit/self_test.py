@@ -2,31 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from psdmc.emit.kernel_view import KernelView
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.prototypes import Prototype
-from psdmc.program.functions import BY_NAME
+from psdmc.program.signature import TAU
 
 TOLERANCES = {"float64": "1e-10", "float32": "1e-3"}
 FORWARD_TOLERANCES = {"float64": "1e-7", "float32": "1e-1"}
 """Relative to a joint's largest value: loose enough for badly conditioned mass matrices, tight for wrong
 code."""
 
+ROWS = ("6", "nv")
+"""First axes of outputs whose rows are compared each with its own largest value; of others, all entries with one."""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenVector:
+    """An input by the reference states' name, `size` reals per state; `of_joints`: one a joint."""
+
+    name: str
+    size: int
+    of_joints: bool
+
+    @property
+    def length(self) -> str:
+        """Its size as the test's C says it."""
+        return "N" if self.of_joints else str(self.size)
+
+    @property
+    def repeat(self) -> str:
+        """C that fills its rows and lanes."""
+        places = f"{self.name}_rows, {self.name}_lanes"
+        if self.of_joints:
+            return f"repeat({self.name}_given, {places})"
+        return f"repeat_sized({self.size}, {self.name}_given[0], {places})"
+
 
 @dataclass(frozen=True, slots=True)
 class SelfCheck:
-    """One kernel called state by state, row by row and, where it has that form, lane by lane.
+    """One output of a kernel that is called state by state, row by row and, where it has that form, lane by lane.
 
-    rows, columns  of its output per state
+    rows, columns  of the output per state
     single, batch  C calls, `row` being the state's number and `count` the batch's size; lanes: '' where there is no
                    such form
     status         whether the calls return one
     expected       array that it should reproduce; '' where no reference state has a value
     """
 
+    kernel: str
     name: str
     rows: int
     columns: int
@@ -45,37 +71,59 @@ class SelfCheck:
 def self_checks(
     kernels: Iterable[KernelView], n: int, options: EmitOptions, known: Collection[str]
 ) -> tuple[SelfCheck, ...]:
-    """One check per kernel; `known`: the kernels whose values the reference states hold."""
-    return tuple(_check(kernel, n, options, known) for kernel in kernels)
+    """One check per output of each kernel; `known`: labels of those whose values the reference states hold."""
+    return tuple(
+        _check(kernel, k, n, options, known) for kernel in kernels for k in range(len(kernel.outputs))
+    )
 
 
-def given_vectors(kernels: Iterable[KernelView]) -> tuple[str, ...]:
-    """Input vectors of all these kernels, by the reference states' names, each once."""
-    return tuple(dict.fromkeys(_given(kernel, v.name) for kernel in kernels for v in kernel.inputs))
+def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, ...]:
+    """Inputs of all these kernels, by the reference states' names, each once."""
+    return tuple(
+        dict.fromkeys(
+            GivenVector(_given(kernel, v.name), v.size, v.size == n)
+            for kernel in kernels
+            for v in kernel.inputs
+        )
+    )
 
 
-def _check(kernel: KernelView, n: int, options: EmitOptions, known: Collection[str]) -> SelfCheck:
-    function = BY_NAME[kernel.name.removesuffix("_theta")]
-    rows = 6 if function.rows == "6" else n
-    size = kernel.output.size
-    prototypes: Mapping[str, Prototype] = kernel.prototypes
+def labels(kernels: Iterable[KernelView]) -> tuple[str, ...]:
+    """What the values of all outputs of these kernels are called."""
+    return tuple(_label(kernel, k) for kernel in kernels for k in range(len(kernel.outputs)))
+
+
+def _label(kernel: KernelView, k: int) -> str:
+    return kernel.function.label(kernel.function.outputs[k], kernel.theta)
+
+
+def _check(kernel: KernelView, k: int, n: int, options: EmitOptions, known: Collection[str]) -> SelfCheck:
+    """Of output number k; the others go where nobody looks."""
+    quantity, output, label = kernel.function.outputs[k], kernel.outputs[k], _label(kernel, k)
+    rows = output.shape[0] if quantity.axes and quantity.axes[0] in ROWS else 1
+    prototypes = kernel.prototypes
     theta = ["theta_b_given"] if kernel.theta else []
     names = [_given(kernel, vector.name) for vector in kernel.inputs]
-    each = [f"{name}_rows + row * N" for name in names]
+    each = [f"{given.name}_rows + row * {given.length}" for given in given_vectors([kernel], n)]
     batch, lanes = (
         ["count", *(f"{name}_rows" for name in names)],
         ["count", *(f"{name}_lanes" for name in names)],
     )
-    tolerances = FORWARD_TOLERANCES if function.pivots else TOLERANCES
+    tolerances = FORWARD_TOLERANCES if kernel.positive else TOLERANCES
+
+    def found(place: str) -> list[str]:
+        return [place if i == k else f"unseen[{i}]" for i in range(len(kernel.outputs))]
+
     return SelfCheck(
-        name=kernel.name,
+        kernel=kernel.name,
+        name=label,
         rows=rows,
-        columns=size // rows,
-        single=_call(prototypes["single"], [*each, *theta, f"found + row * {size}"]),
-        batch=_call(prototypes["batch"], [*batch, *theta, "found"]),
-        lanes=_call(prototypes["batch_soa"], [*lanes, "blocks"]) if "batch_soa" in prototypes else "",
-        status=function.pivots,
-        expected=f"{kernel.name}_expected" if kernel.name in known else "",
+        columns=output.size // rows,
+        single=_call(prototypes["single"], [*each, *theta, *found(f"found + row * {output.size}")]),
+        batch=_call(prototypes["batch"], [*batch, *theta, *found("found")]),
+        lanes=_call(prototypes["batch_soa"], [*lanes, *found("blocks")]) if "batch_soa" in prototypes else "",
+        status=kernel.positive is not None,
+        expected=f"{label}_expected" if label in known else "",
         tolerance=tolerances[options.real],
     )
 
@@ -87,4 +135,4 @@ def _call(prototype: Prototype, arguments: list[str]) -> str:
 
 def _given(kernel: KernelView, vector: str) -> str:
     """The reference states' name of an input: torques depend on the parameters that they belong to."""
-    return "tau_theta" if kernel.theta and vector == "tau" else vector
+    return f"{vector}_theta" if kernel.theta and vector == TAU.name else vector

@@ -29,9 +29,10 @@ class Table:
     cpp_entries: tuple[str, ...]
 
 
-def tables(info: PackageInfo, robot: str, real: str) -> tuple[Table, ...]:
+def tables(info: PackageInfo, robot: str, real: str, with_frames: bool = False) -> tuple[Table, ...]:
     """All tables of a package, in the header's order."""
     lengths = {"dof": f"{robot}_DOF", "base_parameters": f"{robot}_BASE_PARAMETERS", "3": "3"}
+    lengths["frames"] = f"{robot}_FRAMES"
 
     def numbers(name: str, length: str, values: Iterable[float | None]) -> Table:
         kept = tuple(values)
@@ -46,6 +47,7 @@ def tables(info: PackageInfo, robot: str, real: str) -> tuple[Table, ...]:
         return Table(name, declaration, entries, f"const char *, {length}", entries)
 
     joints, parameters = info.joints, info.parameters
+    frames = (texts("frame_names", "frames", info.frames),) if with_frames else ()
     return (
         texts("joint_names", "dof", (joint.name for joint in joints)),
         texts("joint_units", "dof", (joint.unit for joint in joints)),
@@ -58,6 +60,7 @@ def tables(info: PackageInfo, robot: str, real: str) -> tuple[Table, ...]:
         numbers("theta_b", "base_parameters", (parameter.value for parameter in parameters)),
         texts("base_parameter_equations", "base_parameters", (p.equation for p in parameters)),
         texts("base_parameter_units", "base_parameters", (p.unit for p in parameters)),
+        *frames,
     )
 
 

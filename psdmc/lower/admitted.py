@@ -1,50 +1,64 @@
-"""Which functions a model can have: forward dynamics needs a positive definite mass matrix, baked code known parameters."""
+"""Which functions a model can have: some need a positive definite mass matrix or known links, baked code parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 from psdmc.errors import InputError
-from psdmc.lower.kernels import ALL_FUNCTIONS
+from psdmc.functions import DEFAULT, RECIPES
+from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix
-from psdmc.program.functions import BY_NAME
+from psdmc.model.standard_parameters import lack_of_standard_parameters
+from psdmc.recipes.recipe import Needs
 
-FORWARD = "forward_dynamics"
+REMEDY = {
+    Needs.POSITIVE_MASS: "correct the inertias, or calibrate with physical consistency",
+    Needs.STANDARD: "derive the model from a file with the inertias of all links",
+}
 
 
-def require_forward_dynamics(model: DynamicsModel, functions: Sequence[str] | None) -> None:
-    """InputError where forward dynamics is wanted (functions None: all) and `check_mass_matrix` fails."""
-    reason = None if functions is not None and FORWARD not in functions else _without_forward(model)
-    if reason is None:
-        return
-    others = ",".join(name for name in functions or ALL_FUNCTIONS if name != FORWARD)
-    raise InputError(
-        f"{model.chain.name}: no {FORWARD}: {reason}",
-        f"correct the inertias, or calibrate with physical consistency; or leave it out: --functions {others}",
-    )
+def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
+    """InputError where a wanted function (None: the default ones) needs what the model has not."""
+    names = wanted(functions)
+    lacking = _lacking(model, names)
+    for name, reason in lacking.items():
+        need = RECIPES[name].needs
+        others = ",".join(other for other in names if other not in lacking)
+        leave = f"; or leave it out: --functions {others}" if others else ""
+        raise InputError(f"{model.chain.name}: no {name}: {reason}", f"{REMEDY[need] if need else ''}{leave}")
 
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of all functions that the model can have, and a sentence for each restriction."""
-    reason = _without_forward(model)
-    if reason is None:
-        return ALL_FUNCTIONS, run_time_only(model, ALL_FUNCTIONS)
-    names = tuple(name for name in ALL_FUNCTIONS if name != FORWARD)
-    return names, (f"{FORWARD} is left out: {reason}", *run_time_only(model, names))
+    """Names of all default functions that the model can have, and a sentence for each restriction."""
+    lacking = _lacking(model, DEFAULT)
+    names = tuple(name for name in DEFAULT if name not in lacking)
+    left_out = (f"{name} is left out: {reason}" for name, reason in lacking.items())
+    return names, (*left_out, *run_time_only(model, names))
 
 
 def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
-    """A sentence that names those of `functions` (None: all) that only take parameters at run time, as theta_b is
-    unknown; none where it is known or no function needs it."""
-    wanted = ALL_FUNCTIONS if functions is None else functions
-    names = [name for name in wanted if name in BY_NAME and BY_NAME[name].theta]
+    """A sentence that names those of `functions` (None: the default ones) that only take parameters at run time, as
+    theta_b is unknown; none where it is known or no function needs it."""
+    names = [name for name in wanted(functions) if RECIPES[name].signature.theta]
     if model.theta_b is not None or not names:
         return ()
     return (f"the base parameters are unknown: {', '.join(names)} take them at run time only, as NAME_theta",)
 
 
-def _without_forward(model: DynamicsModel) -> str | None:
-    """Why the model can have no forward dynamics; None where it can, or while its parameters are unknown."""
+def _lacking(model: DynamicsModel, names: Sequence[str]) -> dict[str, str]:
+    """Function -> why the model cannot have it."""
+    reason = cache(lambda need: _REASONS[need](model))
+    needs = {name: RECIPES[name].needs for name in names}
+    found = {name: reason(need) for name, need in needs.items() if need is not None}
+    return {name: why for name, why in found.items() if why is not None}
+
+
+def _without_positive_mass(model: DynamicsModel) -> str | None:
+    """Why there is no forward dynamics; None where there is, or while the parameters are unknown."""
     mass = check_mass_matrix(model)
     return None if mass is None or mass.passed else mass.reason
+
+
+_REASONS = {Needs.POSITIVE_MASS: _without_positive_mass, Needs.STANDARD: lack_of_standard_parameters}

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.solve import factorize, solve
 from psdmc.lower.expanded_diagram import Diagram, nested_horner, operations, with_constants
 from psdmc.lower.expanded_orders import Joints, base_first, candidates, tip_first
 from psdmc.lower.expanded_terms import (
@@ -22,23 +23,13 @@ from psdmc.lower.expanded_terms import (
     with_gravity,
 )
 from psdmc.lower.expanded_values import polynomial_values, row_symbols
-from psdmc.lower.solve import factorize, solve
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
-from psdmc.program.functions import BY_NAME
 from psdmc.program.pipeline import optimize
 from psdmc.program.program import Program, Slot
+from psdmc.program.signature import Sizes
 from psdmc.program.trace import Number, Symbol, Tracer
-
-SUPPORTED = (
-    "inverse_dynamics",
-    "forward_dynamics",
-    "mass_matrix",
-    "nonlinear_effects",
-    "gravity",
-    "regressor",
-)
-"""Functions of psdmc/program/functions.py that this lowering makes."""
+from psdmc.recipes.recipe import Polynomials, Recipe
 
 Outputs = list[tuple[Slot, Symbol | Number]]
 
@@ -47,35 +38,36 @@ TRACED = 3
 """Diagrams, of those that should be cheapest, that are traced and optimized to find the one that is."""
 
 
-def lower_expanded(model: DynamicsModel, function_name: str, theta: bool) -> Program:
-    """The PROGRAM of one function in SUPPORTED; with `theta`, theta_b is an input instead of constants.
+def lower_expanded(model: DynamicsModel, recipe: Recipe, theta: bool) -> Program:
+    """The PROGRAM of one function that is a part of the torques' polynomials; with `theta`, theta_b is an input instead
+    of constants.
 
     Row order, and whether parameters enter before or after equal parts are found, are chosen by cost, the
     same on every machine. InputError where the model has no E and P, or its base parameters are needed and
     unknown; SingularMassMatrix where the mass matrix cannot be inverted for any q.
     """
-    if function_name not in SUPPORTED or (theta and not BY_NAME[function_name].theta):
-        raise ValueError(f"the expanded lowering does not make {function_name}{'_theta' * theta}")
-    diagrams = sorted(_diagrams(model, function_name, theta), key=lambda d: sum(operations(d)))
-    programs = (_traced(model, function_name, theta, diagram) for diagram in diagrams[:TRACED])
+    if recipe.polynomials is None or (theta and not recipe.signature.theta):
+        raise ValueError(f"the expanded lowering does not make {recipe.name}{'_theta' * theta}")
+    diagrams = sorted(_diagrams(model, recipe.polynomials, theta), key=lambda d: sum(operations(d)))
+    programs = (_traced(model, recipe, theta, diagram) for diagram in diagrams[:TRACED])
     return min(programs, key=lambda program: cost(program).total)
 
 
-def _diagrams(model: DynamicsModel, function_name: str, theta: bool) -> Iterator[Diagram]:
+def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool) -> Iterator[Diagram]:
     """Candidates. Baked parameters enter as rows that become constants afterwards - equal parts are then found
     whatever the parameters' values, and constants sit furthest in - or in the coefficients at once."""
     n = model.n
-    if function_name == "regressor":
+    if part is Polynomials.REGRESSOR:
         yield from _in_all_orders(with_gravity(regressor_terms(model), model.chain), tip_first(n))
         return
-    symbolic = _part(function_name, with_gravity(torque_terms(model), model.chain), n)
+    symbolic = _part(part, with_gravity(torque_terms(model), model.chain), n)
     if theta:
         yield from _in_all_orders(symbolic, base_first(n))
         return
     values = dict(enumerate(known_parameters(model).tolist(), start=5 * n))
     present = _without_zero_rows(symbolic, values)
     yield from (with_constants(diagram, values) for diagram in _in_all_orders(present, base_first(n)))
-    baked = _part(function_name, with_gravity(baked_torque_terms(model), model.chain), n)
+    baked = _part(part, with_gravity(baked_torque_terms(model), model.chain), n)
     yield from _in_all_orders(baked, base_first(n))
 
 
@@ -89,36 +81,38 @@ def _without_zero_rows(terms: Terms, values: Mapping[int, float]) -> Terms:
     return terms.where(np.asarray(~terms.exponents[zero].any(axis=0)))
 
 
-def _part(function_name: str, torque: Terms, n: int) -> Terms:
+def _part(part: Polynomials, torque: Terms, n: int) -> Terms:
     """The terms of a function's polynomials, out of those of all torques."""
-    match function_name:
-        case "mass_matrix":
+    match part:
+        case Polynomials.MASS:
             return mass_matrix_terms(torque, n)
-        case "nonlinear_effects":
+        case Polynomials.BIAS:
             return nonlinear_terms(torque, n)
-        case "gravity":
+        case Polynomials.GRAVITY:
             return gravity_terms(torque, n)
-        case "forward_dynamics":
+        case Polynomials.SOLVED:
             return joined(mass_matrix_terms(torque, n), nonlinear_terms(torque, n), n * n)
     return torque
 
 
-def _traced(model: DynamicsModel, function_name: str, theta: bool, diagram: Diagram) -> Program:
+def _traced(model: DynamicsModel, recipe: Recipe, theta: bool, diagram: Diagram) -> Program:
     tracer = Tracer()
     values = polynomial_values(diagram, row_symbols(tracer, model, theta))
-    return optimize(tracer.finish(_outputs(tracer, model, function_name, values)))
+    return optimize(tracer.finish(_outputs(tracer, model, recipe, values)))
 
 
-def _outputs(tracer: Tracer, model: DynamicsModel, function_name: str, values: dict[int, Scalar]) -> Outputs:
-    n, function = model.n, BY_NAME[function_name]
-    if function_name == "mass_matrix":
-        return _vector("M", [entry for row in _symmetric(values, n) for entry in row])
-    if function_name == "forward_dynamics":
-        torque = tracer.symbols("tau", n)
+def _outputs(tracer: Tracer, model: DynamicsModel, recipe: Recipe, values: dict[int, Scalar]) -> Outputs:
+    n, signature = model.n, recipe.signature
+    output = signature.outputs[0]
+    if recipe.polynomials is Polynomials.MASS:
+        return _vector(output.name, [entry for row in _symmetric(values, n) for entry in row])
+    if recipe.polynomials is Polynomials.SOLVED:
+        torque = tracer.symbols(signature.inputs[-1].name, n)
         load = [tau - values.get(n * n + i, 0.0) for i, tau in enumerate(torque)]
         factors = factorize(_symmetric(values, n))
-        return _vector("qdd", solve(factors, load)) + _vector("pivot", factors.pivots)
-    return _vector(function.output, [values.get(i, 0.0) for i in range(function.size(n, model.l))])
+        return _vector(output.name, solve(factors, load)) + _vector(signature.stored[-1].name, factors.pivots)
+    size = Sizes.of_chain(n, model.l).size(output)
+    return _vector(output.name, [values.get(i, 0.0) for i in range(size)])
 
 
 def _vector(name: str, values: Sequence[Scalar]) -> Outputs:

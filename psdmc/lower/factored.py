@@ -6,25 +6,37 @@ One PROGRAM per generated function. What can be chosen freely is in an Arrangeme
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.kinematics import jacobian
-from psdmc.dynamics.motion import Choices
-from psdmc.dynamics.newton_euler import inverse_dynamics
-from psdmc.dynamics.regressor import regressor
-from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
+from psdmc.dynamics.motion import PLAIN, Choices
+from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.errors import InternalError
 from psdmc.lower.carriers import bodies_from_carriers
 from psdmc.lower.reframe import Reframed
-from psdmc.lower.solve import factorize, solve
 from psdmc.program.cost import Cost
-from psdmc.program.functions import BY_NAME
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
-from psdmc.program.trace import Number, Outputs, Symbol, Tracer
-from psdmc.robot.chain import Array
+from psdmc.program.signature import Signature, Sizes
+from psdmc.program.trace import Number, Symbol, Tracer
+from psdmc.program.trace import Outputs as Recorded
+from psdmc.recipes.recipe import Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array, Chain
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotConstants:
+    """What of a model every trace needs.
+
+    representative  (11 n, l)  theta_b to standard parameters about the link frames
+    theta_b         (l,)       None: an input of the PROGRAM
+    """
+
+    chain: Chain
+    representative: Array
+    theta_b: Array | None
+    sizes: Sizes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,42 +61,80 @@ class Arrangement:
         return len(self.reframed.frames)
 
 
-@dataclass(frozen=True, slots=True)
-class Ingredients:
-    """What the recursions run on, in the arrangement's unit of length."""
-
-    reframed: Reframed
-    base: Vector
-    bodies: tuple[Body, ...]
-    drives: tuple[Scalar, ...]
-    choices: Choices
-    inputs: dict[str, list[Symbol]]
-
-
-Values = Sequence[Scalar]
-
-
-def trace_dynamics(name: str, arrangement: Arrangement, theta_b: Array | None) -> Program:
-    """The PROGRAM of one function that needs bodies; theta_b None makes it an input."""
+def trace_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Program:
+    """The PROGRAM of one function that needs bodies; unknown base parameters become an input."""
     tracer = Tracer()
-    return drop_unused(tracer.finish(_recorded(name, arrangement, theta_b, tracer)))
+    return drop_unused(tracer.finish(_recorded(recipe, arrangement, robot, tracer)))
 
 
-def cost_of_dynamics(name: str, arrangement: Arrangement, theta_b: Array | None) -> Cost:
+def cost_of_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Cost:
     """What that PROGRAM costs."""
     tracer = Tracer()
-    return tracer.cost(_recorded(name, arrangement, theta_b, tracer))
+    return tracer.cost(_recorded(recipe, arrangement, robot, tracer))
 
 
-def _recorded(name: str, arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> Outputs:
-    function = BY_NAME[name]
-    n = arrangement.n
-    inputs = {vector: tracer.symbols(vector, n) for vector in function.inputs}
-    values = _carrier_values(arrangement, theta_b, tracer)
-    scaled = in_unit(arrangement.reframed, arrangement.unit)
-    bodies, drives = bodies_from_carriers(n, arrangement.carriers, values, arrangement.unit)
-    ingredients = Ingredients(scaled, scaled.base, bodies, drives, arrangement.choices, inputs)
-    return _TRACES[name](ingredients)
+def _recorded(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, tracer: Tracer) -> Recorded:
+    inputs = _inputs(recipe, robot, tracer)
+    n, unit = arrangement.n, arrangement.unit
+    values = _carrier_values(arrangement, robot.theta_b, tracer)
+    bodies, drives = bodies_from_carriers(n, arrangement.carriers, values, unit)
+    scaled = in_unit(arrangement.reframed, unit)
+    return _traced(recipe, robot, scaled, inputs, bodies, drives, arrangement.choices, unit)
+
+
+def trace_geometry(recipe: Recipe, reframed: Reframed, robot: RobotConstants) -> Program:
+    """The PROGRAM of one function that needs no theta_b."""
+    tracer = Tracer()
+    inputs = _inputs(recipe, robot, tracer)
+    return drop_unused(tracer.finish(_traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0)))
+
+
+def _traced(
+    recipe: Recipe,
+    robot: RobotConstants,
+    reframed: Reframed,
+    inputs: dict[str, list[Symbol]],
+    bodies: tuple[Body, ...],
+    drives: tuple[Scalar, ...],
+    choices: Choices,
+    unit: float,
+) -> Recorded:
+    ingredients = Ingredients(
+        frames=reframed.frames,
+        base=reframed.base,
+        bodies=bodies,
+        drives=drives,
+        choices=choices,
+        unit=unit,
+        base_axes=reframed.base_axes,
+        base_origin=reframed.base_origin,
+        link_frames=reframed.link_frames,
+        named=reframed.named,
+        tip=reframed.tip,
+        tip_body=reframed.tip_body,
+        lift=robot.representative,
+        standard=robot.chain.parameters,
+        inputs=inputs,
+    )
+    return _stored(recipe.signature, recipe.trace(ingredients))
+
+
+def _inputs(recipe: Recipe, robot: RobotConstants, tracer: Tracer) -> dict[str, list[Symbol]]:
+    return {q.name: tracer.symbols(q.name, robot.sizes.size(q)) for q in recipe.signature.inputs}
+
+
+def _stored(signature: Signature, outputs: Outputs) -> Recorded:
+    """Every entry of what a trace gives; InternalError where that is not what the signature says."""
+    if tuple(outputs) != tuple(quantity.name for quantity in signature.stored):
+        raise InternalError(f"{signature.name}: its trace gives {', '.join(outputs)}")
+    return [
+        (Slot(name, i), value) for name, values in outputs.items() for i, value in enumerate(_flat(values))
+    ]
+
+
+def _flat(values: Any) -> list[Symbol | Number]:
+    """Entries of nested sequences, row by row."""
+    return [x for value in values for x in _flat(value)] if isinstance(values, list | tuple) else [values]
 
 
 def _carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:
@@ -116,112 +166,3 @@ def in_unit(reframed: Reframed, unit: float) -> Reframed:
 def _ratio(value: float, unit: float) -> float:
     ratio = value / unit
     return float(round(ratio)) if abs(abs(ratio) - 1.0) < 1e-13 else ratio
-
-
-def _vector(name: str, values: Sequence[Scalar]) -> list[tuple[Slot, Symbol | Number]]:
-    return [(Slot(name, i), value) for i, value in enumerate(values)]
-
-
-def _matrix(name: str, rows: Sequence[Sequence[Scalar]]) -> list[tuple[Slot, Symbol | Number]]:
-    return _vector(name, [value for row in rows for value in row])
-
-
-def _torques(
-    g: Ingredients, qd: Values, qdd: Values, base: Vector, qd_r: Values | None = None
-) -> tuple[Scalar, ...]:
-    frames = g.reframed.frames
-    return inverse_dynamics(frames, g.bodies, g.drives, g.inputs["q"], qd, qdd, base, g.choices, qd_r)
-
-
-def _still(g: Ingredients) -> list[Scalar]:
-    return [0.0] * len(g.bodies)
-
-
-def _inverse_dynamics(g: Ingredients) -> list[tuple[Slot, Symbol | Number]]:
-    return _vector("tau", _torques(g, g.inputs["qd"], g.inputs["qdd"], g.base))
-
-
-def _nonlinear_effects(g: Ingredients) -> list[tuple[Slot, Symbol | Number]]:
-    return _vector("h", _torques(g, g.inputs["qd"], _still(g), g.base))
-
-
-def _gravity(g: Ingredients) -> list[tuple[Slot, Symbol | Number]]:
-    still = _still(g)
-    return _vector("g", _torques(g, still, still, g.base))
-
-
-def _mass_matrix(g: Ingredients) -> list[tuple[Slot, Symbol | Number]]:
-    return _matrix("M", mass_matrix(g.reframed.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
-
-
-def _coriolis_matrix(g: Ingredients) -> list[tuple[Slot, Symbol | Number]]:
-    """Column j is the Slotine-Li torque of a unit reference rate of joint j, without gravity."""
-    n = len(g.bodies)
-    columns = []
-    for j in range(n):
-        unit: list[Scalar] = [1.0 if i == j else 0.0 for i in range(n)]
-        columns.append(_torques(g, g.inputs["qd"], _still(g), ZERO, unit))
-    return _matrix("C", list(zip(*columns, strict=True)))
-
-
-def _forward_dynamics(g: Ingredients) -> list[tuple[Slot, Symbol | Number]]:
-    """The mass matrix is factorized before the bias is found: its divisions wait for each other, the recursion fills
-    the time."""
-    factors = factorize(mass_matrix(g.reframed.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
-    bias = _torques(g, g.inputs["qd"], _still(g), g.base)
-    load = [tau - h for tau, h in zip(g.inputs["tau"], bias, strict=True)]
-    return _vector("qdd", solve(factors, load)) + _vector("pivot", factors.pivots)
-
-
-_TRACES: dict[str, Callable[[Ingredients], list[tuple[Slot, Symbol | Number]]]] = {
-    "inverse_dynamics": _inverse_dynamics,
-    "forward_dynamics": _forward_dynamics,
-    "mass_matrix": _mass_matrix,
-    "nonlinear_effects": _nonlinear_effects,
-    "coriolis_matrix": _coriolis_matrix,
-    "gravity": _gravity,
-}
-
-
-def trace_regressor(name: str, reframed: Reframed, representative: Array) -> Program:
-    """The PROGRAM of the regressor (name "regressor" or "regressor_slotine_li") with columns in theta_b's order.
-
-    representative  (11 n, l)  theta_b to standard parameters about the link frames
-    """
-    tracer, function = Tracer(), BY_NAME[name]
-    n, l = len(reframed.frames), representative.shape[1]
-    inputs = {vector: tracer.symbols(vector, n) for vector in function.inputs}
-    needed = [j for j in range(11 * n) if representative[j].any()]
-    accelerations = inputs["qdd_r"] if "qdd_r" in inputs else inputs["qdd"]
-    rows = regressor(
-        reframed.frames,
-        reframed.link_frames,
-        set(needed),
-        inputs["q"],
-        inputs["qd"],
-        accelerations,
-        reframed.base,
-        inputs.get("qd_r"),
-    )
-    outputs: list[tuple[Slot, Symbol | Number]] = []
-    for i, row in enumerate(rows):
-        for column in range(l):
-            total: Scalar = 0.0
-            for j in needed:
-                if representative[j, column] and j in row:
-                    total = total + row[j] * float(representative[j, column])
-            outputs.append((Slot("Y", l * i + column), total))
-    return drop_unused(tracer.finish(outputs))
-
-
-def trace_jacobian(reframed: Reframed) -> Program:
-    """The PROGRAM of the tip's geometric Jacobian in the chain's base frame."""
-    tracer = Tracer()
-    q = tracer.symbols("q", len(reframed.frames))
-    rows = jacobian(reframed.frames, reframed.tip_body, reframed.tip, q)
-    turned = [
-        [dot(axes, (rows[k][j], rows[k + 1][j], rows[k + 2][j])) for j in range(len(q))]
-        for k in (0, 3)
-        for axes in reframed.base_axes
-    ]
-    return drop_unused(tracer.finish(_matrix("J", turned)))

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal
 
+from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.errors import InputError
-from psdmc.lower.expanded import SUPPORTED, lower_expanded
-from psdmc.lower.factored import Arrangement, trace_jacobian, trace_regressor
+from psdmc.functions import DEFAULT, RECIPES
+from psdmc.lower.expanded import lower_expanded
+from psdmc.lower.factored import Arrangement, trace_geometry
 from psdmc.lower.search import BATCH, SINGLE, Search, Spaces, Target
-from psdmc.lower.solve import SingularMassMatrix
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.program.functions import BY_NAME, FUNCTIONS, Function
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
+from psdmc.recipes.recipe import Recipe
 from psdmc.robot.derivable import require_derivable
 
 Lowering = Literal["auto", "expanded", "factored"]
@@ -22,22 +23,8 @@ Lowering = Literal["auto", "expanded", "factored"]
 EXPANDED_LIMIT = 600
 """`auto` tries the expanded lowering up to this many functions p; beyond, it has never been the cheaper."""
 
-ALL_FUNCTIONS = tuple(function.name for function in FUNCTIONS)
-
-REGRESSORS = ("regressor", "regressor_slotine_li")
-
 WORTH_TWO_BODIES = 1.03
 """Lanes get a body of their own only where it saves them this much: the C of both is long."""
-
-GEOMETRY = "inverse_dynamics"
-"""The function whose search decides where frames sit and the unit of length, for all functions."""
-
-SHARED = {
-    "nonlinear_effects": "inverse_dynamics",
-    "gravity": "inverse_dynamics",
-    "coriolis_matrix": "inverse_dynamics",
-}
-"""Functions that run another's recursion: its arrangement is taken over, only the choices in it are made anew."""
 
 
 def lower(
@@ -47,48 +34,53 @@ def lower(
     progress: Callable[[str], None] = lambda message: None,
     theta_variants: bool = True,
 ) -> dict[str, Kernel]:
-    """Kernels by name, `_theta` variants included where wanted, in the order of FUNCTIONS.
+    """Kernels by name, `_theta` variants included where wanted, in the order of psdmc.functions.
 
-    functions  names of FUNCTIONS; None takes all; without theta_b only those variants that need none are made
+    functions  names; None takes the default ones; without theta_b only those variants that need none are made
     Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
     require_derivable(model.chain)
-    wanted = _wanted(model, functions)
     lowered = _Lowered(model, lowering)
     kernels: dict[str, Kernel] = {}
-    for name in wanted:
-        for theta in (False, True) if BY_NAME[name].theta and theta_variants else (False,):
-            if not theta and model.theta_b is None and BY_NAME[name].theta:
+    for recipe in map(RECIPES.__getitem__, wanted(functions)):
+        takes_theta = recipe.signature.theta
+        for theta in (False, True) if takes_theta and theta_variants else (False,):
+            if not theta and model.theta_b is None and takes_theta:
                 continue
-            progress(name + ("_theta" if theta else ""))
+            progress(recipe.name + ("_theta" if theta else ""))
             try:
-                kernel = lowered.kernel(BY_NAME[name], theta)
+                kernel = lowered.kernel(recipe, theta)
             except SingularMassMatrix as singular:
-                raise _refusal(model, singular) from singular
+                raise _refusal(model, recipe.name, singular) from singular
             kernels[kernel.name] = kernel
     return kernels
 
 
-def _wanted(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
+def wanted(functions: Sequence[str] | None) -> tuple[str, ...]:
+    """The names in the order of psdmc.functions; None and the word 'default': the default ones, 'all': all of them.
+    InputError for one that is unknown."""
     if functions is None:
-        return ALL_FUNCTIONS
-    unknown = [name for name in functions if name not in BY_NAME]
+        return DEFAULT
+    groups = {"default": DEFAULT, "all": tuple(RECIPES)}
+    names = [name for word in functions for name in groups.get(word, (word,))]
+    unknown = [name for name in names if name not in RECIPES]
     if unknown:
         raise InputError(
-            f"function {unknown[0]!r} is not known", f"psdmc generates {', '.join(ALL_FUNCTIONS)}"
+            f"function {unknown[0]!r} is not known", f"psdmc generates {', '.join((*RECIPES, *groups))}"
         )
-    return tuple(name for name in ALL_FUNCTIONS if name in functions)
+    return tuple(name for name in RECIPES if name in names)
 
 
-def _refusal(model: DynamicsModel, singular: SingularMassMatrix) -> InputError:
+def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> InputError:
     joint = model.joint_names[singular.joint]
     return InputError(
-        f"{model.chain.name}: forward_dynamics: joint {joint!r} moves no inertia, the mass matrix is singular for every q",
-        "give its link an inertia, add --drive-inertia, or leave forward_dynamics out of --functions",
+        f"{model.chain.name}: {name}: joint {joint!r} moves no inertia, the mass matrix is singular for every q",
+        f"give its link an inertia, add --drive-inertia, or leave {name} out of --functions",
     )
 
 
-def _kernel(function: Function, theta: bool, single: Program, batch: Program, lowering: str) -> Kernel:
+def _kernel(recipe: Recipe, theta: bool, single: Program, batch: Program, lowering: str) -> Kernel:
+    function = recipe.signature
     for_one, shared = ordered(shortened(single))
     if batch == single:
         return Kernel(function, theta, for_one, shared, lowering)
@@ -108,49 +100,46 @@ class _Lowered:
         self._arrangements: dict[tuple[str, bool], Arrangement] = {}
         self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
 
-    def kernel(self, function: Function, theta: bool) -> Kernel:
+    def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
         candidates: list[Kernel] = []
-        if self._may_expand(function):
-            program = lower_expanded(self.model, function.name, theta)
-            candidates.append(_kernel(function, theta, program, program, "expanded"))
+        if self._may_expand(recipe):
+            program = lower_expanded(self.model, recipe, theta)
+            candidates.append(_kernel(recipe, theta, program, program, "expanded"))
         if self.lowering != "expanded" or not candidates:
-            single = self._factored(function.name, theta, SINGLE)
-            batch = self._factored(function.name, theta, BATCH)
-            candidates.append(_kernel(function, theta, single, batch, "factored"))
+            single = self._factored(recipe, theta, SINGLE)
+            batch = self._factored(recipe, theta, BATCH)
+            candidates.append(_kernel(recipe, theta, single, batch, "factored"))
         return min(candidates, key=lambda kernel: SINGLE.score(kernel.single))
 
-    def _may_expand(self, function: Function) -> bool:
-        if self.lowering == "factored" or function.name not in SUPPORTED or self.model.p is None:
+    def _may_expand(self, recipe: Recipe) -> bool:
+        if self.lowering == "factored" or recipe.polynomials is None or self.model.p is None:
             return False
         return self.lowering == "expanded" or self.model.p <= EXPANDED_LIMIT
 
-    def _factored(self, name: str, theta: bool, target: Target) -> Program:
-        return min(self._candidates(name, theta), key=target.score)
+    def _factored(self, recipe: Recipe, theta: bool, target: Target) -> Program:
+        return min(self._candidates(recipe, theta), key=target.score)
 
-    def _candidates(self, name: str, theta: bool) -> tuple[Program, ...]:
+    def _candidates(self, recipe: Recipe, theta: bool) -> tuple[Program, ...]:
         """What the targets choose from; traced once for all of them."""
-        if (name, theta) not in self._traced:
-            self._traced[name, theta] = tuple(self._traces(name, theta))
-        return self._traced[name, theta]
+        if (recipe.name, theta) not in self._traced:
+            self._traced[recipe.name, theta] = tuple(self._traces(recipe, theta))
+        return self._traced[recipe.name, theta]
 
-    def _traces(self, name: str, theta: bool) -> Iterator[Program]:
+    def _traces(self, recipe: Recipe, theta: bool) -> Iterator[Program]:
         search = self._search(theta)
-        if name == "jacobian" or name in REGRESSORS:
-            for feet in search.feet():
-                reframed, _ = search.space(feet)
-                yield (
-                    trace_jacobian(reframed)
-                    if name == "jacobian"
-                    else trace_regressor(name, reframed, self.model.representative)
-                )
-        else:
-            yield from search.rearrangements(name, self._arrangement(SHARED.get(name, name), theta))
+        if recipe.signature.theta:
+            arranged = RECIPES[recipe.shares] if recipe.shares else recipe
+            yield from search.rearrangements(recipe, self._arrangement(arranged, theta))
+            return
+        for feet in search.feet():
+            yield trace_geometry(recipe, search.space(feet)[0], search.robot)
 
-    def _arrangement(self, name: str, theta: bool) -> Arrangement:
-        if (name, theta) not in self._arrangements:
-            start = None if name == GEOMETRY else self._arrangement(GEOMETRY, theta)
-            self._arrangements[name, theta] = self._search(theta).best(name, SINGLE, start)
-        return self._arrangements[name, theta]
+    def _arrangement(self, recipe: Recipe, theta: bool) -> Arrangement:
+        key = recipe.name, theta
+        if key not in self._arrangements:
+            start = self._arrangement(RECIPES[recipe.starts], theta) if recipe.starts else None
+            self._arrangements[key] = self._search(theta).best(recipe, SINGLE, start)
+        return self._arrangements[key]
 
     def _search(self, theta: bool) -> Search:
         if theta not in self._searches:

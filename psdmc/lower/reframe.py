@@ -11,14 +11,14 @@ neighbour's origin.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector
 from psdmc.dynamics.scalar import Matrix, Vector
-from psdmc.robot.chain import BASE, Array, Chain, Placement
+from psdmc.robot.chain import BASE, Array, Chain, NamedFrame, Placement
 from psdmc.robot.small import length, times
 
 Foot = Literal["previous", "next"]
@@ -51,6 +51,8 @@ class Reframed:
     tip          the tip frame in the new joint frame of `tip_body`
     base_axes    3 x 3, the axes that the first frame turns from, as columns in the robot's base frame
     tip_body     the body that the tip frame is fixed to
+    base_origin  m, the point that frames on the base have their translations from, in the robot's base frame
+    named        the robot's named frames in the new joint frames
     """
 
     frames: tuple[Frame, ...]
@@ -59,6 +61,8 @@ class Reframed:
     tip: Placement
     base_axes: Matrix
     tip_body: int
+    base_origin: Vector
+    named: tuple[NamedFrame, ...]
 
     def is_same(self, other: Reframed) -> bool:
         """Whether every number of both is."""
@@ -101,9 +105,24 @@ def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
         link_frames.append(_rounded(mine.inverse() @ placed[i] @ joint.link_frame, reach))
     base = _clean_lengths(times(before[0].T, -chain.gravity), length(chain.gravity))
     end = chain.tip_body
-    tip = _rounded(Placement(after[end], origins[end]).inverse() @ placed[end] @ chain.tip, reach)
+    tip = _rounded(_moved(after, origins, placed, chain.tip_frame), reach)
+    named = tuple(
+        replace(frame, placement=_rounded(_moved(after, origins, placed, frame), reach))
+        for frame in chain.frames
+    )
     base_axes = as_matrix(np.where(np.abs(before[0]) < EXACT, 0.0, before[0]).tolist())
-    return Reframed(tuple(frames), as_vector(base.tolist()), tuple(link_frames), tip, base_axes, end)
+    origin = as_vector((_clean_lengths(origins[0], reach) + 0.0).tolist())
+    return Reframed(
+        tuple(frames), as_vector(base.tolist()), tuple(link_frames), tip, base_axes, end, origin, named
+    )
+
+
+def _moved(
+    axes: Sequence[Array], origins: Sequence[Array], placed: Sequence[Placement], frame: NamedFrame
+) -> Placement:
+    """Where a named frame sits in the new frame of its joint."""
+    k = frame.joint
+    return Placement(axes[k], origins[k]).inverse() @ placed[k] @ frame.placement
 
 
 def _rounded(place: Placement, reach: float) -> Placement:

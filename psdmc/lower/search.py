@@ -8,7 +8,7 @@ budget is a number of traced programs, not a time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -16,10 +16,12 @@ import numpy as np
 
 from psdmc.dynamics.motion import Choices
 from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace, carrier_space
-from psdmc.lower.factored import Arrangement, cost_of_dynamics, trace_dynamics
+from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
 from psdmc.lower.reframe import Foot, Reframed, reframe
 from psdmc.program.cost import Cost, cost
 from psdmc.program.program import Program
+from psdmc.program.signature import Sizes
+from psdmc.recipes.recipe import Recipe
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
 
 BUDGET = 600
@@ -68,10 +70,11 @@ ALL_CHOICES = (*CHOICES, *(replace(choices, add_sines=True) for choices in CHOIC
 """What `rearranged` tries; the descent leaves added sines out, which pay only where each angle has a sincos of its own."""
 
 
-DISTINCT = {
-    "mass_matrix": tuple(Choices(fold_double_angle=double) for double in (False, True)),
-}
-"""Functions to which few choices make a difference: one of each kind, the first of its kind in ALL_CHOICES."""
+def distinct(recipe: Recipe, choices: Sequence[Choices]) -> tuple[Choices, ...]:
+    """Those that make a difference to a function: the first of each kind."""
+    kinds = {tuple(getattr(each, field) for field in recipe.matters): each for each in reversed(choices)}
+    return tuple(each for each in choices if each in kinds.values())
+
 
 Spaces = dict[tuple[Foot, ...], tuple[Reframed, CarrierSpace]]
 """A model's geometry by where frames sit, and what can carry the model there."""
@@ -88,15 +91,17 @@ class Search:
         budget: int = BUDGET,
         spaces: Spaces | None = None,
     ) -> None:
-        self.chain, self.representative, self.theta_b, self.budget = chain, representative, theta_b, budget
+        sizes = Sizes.of_chain(len(chain), representative.shape[1], len(chain.frames))
+        self.robot = RobotConstants(chain, representative, theta_b, sizes)
+        self.chain, self.representative, self.budget = chain, representative, budget
         self._spaces: Spaces = {} if spaces is None else spaces
         self._frames: dict[tuple[Foot, ...], Reframed] = {}
 
-    def best(self, name: str, target: Target, start: Arrangement | None = None) -> Arrangement:
+    def best(self, recipe: Recipe, target: Target, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function; `start` is one found for another, whose geometry stays."""
-        descent = _Descent(lambda a: target.weight(cost_of_dynamics(name, a, self.theta_b)), self.budget)
+        descent = _Descent(lambda a: target.weight(cost_of_dynamics(recipe, a, self.robot)), self.budget)
         if start is not None:
-            descent.consider(replace(start, choices=choices) for choices in DISTINCT.get(name, CHOICES))
+            descent.consider(replace(start, choices=choices) for choices in distinct(recipe, CHOICES))
         else:
             for candidate in self.feet():
                 descent.consider(self.starts(candidate))
@@ -105,18 +110,18 @@ class Search:
             pass
         return descent.arrangement
 
-    def rearranged(self, name: str, found: Arrangement, target: Target) -> Program:
+    def rearranged(self, recipe: Recipe, found: Arrangement, target: Target) -> Program:
         """The PROGRAM of a function in an arrangement found for another function or target: only the choices within
         the recursion are made anew."""
-        return min(self.rearrangements(name, found), key=target.score)
+        return min(self.rearrangements(recipe, found), key=target.score)
 
-    def rearrangements(self, name: str, found: Arrangement) -> Iterator[Program]:
+    def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
         """The PROGRAMs that `rearranged` chooses from: the cheapest for each target, the others are only counted."""
-        tried = [replace(found, choices=choices) for choices in _felt(found, DISTINCT.get(name, ALL_CHOICES))]
-        costs = [cost_of_dynamics(name, arrangement, self.theta_b) for arrangement in tried]
+        tried = [replace(found, choices=choices) for choices in _felt(found, distinct(recipe, ALL_CHOICES))]
+        costs = [cost_of_dynamics(recipe, arrangement, self.robot) for arrangement in tried]
         weights = [[target.weight(each) for each in costs] for target in (SINGLE, BATCH)]
         for best in sorted({each.index(min(each)) for each in weights}):
-            yield trace_dynamics(name, tried[best], self.theta_b)
+            yield trace_dynamics(recipe, tried[best], self.robot)
 
     def feet(self) -> Iterator[tuple[Foot, ...]]:
         """Those of `all_feet` that give different frames: parallel and crossing axes have the same foot either way."""

@@ -88,8 +88,18 @@ class DynamicsModel:
     def pivots(self) -> tuple[int, ...]:
         """For each base parameter the first standard parameter (index into x) that enters it alone, and as
         itself."""
+        return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
+
+    @property
+    def is_reduced(self) -> bool:
+        """Whether every base parameter has such a pivot, as derivation makes them."""
+        return bool(self._leads.any(axis=1).all())
+
+    @property
+    def _leads(self) -> NDArray[np.bool_]:
+        """(l, 11n) where a standard parameter enters one base parameter alone, and as itself."""
         is_alone = (self.B != 0.0).sum(axis=0) == 1
-        return tuple(int(np.flatnonzero(is_alone & (row == 1.0))[0]) for row in self.B)
+        return np.asarray(is_alone & (self.B == 1.0))
 
     @property
     def representative(self) -> Array:

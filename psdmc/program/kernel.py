@@ -4,30 +4,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from psdmc.program.functions import Function
 from psdmc.program.program import Program
+from psdmc.program.signature import Signature
 
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
     """A function and the PROGRAMs that compute it.
 
-    function  which vectors it reads and writes
+    function  which quantities it reads and writes
     theta     whether it also reads theta_b, the base parameters, at run time
     single    arithmetic in an order for one state
     batch     arithmetic in an order for one state per SIMD lane; may be the same object
     lowering  how it was made: 'expanded' or 'factored'
     """
 
-    function: Function
+    function: Signature
     theta: bool
     single: Program
     batch: Program
     lowering: str
 
     def __post_init__(self) -> None:
-        inputs = {*self.function.inputs, *(("theta_b",) if self.theta else ())}
-        outputs = {self.function.output, *(("pivot",) if self.function.pivots else ())}
+        inputs = set(self.inputs)
+        outputs = {quantity.name for quantity in self.function.stored}
         for program in (self.single, self.batch):
             foreign = [str(slot) for slot in program.inputs() if slot.vector not in inputs]
             foreign += [str(slot) for slot, _ in program.outputs if slot.vector not in outputs]
@@ -38,3 +38,8 @@ class Kernel:
     def name(self) -> str:
         """Function name, with '_theta' where parameters are given at run time."""
         return self.function.name + ("_theta" if self.theta else "")
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the vectors that it reads, in the order of C's arguments."""
+        return (*(q.name for q in self.function.inputs), *(("theta_b",) if self.theta else ()))

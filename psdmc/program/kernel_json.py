@@ -8,9 +8,9 @@ from typing import Any
 
 from psdmc.errors import InternalError
 from psdmc.program.check import check
-from psdmc.program.functions import BY_NAME
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.signature import Signature
 
 FORMAT = 1
 """Grows where the text's form changes."""
@@ -31,22 +31,25 @@ def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
     return json.dumps({"format": FORMAT, "kernels": entries}, separators=(",", ":"), allow_nan=False)
 
 
-def kernels_from_json(text: str) -> dict[str, Kernel]:
-    """Kernels by name, in the order of `kernels_to_json`; InternalError where the text is not of its making."""
+def kernels_from_json(text: str, functions: Mapping[str, Signature]) -> dict[str, Kernel]:
+    """Kernels by name, in the order of `kernels_to_json`; InternalError where the text is not of its making.
+
+    functions  signatures by name, one of which each kernel must have
+    """
     try:
         whole = json.loads(text)
         if whole["format"] != FORMAT:
             raise ValueError(f"format {whole['format']}, expected {FORMAT}")
-        kernels = [_kernel_from_plain(entry) for entry in whole["kernels"]]
+        kernels = [_kernel_from_plain(entry, functions) for entry in whole["kernels"]]
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise InternalError(f"kept kernels cannot be read: {error}") from error
     return {kernel.name: kernel for kernel in kernels}
 
 
-def _kernel_from_plain(entry: Mapping[str, Any]) -> Kernel:
+def _kernel_from_plain(entry: Mapping[str, Any], functions: Mapping[str, Signature]) -> Kernel:
     single = _program_from_plain(entry["single"])
     batch = single if entry["batch"] is None else _program_from_plain(entry["batch"])
-    return Kernel(BY_NAME[entry["function"]], entry["theta"], single, batch, entry["lowering"])
+    return Kernel(functions[entry["function"]], entry["theta"], single, batch, entry["lowering"])
 
 
 def _program_to_plain(program: Program) -> list[Any]:

@@ -12,6 +12,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from psdmc.atomic import write_whole
 from psdmc.bench.results import BenchResult
+from psdmc.bench.run import SCALED
 from psdmc.errors import InputError, exit_status_of
 from psdmc.report import bench_plots
 from psdmc.report.bench_view import (
@@ -80,7 +81,7 @@ def _section(result: BenchResult, index: int) -> RobotSection:
 def _scaling_plots(result: BenchResult) -> tuple[str, ...]:
     if not result.scaling:
         return ()
-    return tuple(bench_plots.scaling(result, f) for f in ("inverse_dynamics", "forward_dynamics"))
+    return tuple(bench_plots.scaling(result, f) for f in SCALED)
 
 
 def _environment() -> Environment:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
+from psdmc.bench.run import SCALED
 from psdmc.report.bench_view import FUNCTION_TITLES, OURS, PINOCCHIO
 from psdmc.report.drawing import Figure, new_figure, style
 
@@ -96,8 +97,6 @@ def _colour(measurement: Measurement) -> str:
     return next((c for name, c in COLOURS.items() if measurement.rival.startswith(name)), "#888888")
 
 
-def case_plots(
-    case: CaseResult, functions: Sequence[str] = ("inverse_dynamics", "forward_dynamics")
-) -> tuple[str, ...]:
+def case_plots(case: CaseResult, functions: Sequence[str] = SCALED) -> tuple[str, ...]:
     """Bars for the functions that were measured on a robot."""
     return tuple(bars(case, function) for function in functions if any(case.of(function)))

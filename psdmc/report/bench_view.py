@@ -7,19 +7,14 @@ from dataclasses import dataclass
 
 from psdmc.bench.published import DENSO_TABLE_5, PUBLISHED
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
+from psdmc.bench.run import SCALED
+from psdmc.functions import RECIPES
 
 OURS = "psdmc factored"
 PINOCCHIO = "Pinocchio"
 CASADI = "CasADi"
 
-FUNCTION_TITLES = {
-    "inverse_dynamics": "Inverse dynamics",
-    "forward_dynamics": "Forward dynamics",
-    "mass_matrix": "Mass matrix",
-    "nonlinear_effects": "Nonlinear effects",
-    "gravity": "Gravity",
-    "regressor": "Joint-torque regressor",
-}
+FUNCTION_TITLES = {name: recipe.title[0].upper() + recipe.title[1:] for name, recipe in RECIPES.items()}
 
 LAYOUT_TITLES = {"state": "one state a call", "rows": "batch, rows", "lanes": "batch, lane by lane"}
 
@@ -80,7 +75,7 @@ def _headline(case: CaseResult) -> Headline:
         found = case.best(OURS, function)
         return f"{found.ns:.0f}" if found else "–"
 
-    inverse, forward = "inverse_dynamics", "forward_dynamics"
+    inverse, forward = SCALED
     return Headline(
         case.name,
         ns(inverse), ratio(inverse), ratio(inverse, over=CASADI), ratio(inverse, "rows"), ratio(inverse, "lanes"),
@@ -143,7 +138,7 @@ def own_table(result: BenchResult) -> tuple[Quoted, ...]:
         return ()
     found = []
     for rival in (OURS, "psdmc expanded", PINOCCHIO, CASADI):
-        pair = case.best(rival, "inverse_dynamics"), case.best(rival, "forward_dynamics")
+        pair = tuple(case.best(rival, function) for function in SCALED)
         if pair[0] and pair[1]:
             found.append((rival, pair[0].ns, pair[1].ns))
     return tuple(_quoted(rival, i, f, found[0][1], found[0][2]) for rival, i, f in found)
@@ -193,7 +188,7 @@ def published_rows(result: BenchResult) -> tuple[PublishedRow, ...]:
 
 
 def _pair(case: CaseResult, rival: str) -> str:
-    both = (case.best(rival, "inverse_dynamics"), case.best(rival, "forward_dynamics"))
+    both = tuple(case.best(rival, function) for function in SCALED)
     return " / ".join(f"{m.ns:.0f}" if m else "–" for m in both)
 
 
@@ -227,7 +222,7 @@ def scaling_rows(result: BenchResult) -> tuple[ScalingRow, ...]:
 
 
 def _operations(case: CaseResult, rival: str) -> str:
-    both = (case.best(rival, "inverse_dynamics"), case.best(rival, "forward_dynamics"))
+    both = tuple(case.best(rival, function) for function in SCALED)
     return " / ".join(str(sum(m.operations)) if m and m.operations else "–" for m in both)
 
 

@@ -59,6 +59,20 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class NamedFrame:
+    """A frame that functions are about: fixed to one of the chain's links.
+
+    name       a link's of the file, or a user's own: untrusted text
+    joint      number of the joint whose frame it moves with; 0 is the first
+    placement  its place in that joint frame
+    """
+
+    name: str
+    joint: int
+    placement: Placement
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Chain:
     """A robot: kinematics, gravity and what is known of its inertia. n joints, each with the body that it carries.
 
@@ -73,6 +87,7 @@ class Chain:
     parents          n, the body that each joint hangs on: its index, or BASE; left out: each on the one before
     tip_body         the body that the tip frame is fixed to; left out: the only leaf
     coordinates      n, which coordinate each joint's q follows; left out: each joint its own
+    frames           named frames; left out: the tip alone
     """
 
     name: str
@@ -88,6 +103,7 @@ class Chain:
     parents: tuple[int, ...] = ()
     tip_body: int = BASE
     coordinates: tuple[Coordinate, ...] = ()
+    frames: tuple[NamedFrame, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.joints)
@@ -103,10 +119,17 @@ class Chain:
         object.__setattr__(self, "parents", _checked_parents(self.parents, n))
         object.__setattr__(self, "tip_body", _checked_tip(self.tip_body, self.leaves, n))
         object.__setattr__(self, "coordinates", checked_coordinates(self.coordinates, n))
+        object.__setattr__(self, "frames", tuple(self.frames) or (self.tip_frame,))
+        if any(not 0 <= frame.joint < n for frame in self.frames):
+            raise ValueError(f"a frame moves with none of the {n} joints")
 
     @property
     def joint_names(self) -> tuple[str, ...]:
         return tuple(joint.name for joint in self.joints)
+
+    @property
+    def tip_frame(self) -> NamedFrame:
+        return NamedFrame(self.tip_name, self.tip_body, self.tip)
 
     @property
     def types(self) -> tuple[JointType, ...]:

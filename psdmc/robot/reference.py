@@ -65,32 +65,39 @@ def as_written(loaded: LoadedRobot) -> pinocchio.Model:
 class Reference:
     """Pinocchio's dynamics of one model on arrays of states: q, qd, qdd, tau (..., n), SI.
 
-    tip_name   the frame whose Jacobian is meant
+    tip_name     the frame whose Jacobian is meant
+    frame_names  the named frames; empty: the tip alone
     """
 
     model: pinocchio.Model
     tip_name: str
+    frame_names: tuple[str, ...] = ()
+
+    @property
+    def frame_ids(self) -> list[int]:
+        """Pinocchio's numbers of the named frames."""
+        return [self.model.getFrameId(name) for name in self.frame_names or (self.tip_name,)]
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        return self._each(pinocchio.rnea, q, qd, qdd)
+        return self.each(pinocchio.rnea, q, qd, qdd)
 
     def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
-        return self._each(pinocchio.aba, q, qd, tau)
+        return self.each(pinocchio.aba, q, qd, tau)
 
     def mass_matrix(self, q: Array) -> Array:
         """(..., n, n), both triangles."""
-        upper = np.triu(self._each(pinocchio.crba, q))
+        upper = np.triu(self.each(pinocchio.crba, q))
         return upper + np.swapaxes(np.triu(upper, 1), -1, -2)
 
     def nonlinear_effects(self, q: Array, qd: Array) -> Array:
-        return self._each(pinocchio.nonLinearEffects, q, qd)
+        return self.each(pinocchio.nonLinearEffects, q, qd)
 
     def gravity(self, q: Array) -> Array:
-        return self._each(pinocchio.computeGeneralizedGravity, q)
+        return self.each(pinocchio.computeGeneralizedGravity, q)
 
     def coriolis_matrix(self, q: Array, qd: Array) -> Array:
         """(..., n, n)"""
-        return self._each(pinocchio.computeCoriolisMatrix, q, qd)
+        return self.each(pinocchio.computeCoriolisMatrix, q, qd)
 
     def jacobian(self, q: Array) -> Array:
         """(..., 6, n) of the tip frame: linear then angular, along the base frame's axes."""
@@ -104,7 +111,7 @@ class Reference:
             )
             return jacobian
 
-        return self._each(of_tip, q)
+        return self.each(of_tip, q)
 
     def poses(self, q: Array, link_names: Sequence[str]) -> Array:
         """(..., len(link_names) + 1, 4, 4) of the links' frames and the tip's in the base frame."""
@@ -116,7 +123,7 @@ class Reference:
             pinocchio.framesForwardKinematics(model, data, q)
             return np.array([data.oMf[frame].homogeneous for frame in frames])
 
-        return self._each(of_links, q)
+        return self.each(of_links, q)
 
     @property
     def gravity_vector(self) -> Array:
@@ -135,12 +142,12 @@ class Reference:
             frame = above
         return length
 
-    def _each(self, function: Callable[..., Array], *states: Array) -> Array:
-        """Pinocchio's function at every state of broadcast arrays."""
+    def each(self, function: Callable[..., Array], *states: Array) -> Array:
+        """A function of Pinocchio's (model, data, state ...) at every state of broadcast arrays."""
         data = self.model.createData()
-        rows = np.broadcast_arrays(*(np.asarray(state, dtype=float) for state in states))
-        lead = rows[0].shape[:-1]
-        flat = [row.reshape(-1, row.shape[-1]) for row in rows]
+        rows = [np.asarray(state, dtype=float) for state in states]
+        lead = np.broadcast_shapes(*(row.shape[:-1] for row in rows))
+        flat = [np.broadcast_to(row, (*lead, row.shape[-1])).reshape(-1, row.shape[-1]) for row in rows]
         results = [np.array(function(self.model, data, *row)) for row in zip(*flat, strict=True)]
         return np.array(results).reshape(*lead, *results[0].shape)
 
@@ -148,7 +155,8 @@ class Reference:
 def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None) -> Reference:
     """reference_model with its functions at hand."""
     model = reference_model(loaded, snapped=snapped, parameters=parameters)
-    return Reference(model, loaded.chain.tip_name)
+    names = tuple(frame.name for frame in loaded.chain.frames)
+    return Reference(model, loaded.chain.tip_name, names)
 
 
 def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
@@ -224,11 +232,10 @@ def _placed_as(chain: Chain, model: pinocchio.Model) -> pinocchio.Model:
         place = _se3(joint.link_frame)
         placed.inertias[k + 1] = (place * own.inverse()).act(model.inertias[k + 1])
         placed.addFrame(pinocchio.Frame(joint.link_name, k + 1, 0, place, pinocchio.FrameType.BODY))
-    tip = pinocchio.Frame(
-        chain.tip_name, chain.tip_body + 1, 0, _se3(chain.tip), pinocchio.FrameType.OP_FRAME
-    )
-    if not placed.existFrame(chain.tip_name):
-        placed.addFrame(tip)
+    for frame in (chain.tip_frame, *chain.frames):
+        if not placed.existFrame(frame.name):
+            place, kind = _se3(frame.placement), pinocchio.FrameType.OP_FRAME
+            placed.addFrame(pinocchio.Frame(frame.name, frame.joint + 1, 0, place, kind))
     placed.gravity.linear = np.array(chain.gravity)
     placed.armature = model.armature.copy()
     return placed

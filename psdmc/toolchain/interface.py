@@ -13,9 +13,9 @@ from typing import Any
 
 from psdmc.emit.package import PackageView
 from psdmc.errors import InternalError
-from psdmc.program.functions import BY_NAME
+from psdmc.program.signature import Sizes
 
-FORMAT = 1
+FORMAT = 2
 """Grows where the text's form changes."""
 
 
@@ -27,7 +27,8 @@ class Interface:
     real         C's name of its floating-point type; `dtype` is NumPy's
     n, l         joints, base parameters
     joint_names  n, from base to tip
-    kernels      name -> trailing axes of its result
+    frame_names  the named frames
+    kernels      name -> trailing axes of each of its results
     cdef         C declarations of the functions that are called
     """
 
@@ -37,8 +38,14 @@ class Interface:
     n: int
     l: int
     joint_names: tuple[str, ...]
-    kernels: Mapping[str, tuple[int, ...]]
+    frame_names: tuple[str, ...]
+    kernels: Mapping[str, tuple[tuple[int, ...], ...]]
     cdef: str
+
+    @property
+    def sizes(self) -> Sizes:
+        """What the words of signatures mean for this robot."""
+        return Sizes.of_chain(self.n, self.l, len(self.frame_names))
 
 
 def interface_of(package: PackageView) -> Interface:
@@ -50,7 +57,8 @@ def interface_of(package: PackageView) -> Interface:
         n=package.n,
         l=package.l,
         joint_names=tuple(joint.name for joint in package.info.joints),
-        kernels={name: _tail(package, name) for name in package.kernel_names},
+        frame_names=package.info.frames,
+        kernels={kernel.name: tuple(output.shape for output in kernel.outputs) for kernel in package.kernels},
         cdef="".join(
             f"{prototype.text};\n"
             for kernel in package.kernels
@@ -63,12 +71,6 @@ def interface_of(package: PackageView) -> Interface:
 def batch_symbol(robot: str, kernel: str) -> str:
     """The C function that computes a kernel for many states."""
     return f"{robot}_{kernel}_batch"
-
-
-def _tail(package: PackageView, name: str) -> tuple[int, ...]:
-    function = BY_NAME[name.removesuffix("_theta")]
-    lengths = {"n": package.n, "l": package.l, "6": 6}
-    return tuple(lengths[axis] for axis in (function.rows, function.columns) if axis != "1")
 
 
 def interface_to_json(interface: Interface, library: str) -> str:
@@ -88,6 +90,6 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
 
 
 def _from_plain(plain: dict[str, Any]) -> Interface:
-    names = tuple(plain.pop("joint_names"))
-    kernels = {name: tuple(tail) for name, tail in plain.pop("kernels").items()}
-    return Interface(joint_names=names, kernels=kernels, **plain)
+    joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
+    kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
+    return Interface(joint_names=joints, frame_names=frames, kernels=kernels, **plain)

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.errors import InternalError, ToolchainError
+from psdmc.functions import SIGNATURES
 from psdmc.program.kernel import Kernel
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
 from psdmc.toolchain.cache import cache_key, cached
 
 KERNELS = "kernels.json"
 
-DECIDES = ("dynamics", "lower", "model", "program", "robot")
+DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "robot")
 """Folders of psdmc whose sources decide what a lowering gives."""
 
 
@@ -36,7 +37,7 @@ def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -
     key = cache_key({}, ("kernels", *sources_digests(), *parts))
     try:
         kept = cached(key, build, [KERNELS]) / KERNELS
-        return made or kernels_from_json(kept.read_text(encoding="utf-8"))
+        return made or kernels_from_json(kept.read_text(encoding="utf-8"), SIGNATURES)
     except (ToolchainError, InternalError, OSError):
         return made or lower()
 

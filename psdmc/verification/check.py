@@ -8,7 +8,7 @@ and that these differ from the file's by no more than snapping says is compared 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
 from psdmc.robot.reference import Reference, pinocchio_version, reference
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
+from psdmc.verification.functions import function_errors
 from psdmc.verification.placements import chain_poses, gravity_error, placement_errors, reach_of
 
 Array = NDArray[np.float64]
@@ -112,7 +113,8 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     snapped = bool(loaded.snap_report)
     robot = reference(loaded, parameters=parameters) if snapped else written
     angles = angles_by_segment(loaded.snap_report, model.n, loaded.options.snap)
-    rows = (*_compared(model, theta, robot), *_placements(model, written, angles))
+    rows = (*_compared(model, theta, robot), *_functions(model, theta, robot))
+    rows += _placements(model, written, angles)
     if snapped:
         rows += (_snapping(model, theta, written, angles),)
     return (*rows, _against_mujoco(model, loaded, angles))
@@ -174,6 +176,16 @@ def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[Che
     least = NO_TORQUE * float(np.abs(pairs[0][-1]).max(initial=0.0))
     checked = [CheckRow(name, against, _error(a, b, least), TORQUE_LIMIT) for name, against, a, b in pairs]
     return (*checked, _forward(robot, q, qd, qdd, tau))
+
+
+def _functions(model: DynamicsModel, theta: Array, robot: Reference) -> Iterator[CheckRow]:
+    """What functions compute that is no part of the expansion."""
+    if not model.is_reduced:
+        remark = "a base parameter has no standard parameter of its own"
+        yield CheckRow("base parameters", "their equations", np.inf, TORQUE_LIMIT, remark)
+        return
+    for name, against, error, lack in function_errors(model, theta, robot):
+        yield CheckRow(name, against, error, None if lack else TORQUE_LIMIT, lack and f"not compared: {lack}")
 
 
 def _forward(robot: Reference, q: Array, qd: Array, qdd: Array, tau: Array) -> CheckRow:

@@ -7,8 +7,8 @@ import numpy as np
 from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
-from psdmc.model.reference_states import ReferenceStates
-from psdmc.program.functions import BY_NAME
+from psdmc.emit.reference_states import ReferenceStates
+from psdmc.functions import SIGNATURES
 from psdmc.program.kernel import Kernel
 from psdmc.program.text import parse
 
@@ -52,7 +52,7 @@ FORWARD = """
 
 def kernel(name: str, text: str, theta: bool = False, batch: str | None = None) -> Kernel:
     program = parse(text)
-    return Kernel(BY_NAME[name], theta, program, parse(batch) if batch else program, "expanded")
+    return Kernel(SIGNATURES[name], theta, program, parse(batch) if batch else program, "expanded")
 
 
 def pendulum_kernels() -> dict[str, Kernel]:

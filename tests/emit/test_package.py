@@ -26,8 +26,8 @@ from small import (
 
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_files, package_view
+from psdmc.emit.reference_states import ReferenceStates
 from psdmc.errors import InputError, InternalError
-from psdmc.model.reference_states import ReferenceStates
 
 GOLDEN = Path(__file__).parent.parent / "golden" / "pendulum"
 REFERENCES = pendulum_references()
@@ -236,11 +236,11 @@ def test_a_kernel_may_only_name_its_functions_vectors() -> None:
 
 def test_references_of_another_robot_are_refused() -> None:
     two = {name: np.zeros((3, 2)) for name in REFERENCES.given}
-    with pytest.raises(ValueError, match="2 joints, expected 1"):
+    with pytest.raises(ValueError, match="2 entries of q, expected 1"):
         pendulum(references=ReferenceStates(two, {}, np.zeros(2)))
-    with pytest.raises(ValueError, match=r"expected one \(k, n\)"):
+    with pytest.raises(ValueError, match=r"qd have shape \(3, 2\), expected \(2, k\)"):
         ReferenceStates({**two, "q": np.zeros((2, 1))}, {}, np.zeros(2))
-    with pytest.raises(ValueError, match="gravity are not 3 rows"):
+    with pytest.raises(ValueError, match=r"gravity have shape \(2, 2\), expected \(3, k\)"):
         ReferenceStates(two, {"gravity": np.zeros((2, 2))}, np.zeros(2))
 
 

@@ -50,7 +50,7 @@ def test_a_group_is_stored_where_its_last_member_is_known_zeros_included() -> No
     """)
     sizes = {"Y": 5}
 
-    body = make_body(program, ("q", "qd"), sizes, "", stores_early=True, in_groups=True)
+    body = make_body(program, ("q", "qd"), sizes, "", stores_early=True, in_groups=tuple(sizes))
 
     assert [line.line for line in body.sections[-1].steps] == [
         "const V t2 = q_0 * qd_0",

@@ -10,10 +10,11 @@ import numpy as np
 from random_chains import states
 from robots_at_hand import Subject
 
+from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.program.functions import BY_NAME
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
+from psdmc.program.signature import Sizes
 from psdmc.toolchain.call import CompiledRobot
 
 Array = np.ndarray
@@ -44,7 +45,7 @@ class Questions:
         return {"q": q, "qd": qd, "qdd": qdd, "tau": tau, "qd_r": qd_r, "qdd_r": qdd_r}
 
     def of(self, function: str) -> list[Array]:
-        return [self.inputs[name] for name in BY_NAME[function].inputs]
+        return [self.inputs[quantity.name] for quantity in SIGNATURES[function].inputs]
 
     @cached_property
     def mass(self) -> Array:
@@ -108,17 +109,16 @@ def program_answers(kernels: Mapping[str, Kernel], model: DynamicsModel, questio
     """The interpreted PROGRAMs: for one state and for lanes, parameters baked and given."""
     for name, kernel in kernels.items():
         function = kernel.function
-        size, extra = function.size(model.n, model.l), {"theta_b": model.theta_b} if kernel.theta else {}
-        given = dict(zip(function.inputs, questions.of(function.name), strict=True)) | extra
+        sizes = function.sizes(Sizes.of_chain(model.n, model.l))
+        given = questions.inputs | ({"theta_b": model.theta_b} if kernel.theta else {})
         for form in ("single", "batch"):
-            sizes = {function.output: size, "pivot": model.n}
-            found = interpret(getattr(kernel, form), given, sizes)[function.output]
+            found = interpret(getattr(kernel, form), given, sizes)[function.outputs[0].name]
             yield f"{name} {form}", found.reshape(-1, *_shape(model, function.name))
 
 
 def compiled_answers(robot: CompiledRobot, model: DynamicsModel, questions: Questions) -> Answers:
     """The compiled library through its batch functions, parameters baked and given; one state a call on a few."""
-    for function in BY_NAME.values():
+    for function in map(SIGNATURES.__getitem__, DEFAULT):
         given = questions.of(function.name)
         call = getattr(robot, function.name)
         found = call(*given)
@@ -131,9 +131,7 @@ def compiled_answers(robot: CompiledRobot, model: DynamicsModel, questions: Ques
 
 
 def _shape(model: DynamicsModel, function: str) -> tuple[int, ...]:
-    lengths = {"n": model.n, "l": model.l, "6": 6}
-    axes = (BY_NAME[function].rows, BY_NAME[function].columns)
-    return tuple(lengths[axis] for axis in axes if axis != "1")
+    return Sizes.of_chain(model.n, model.l).shape(SIGNATURES[function].outputs[0].axes)
 
 
 def function_of(label: str) -> str:

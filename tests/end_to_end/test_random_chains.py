@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from robots_at_hand import drawn
 
 from psdmc.compiler import compile
+from psdmc.functions import DEFAULT
 from psdmc.lower import kernels, search
-from psdmc.lower.kernels import ALL_FUNCTIONS, lower
+from psdmc.lower.kernels import lower
 from psdmc.toolchain import compile as toolchain
 from psdmc.toolchain.compiler_command import find_compiler
 
@@ -39,13 +40,13 @@ def test_model_and_program(length: int, chains: int):
         seed=st.integers(0, 10**6),
         kinds=st.text("RP", min_size=length, max_size=length),
         tidy=st.booleans(),
-        function=st.sampled_from(ALL_FUNCTIONS[1:]),
+        function=st.sampled_from(DEFAULT[1:]),
     )
     @settings(max_examples=chains, deadline=None)
     def check(seed: int, kinds: str, tidy: bool, function: str):
         robot = drawn(seed, kinds, tidy=tidy)
         questions = Questions(robot, STATES)
-        lowered = lower(robot.model, "auto", [ALL_FUNCTIONS[0], function])
+        lowered = lower(robot.model, "auto", [DEFAULT[0], function])
 
         assert not too_large(errors(questions, numpy_answers(robot.model, questions)))
         assert not too_large(errors(questions, program_answers(lowered, robot.model, questions)))

@@ -16,12 +16,13 @@ from random_chains import Oracle, random_chain, relative_error, states
 
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
-from psdmc.lower.expanded import SUPPORTED, lower_expanded
+from psdmc.functions import RECIPES
+from psdmc.lower.expanded import lower_expanded
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
-from psdmc.program.functions import BY_NAME
 from psdmc.program.interpret import interpret
 from psdmc.program.program import Program
+from psdmc.program.signature import Sizes
 from psdmc.program.text import show
 from psdmc.robot.load import load_robot, load_robot_text
 
@@ -29,7 +30,10 @@ ROBOTS = Path(__file__).parents[2] / "examples" / "robots"
 GOLDEN = Path(__file__).parents[1] / "golden"
 BUNDLED = ("two_link", "two_link_full", "scara", "denso_floor", "denso_wall", "kr6", "lbr7")
 WITH_THETA = [
-    (name, theta) for name in SUPPORTED for theta in (False, True) if BY_NAME[name].theta or not theta
+    (name, theta)
+    for name, recipe in RECIPES.items()
+    for theta in (False, True)
+    if recipe.polynomials and (recipe.signature.theta or not theta)
 ]
 
 
@@ -40,13 +44,13 @@ def bundled(robot: str) -> DynamicsModel:
 
 @cache
 def lowered(robot: str, name: str, theta: bool = False) -> Program:
-    return lower_expanded(bundled(robot), name, theta)
+    return lower_expanded(bundled(robot), RECIPES[name], theta)
 
 
 def run(program: Program, model: DynamicsModel, name: str, **inputs: np.ndarray) -> np.ndarray:
-    function = BY_NAME[name]
-    sizes = {function.output: function.size(model.n, model.l), "pivot": model.n}
-    return interpret(program, {**inputs, "theta_b": model.theta_b}, sizes)[function.output]
+    function = RECIPES[name].signature
+    sizes = function.sizes(Sizes.of_chain(model.n, model.l))
+    return interpret(program, {**inputs, "theta_b": model.theta_b}, sizes)[function.outputs[0].name]
 
 
 @pytest.mark.parametrize("robot", ["two_link_full", "scara", "denso_wall", "kr6"])
@@ -80,7 +84,7 @@ def test_inverse_dynamics_of_any_chain_is_as_good_as_its_model(seed: int, kinds:
     chain = random_chain(seed, kinds, tidy=tidy, gravity=(1.0, -2.0, -9.0))
     model = derive_model(chain)
     q, qd, qdd = states(model.n, 100)
-    program = lower_expanded(model, "inverse_dynamics", False)
+    program = lower_expanded(model, RECIPES["inverse_dynamics"], False)
 
     found = run(program, model, "inverse_dynamics", q=q, qd=qd, qdd=qdd)
 
@@ -94,7 +98,7 @@ def test_pivots_are_positive_where_the_mass_matrix_is_positive_definite():
     q, qd, tau = states(4, 100)
 
     out = interpret(
-        lower_expanded(model, "forward_dynamics", False),
+        lower_expanded(model, RECIPES["forward_dynamics"], False),
         {"q": q, "qd": qd, "tau": tau},
         {"qdd": 4, "pivot": 4},
     )
@@ -109,7 +113,7 @@ def test_pivots_are_positive_where_the_mass_matrix_is_positive_definite():
 def test_without_gravity_nothing_is_left_of_gravity_but_zeros():
     model = derive_model(random_chain(5, "RP", gravity=(0.0, 0.0, 0.0)))
 
-    assert show(lower_expanded(model, "gravity", False)).splitlines() == [
+    assert show(lower_expanded(model, RECIPES["gravity"], False)).splitlines() == [
         "t0 = const 0.0",
         "out g[0] = t0",
         "out g[1] = t0",
@@ -138,7 +142,7 @@ def test_a_pendulum_accelerates_as_on_paper():
     """m g l = 9.81 N m and I + m l^2 = 0.6 kg m^2: qdd = (tau - 9.81 cos q) / 0.6."""
     model = derive_model(load_robot_text(PENDULUM, "toml").chain)
 
-    assert show(lower_expanded(model, "forward_dynamics", False)).splitlines() == [
+    assert show(lower_expanded(model, RECIPES["forward_dynamics"], False)).splitlines() == [
         "t0 = load q[0]",
         "t1 = cos t0",
         "t2 = const 9.81",
@@ -157,23 +161,23 @@ def test_parameters_that_are_unknown_cannot_be_baked():
     model = dataclasses.replace(bundled("two_link"), theta_b=None)
 
     with pytest.raises(InputError, match="base parameters are unknown") as caught:
-        lower_expanded(model, "inverse_dynamics", False)
+        lower_expanded(model, RECIPES["inverse_dynamics"], False)
     assert "theta_b" in str(caught.value.hint)
-    assert cost(lower_expanded(model, "inverse_dynamics", True)).total > 0
+    assert cost(lower_expanded(model, RECIPES["inverse_dynamics"], True)).total > 0
 
 
 def test_a_model_without_functions_cannot_be_expanded():
     model = dataclasses.replace(bundled("two_link"), expansion=None)
 
     with pytest.raises(InputError, match="needs E and P") as caught:
-        lower_expanded(model, "gravity", False)
+        lower_expanded(model, RECIPES["gravity"], False)
     assert "--lowering factored" in str(caught.value.hint)
 
 
-@pytest.mark.parametrize(("name", "theta"), [("jacobian", False), ("regressor", True), ("nonsense", False)])
+@pytest.mark.parametrize(("name", "theta"), [("jacobian", False), ("regressor", True)])
 def test_what_this_lowering_does_not_make_is_refused(name: str, theta: bool):
     with pytest.raises(ValueError, match=name):
-        lower_expanded(bundled("two_link"), name, theta)
+        lower_expanded(bundled("two_link"), RECIPES[name], theta)
 
 
 PUBLISHED = {"two_link": (23, 12), "scara": (126, 84), "kr6": (3200, 2000), "lbr7": (11700, 6800)}

@@ -11,15 +11,18 @@ from hypothesis import strategies as st
 from random_chains import Oracle, random_chain, relative_error, states
 from scipy.spatial.transform import Rotation
 
+from psdmc.dynamics.solve import SingularMassMatrix, factorize
+from psdmc.functions import RECIPES
 from psdmc.lower.carriers import carrier_space, link_map
-from psdmc.lower.factored import trace_dynamics, trace_jacobian, trace_regressor
+from psdmc.lower.factored import trace_dynamics, trace_geometry
 from psdmc.lower.reframe import reframe
 from psdmc.lower.search import ALL_CHOICES, BATCH, SINGLE, Search, all_feet
-from psdmc.lower.solve import SingularMassMatrix, factorize
 from psdmc.lower.tableau import Tableau
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
 from psdmc.robot.chain import Chain, Placement
+
+INVERSE = RECIPES["inverse_dynamics"]
 
 
 def known(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
@@ -42,7 +45,7 @@ def test_inverse_dynamics_of_any_chain_in_any_arrangement(seed, kinds, tidy):
     search = Search(chain, representative, theta_b)
     for feet in all_feet(chain):
         for arrangement in search.starts(feet):
-            program = trace_dynamics("inverse_dynamics", arrangement, theta_b)
+            program = trace_dynamics(INVERSE, arrangement, search.robot)
             found = run(program, n, n, "tau", q=q, qd=qd, qdd=qdd)
             assert relative_error(found, expected) < 1e-11
 
@@ -57,10 +60,10 @@ def test_every_function_against_pinocchio(kinds, tidy, baked):
     search = Search(chain, representative, theta_b if baked else None, budget=90)
     q, qd, qdd = states(n, 200)
     given_theta = {} if baked else {"theta_b": theta_b}
-    arrangement = search.best("inverse_dynamics", SINGLE)
+    arrangement = search.best(INVERSE, SINGLE)
 
     def program(name):
-        return search.rearranged(name, arrangement, SINGLE)
+        return search.rearranged(RECIPES[name], arrangement, SINGLE)
 
     tau = run(program("inverse_dynamics"), n, n, "tau", q=q, qd=qd, qdd=qdd, **given_theta)
     assert relative_error(tau, oracle.rnea(q, qd, qdd)) < 1e-12
@@ -87,12 +90,13 @@ def test_regressors_and_jacobian(kinds, tidy):
     l = len(theta_b)
     q, qd, qdd = states(n, 100)
     qd_r = states(n, 100, seed=9)[1]
+    robot = Search(chain, representative, theta_b).robot
     for feet in all_feet(chain):
         reframed = reframe(chain, feet)
-        y = run(trace_regressor("regressor", reframed, representative), n, n * l, "Y", q=q, qd=qd, qdd=qdd)
+        y = run(trace_geometry(RECIPES["regressor"], reframed, robot), n, n * l, "Y", q=q, qd=qd, qdd=qdd)
         torque = y.reshape(-1, n, l) @ theta_b
         assert relative_error(torque, oracle.rnea(q, qd, qdd)) < 1e-12
-        program = trace_regressor("regressor_slotine_li", reframed, representative)
+        program = trace_geometry(RECIPES["regressor_slotine_li"], reframed, robot)
         y = run(program, n, n * l, "Y", q=q, qd=qd, qd_r=qd_r, qdd_r=qdd)
         expected = (
             np.einsum("sij,sj->si", oracle.mass_matrix(q), qdd)
@@ -100,7 +104,7 @@ def test_regressors_and_jacobian(kinds, tidy):
             + oracle.gravity(q)
         )
         assert relative_error(y.reshape(-1, n, l) @ theta_b, expected) < 1e-12
-        j = run(trace_jacobian(reframed), n, 6 * n, "J", q=q)
+        j = run(trace_geometry(RECIPES["jacobian"], reframed, robot), n, 6 * n, "J", q=q)
         assert relative_error(j.reshape(-1, 6, n), oracle.jacobian(q)) < 1e-12
 
 
@@ -109,13 +113,13 @@ def test_coriolis_matrix_leaves_the_rate_of_the_mass_matrix_skew():
     n = len(chain)
     representative, theta_b = known(chain)
     search = Search(chain, representative, theta_b, budget=30)
-    arrangement = search.best("inverse_dynamics", SINGLE)
+    arrangement = search.best(INVERSE, SINGLE)
     q, qd, _ = states(n, 20)
-    mass = search.rearranged("mass_matrix", arrangement, SINGLE)
+    mass = search.rearranged(RECIPES["mass_matrix"], arrangement, SINGLE)
     step = 1e-6
     ahead = run(mass, n, n * n, "M", q=q + step * qd).reshape(-1, n, n)
     behind = run(mass, n, n * n, "M", q=q - step * qd).reshape(-1, n, n)
-    program = search.rearranged("coriolis_matrix", arrangement, SINGLE)
+    program = search.rearranged(RECIPES["coriolis_matrix"], arrangement, SINGLE)
     coriolis = run(program, n, n * n, "C", q=q, qd=qd).reshape(-1, n, n)
     skew = (ahead - behind) / (2 * step) - 2 * coriolis
     assert np.max(np.abs(skew + skew.transpose(0, 2, 1))) < 1e-7
@@ -142,18 +146,18 @@ def test_search_never_ends_dearer_than_it_starts():
     representative, theta_b = known(chain)
     search = Search(chain, representative, theta_b)
     first = next(search.starts(next(iter(all_feet(chain)))))
-    start = SINGLE.score(trace_dynamics("inverse_dynamics", first, theta_b))
-    best = search.best("inverse_dynamics", SINGLE)
-    assert SINGLE.score(trace_dynamics("inverse_dynamics", best, theta_b)) < start
+    start = SINGLE.score(trace_dynamics(INVERSE, first, search.robot))
+    best = search.best(INVERSE, SINGLE)
+    assert SINGLE.score(trace_dynamics(INVERSE, best, search.robot)) < start
 
 
 def test_lanes_of_states_pay_for_every_angle_and_one_state_does_not():
     chain = random_chain(17, "RRRR", tidy=True)
     representative, theta_b = known(chain)
     search = Search(chain, representative, theta_b, budget=60)
-    arrangement = search.best("inverse_dynamics", SINGLE)
-    one = cost(search.rearranged("inverse_dynamics", arrangement, SINGLE))
-    lanes = cost(search.rearranged("inverse_dynamics", arrangement, BATCH))
+    arrangement = search.best(INVERSE, SINGLE)
+    one = cost(search.rearranged(INVERSE, arrangement, SINGLE))
+    lanes = cost(search.rearranged(INVERSE, arrangement, BATCH))
     assert lanes.sincos <= 4 <= one.sincos or lanes.sincos <= one.sincos
     assert one.total <= lanes.total
 
@@ -166,12 +170,13 @@ def test_every_choice_gives_pinocchios_torques():
         joints[k] = replace(joints[k], placement=Placement(np.eye(3), joints[k].placement.translation))
     chain = replace(chain, joints=tuple(joints))
     representative, theta_b = known(chain)
-    found = Search(chain, representative, theta_b, budget=20).best("inverse_dynamics", SINGLE)
+    search = Search(chain, representative, theta_b, budget=20)
+    found = search.best(INVERSE, SINGLE)
     q, qd, qdd = states(5, 50)
     expected = Oracle(chain).rnea(q, qd, qdd)
     sincos = {}
     for choices in ALL_CHOICES:
-        program = trace_dynamics("inverse_dynamics", replace(found, choices=choices), theta_b)
+        program = trace_dynamics(INVERSE, replace(found, choices=choices), search.robot)
         torque = run(program, 5, 5, "tau", q=q, qd=qd, qdd=qdd)
         assert relative_error(torque, expected) < 1e-12
         sincos[choices] = cost(program).sincos
@@ -203,7 +208,7 @@ def test_axes_that_are_nearly_parallel_cost_no_digits(angle: float):
     chain = tilted(random_chain(3, "RRRRRR", tidy=True), angle)
     representative, theta_b = known(chain)
     search = Search(chain, representative, theta_b, budget=150)
-    program = search.rearranged("inverse_dynamics", search.best("inverse_dynamics", SINGLE), SINGLE)
+    program = search.rearranged(INVERSE, search.best(INVERSE, SINGLE), SINGLE)
     q, qd, qdd = states(6, 200)
     found = run(program, 6, 6, "tau", q=q, qd=qd, qdd=qdd)
     assert relative_error(found, Oracle(chain).rnea(q, qd, qdd)) < 1e-12

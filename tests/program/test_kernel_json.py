@@ -7,7 +7,7 @@ import math
 import pytest
 
 from psdmc.errors import InternalError
-from psdmc.program.functions import BY_NAME
+from psdmc.functions import SIGNATURES
 from psdmc.program.kernel import Kernel
 from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
 from psdmc.program.program import Instr, Op, Program, Slot
@@ -26,14 +26,14 @@ GRAVITY = parse("""
 def kernels() -> dict[str, Kernel]:
     other = parse("a = load q[0]\nout g[0] = a")
     made = (
-        Kernel(BY_NAME["gravity"], False, GRAVITY, GRAVITY, "factored"),
-        Kernel(BY_NAME["gravity"], True, GRAVITY, other, "expanded"),
+        Kernel(SIGNATURES["gravity"], False, GRAVITY, GRAVITY, "factored"),
+        Kernel(SIGNATURES["gravity"], True, GRAVITY, other, "expanded"),
     )
     return {kernel.name: kernel for kernel in made}
 
 
 def test_kernels_come_back_equal_and_in_order():
-    found = kernels_from_json(kernels_to_json(kernels()))
+    found = kernels_from_json(kernels_to_json(kernels()), SIGNATURES)
 
     assert found == kernels()
     assert list(found) == ["gravity", "gravity_theta"]
@@ -43,9 +43,9 @@ def test_kernels_come_back_equal_and_in_order():
 @pytest.mark.parametrize("value", [5e-324, 1.7976931348623157e308, 0.1 + 0.2, -0.0, 1 / 3])
 def test_constants_come_back_bit_for_bit(value: float):
     program = Program((Instr(Op.CONST, value=value),), ((Slot("g", 0), 0),))
-    kept = Kernel(BY_NAME["gravity"], False, program, program, "factored")
+    kept = Kernel(SIGNATURES["gravity"], False, program, program, "factored")
 
-    (found,) = kernels_from_json(kernels_to_json({kept.name: kept})).values()
+    (found,) = kernels_from_json(kernels_to_json({kept.name: kept}), SIGNATURES).values()
 
     constant = found.single.body[0].value
     assert constant == value
@@ -69,4 +69,4 @@ def test_a_changed_text_is_refused(change):
     assert change(text) != text
 
     with pytest.raises(InternalError):
-        kernels_from_json(change(text))
+        kernels_from_json(change(text), SIGNATURES)

@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from direct import Direct, shared_library, states
-from traced import L, N, arm, arm_kernels, arm_package
+from traced import SIZES, L, N, arm, arm_kernels, arm_package
 
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_files
 
 KERNELS = arm_kernels()
-AS_LONG_AS_AN_INPUT = [name for name, kernel in KERNELS.items() if kernel.function.size(N, L) == N]
+AS_LONG_AS_AN_INPUT = [
+    name for name, kernel in KERNELS.items() if SIZES.size(kernel.function.outputs[0]) == N
+]
 BUILDS = {"vectors": ["-march=native"], "plain": ["-Dtest_arm_NO_VECTORS"]}
 
 
@@ -44,7 +46,7 @@ def test_one_state_may_overlap_its_inputs_in_any_way(compiled: Direct, name: str
     """Inputs side by side in one array, theta_b included; the output begins before, within and behind each."""
     real = compiled.package.options.real
     inputs = {key: v if key == "theta_b" else v[0] for key, v in _given(compiled, name, 1).items()}
-    size, length = KERNELS[name].function.size(N, L), sum(map(len, inputs.values()))
+    size, length = SIZES.size(KERNELS[name].function.outputs[0]), sum(map(len, inputs.values()))
     wanted = np.zeros(size, real)
     compiled(name, *inputs.values(), wanted)
     for first in range(length + size):
@@ -67,7 +69,7 @@ def test_a_batch_may_overwrite_any_input_whose_rows_are_as_long(compiled: Direct
         given = _given(compiled, name, count)
         wanted = np.zeros((count, N), compiled.package.options.real)
         compiled(_symbol(name), count, *given.values(), wanted)
-        for shared in KERNELS[name].function.inputs:
+        for shared in (quantity.name for quantity in KERNELS[name].function.inputs):
             rows = {key: v.copy() for key, v in given.items()}
             compiled(_symbol(name), count, *rows.values(), rows[shared])
             assert np.array_equal(rows[shared], wanted), (count, shared)

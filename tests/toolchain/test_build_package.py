@@ -14,9 +14,9 @@ from traced import arm_kernels, arm_package, arm_references
 
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_files
+from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError, ToolchainError
-from psdmc.model.reference_states import ReferenceStates
 from psdmc.toolchain.build_package import UNFINISHED, build_package
 
 NAMES = ["inverse_dynamics", "forward_dynamics"]

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 from direct import error, expected
-from traced import L, N, arm_kernels, arm_package, arm_references
+from traced import SIZES, L, N, arm_kernels, arm_package, arm_references
 
 from psdmc.emit.options import EmitOptions
 from psdmc.errors import InputError
@@ -31,10 +31,9 @@ def robot() -> CompiledRobot:
 def test_every_function_broadcasts_like_a_ufunc(robot: CompiledRobot, name: str) -> None:
     function = KERNELS[name].function
     shapes = [(3, 1, N), (5, N), (N,), (1, 1, N)][: len(function.inputs)]
-    given = {v: RANDOM.normal(size=shape) for v, shape in zip(function.inputs, shapes, strict=True)}
+    given = {q.name: RANDOM.normal(size=shape) for q, shape in zip(function.inputs, shapes, strict=True)}
     leading = np.broadcast_shapes(*shapes)[:-1]
-    tail = {"1": (N,), "n": (N, N), "l": (N, L)}[function.columns]
-    tail = (6, N) if function.rows == "6" else tail
+    tail = SIZES.shape(function.outputs[0].axes)
 
     found = getattr(robot, name)(*given.values())
 
@@ -47,7 +46,7 @@ def test_every_function_broadcasts_like_a_ufunc(robot: CompiledRobot, name: str)
 @pytest.mark.parametrize("name", [kernel.function.name for kernel in KERNELS.values() if kernel.theta])
 def test_parameters_may_be_given(robot: CompiledRobot, name: str) -> None:
     function = KERNELS[name].function
-    given = {v: RANDOM.normal(size=(4, N)) for v in function.inputs}
+    given = {q.name: RANDOM.normal(size=(4, N)) for q in function.inputs}
     parameters = np.array([p.value for p in arm_package().info.parameters])
 
     baked = getattr(robot, name)(*given.values())

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from direct import Direct, error, expected, shared_library, states
-from traced import L, N, arm_kernels, arm_package
+from traced import SIZES, L, N, arm_kernels, arm_package
 
 from psdmc.emit.options import EmitOptions
 from psdmc.program.kernel import Kernel
@@ -108,7 +108,7 @@ def test_an_angle_that_takes_libm_changes_no_other_lane(compiled: Direct, name: 
     real, lanes = compiled.package.options.real, compiled.package.lanes
     count, far = 2 * lanes, [1, lanes + 2, lanes + 3]
     given, _ = _given(compiled, KERNELS[name], count)
-    near = np.empty((count, KERNELS[name].function.size(N, L)), real)
+    near = np.empty((count, SIZES.size(KERNELS[name].function.outputs[0])), real)
     compiled(f"{name}_batch", count, *given.values(), near)
     given["q"][far] += np.asarray(FAR[real], real) * [[1, 0, 0, -2], [0, 1, 0, 0], [0, -1, 0, 3]]
     reference = expected(KERNELS[name], given, N, L)

@@ -9,7 +9,7 @@ import pytest
 
 import psdmc
 from psdmc.errors import InputError
-from psdmc.program.functions import BY_NAME
+from psdmc.functions import SIGNATURES
 from psdmc.program.kernel import Kernel
 from psdmc.program.text import parse
 from psdmc.toolchain import kept_kernels
@@ -31,7 +31,7 @@ class Counted:
     def __call__(self) -> dict[str, Kernel]:
         self.calls += 1
         program = parse("a = load q[0]\ns = sin a\nout g[0] = s")
-        return {"gravity": Kernel(BY_NAME["gravity"], False, program, program, "factored")}
+        return {"gravity": Kernel(SIGNATURES["gravity"], False, program, program, "factored")}
 
 
 def calls(parts: tuple[str, ...], then: Callable[[], None] = lambda: None) -> int:

@@ -11,7 +11,7 @@ from direct import Direct, expected, shared_library, states
 from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_view
-from psdmc.program.functions import BY_NAME
+from psdmc.functions import SIGNATURES
 from psdmc.program.kernel import Kernel
 from psdmc.program.text import parse
 
@@ -43,7 +43,7 @@ INFO = PackageInfo(
 @pytest.mark.parametrize("flags", [["-march=native"], ["-g0"], ["-Dpendulum_NO_VECTORS"]], ids=" ".join)
 @pytest.mark.parametrize("real", ["float64", "float32"])
 def test_six_outputs_per_state(real: str, flags: list[str], tmp_path: Path) -> None:
-    kernel = Kernel(BY_NAME["jacobian"], False, TIP_OF_A_PENDULUM, TIP_OF_A_PENDULUM, "factored")
+    kernel = Kernel(SIGNATURES["jacobian"], False, TIP_OF_A_PENDULUM, TIP_OF_A_PENDULUM, "factored")
     package = package_view(INFO, {"jacobian": kernel}, EmitOptions(real=real))  # type: ignore[arg-type]
     library = Direct(package, shared_library(package, tmp_path, ["-O1", *flags]))
     for count in (1, 7, 16, 21):

@@ -15,12 +15,13 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
-from psdmc.model.reference_states import ReferenceStates
-from psdmc.program.functions import BY_NAME
+from psdmc.emit.reference_states import ReferenceStates
+from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
+from psdmc.program.signature import Sizes
 from psdmc.program.trace import Tracer
 from psdmc.robot.chain import Placement
 from psdmc.robot.joints import PRISMATIC, REVOLUTE
@@ -28,6 +29,7 @@ from psdmc.robot.joints import PRISMATIC, REVOLUTE
 TYPES = (REVOLUTE, REVOLUTE, PRISMATIC, REVOLUTE)
 N = len(TYPES)
 L = 11 * N
+SIZES = Sizes.of_chain(N, L)
 UP = (0.0, 0.0, 9.81)
 Outputs = list[tuple[Slot, object]]
 
@@ -85,8 +87,8 @@ def ldl_solve(M: Sequence[Sequence[object]], right: Sequence[object]) -> tuple[l
 def traced(name: str, theta: bool, frames: list[Frame], parameters: np.ndarray) -> Program:
     """One function's PROGRAM."""
     tracer = Tracer()
-    function = BY_NAME[name]
-    given = {v: tracer.symbols(v, N) for v in function.inputs}
+    function = SIGNATURES[name]
+    given = {q.name: tracer.symbols(q.name, N) for q in function.inputs}
     values = tracer.symbols("theta_b", L) if theta else [float(v) for v in parameters.ravel()]
     body, drive = bodies(values)
     zero = [0.0] * N
@@ -129,7 +131,7 @@ def arm_kernels(seed: int = 0, names: Sequence[str] | None = None) -> dict[str, 
     """All functions, baked and with theta_b."""
     frames, parameters = arm(seed)
     kernels: dict[str, Kernel] = {}
-    for name, function in BY_NAME.items():
+    for name, function in ((name, SIGNATURES[name]) for name in DEFAULT):
         for theta in (False, True) if function.theta else (False,):
             if names is None or name in names:
                 program = traced(name, theta, frames, parameters)
@@ -183,10 +185,9 @@ def arm_references(count: int = 4, seed: int = 0) -> ReferenceStates:
     expected: dict[str, np.ndarray] = {}
     for name, kernel in kernels.items():
         function = kernel.function
-        if not function.pivots:
-            inputs = {v: given[v] for v in function.inputs} | ({"theta_b": theta} if kernel.theta else {})
-            sizes = {function.output: function.size(N, L)}
-            expected[name] = interpret(kernel.single, inputs, sizes)[function.output]
+        if function.positive is None:
+            inputs = given | {"theta_b": theta}
+            (expected[name],) = interpret(kernel.single, inputs, function.sizes(SIZES)).values()
     for suffix in ("", "_theta"):
         given[f"tau{suffix}"] = expected[f"inverse_dynamics{suffix}"]
         expected[f"forward_dynamics{suffix}"] = qdd

@@ -24,6 +24,16 @@ BODY = (
 )
 
 
+OF_THE_TIP = (
+    "Jacobian",
+    "forward kinematics",
+    "frame Jacobian",
+    "frame drift",
+    "inverse dynamics with wrenches",
+)
+"""Functions that a frame's place matters to."""
+
+
 def oblique_urdf(body: str = BODY, kind: str = "continuous") -> str:
     """A base turned in the root, three joints about oblique axes, and a tool."""
     links = "".join(f'<link name="{name}">{body}</link>' for name in ("root", "base", "a", "b", "c", "tool"))
@@ -145,8 +155,10 @@ def test_a_tip_in_the_wrong_place_is_noticed_though_no_torque_tells(monkeypatch)
 
     monkeypatch.setattr(urdf_chain, "_placed_joints", misplaced)
 
-    assert [row.name for row in checked(oblique) if not row.passed] == ["placements of links and tip"]
-    assert [row.name for row in checked(rounded) if not row.passed] == ["placements of links and tip"]
+    for make in (oblique, rounded):
+        failed = {row.name for row in checked(make) if not row.passed}
+        assert "placements of links and tip" in failed
+        assert failed <= {"placements of links and tip", *OF_THE_TIP}
 
 
 def test_gravity_turned_the_wrong_way_is_noticed(monkeypatch) -> None:

@@ -12,24 +12,21 @@ from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, library_files, package_view
+from psdmc.functions import RECIPES
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
-from psdmc.program.functions import BY_NAME, Function
 from psdmc.program.kernel import Kernel
+from psdmc.program.signature import Signature, Sizes
+from psdmc.recipes.recipe import Polynomials
 from psdmc.toolchain.compiler_command import find_compiler, run
 
-FUNCTIONS = (
-    "inverse_dynamics",
-    "forward_dynamics",
-    "mass_matrix",
-    "nonlinear_effects",
-    "gravity",
-    "regressor",
-)
+FUNCTIONS = tuple(name for name, recipe in RECIPES.items() if recipe.benched)
 """What the benchmark measures, of all that psdmc generates."""
 
-EXPANDED = ("inverse_dynamics", "forward_dynamics")
+EXPANDED = tuple(
+    name for name in FUNCTIONS if RECIPES[name].polynomials in (Polynomials.TORQUE, Polynomials.SOLVED)
+)
 """What PSDM-2021 and Denso-2022 published times of."""
 
 
@@ -71,8 +68,8 @@ def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, .
 
 def _ways(case: Case, rival: str, kernel: Kernel, library: Path, lanes: int) -> list[Contestant]:
     name = kernel.name
-    size = kernel.function.size(case.n, case.model.l)
-    weights = case.model.theta_b if name == "regressor" else None
+    size = Sizes.of_chain(case.n, case.model.l).size(kernel.function.outputs[0])
+    weights = case.model.theta_b if RECIPES[name].times_theta else None
     single, batch = (cost(program) for program in (kernel.single, kernel.batch))
     one = Contestant(
         rival, name, library, name, size, weights=weights, operations=(single.mul, single.add + single.div)
@@ -125,19 +122,18 @@ def glue(package: PackageView) -> str:
     """C++ that puts the package's functions behind the loops."""
     lines = ['#include "loops.hpp"', '#include "library.h"']
     for view in package.functions:
-        function = BY_NAME[view.name]
         symbol = f"{package.robot}_{view.name}"
         lines += [
             f"PSDMC_CONTESTANT({view.name}, [](const double *q, const double *qd, const double *x, double *out) "
-            f"{{ {symbol}({_arguments(function)}); }})"
+            f"{{ {symbol}({_arguments(view.signature)}); }})"
         ]
         lines += [
             f"PSDMC_BATCH_CONTESTANT({view.name}{suffix}, [](size_t count, const double *q, const double *qd, "
-            f"const double *x, double *out) {{ {symbol}{suffix}(count, {_arguments(function)}); }})"
+            f"const double *x, double *out) {{ {symbol}{suffix}(count, {_arguments(view.signature)}); }})"
             for suffix in ("_batch", "_batch_soa")
         ]
     return "\n".join(lines) + "\n"
 
 
-def _arguments(function: Function) -> str:
+def _arguments(function: Signature) -> str:
     return ", ".join((*(("q", "qd", "x")[: len(function.inputs)]), "out"))

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
 
+from psdmc.emit.reference_states import COUNT, LOAD, ReferenceStates, reference_states
+from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
-from psdmc.model.reference_states import COUNT, LOAD, ReferenceStates, reference_states
-from psdmc.program.functions import BY_NAME
 from psdmc.robot.reference import Reference, reference
 
 ROBOTS = ("two_link", "scara", "kr6")
@@ -64,7 +64,7 @@ def test_every_value_is_pinocchios(name: str) -> None:
 def test_unknown_parameters_leave_what_does_not_need_them() -> None:
     model = replace(bundled_model("scara"), theta_b=None)
     states = reference_states(model)
-    with_theta = {f"{name}_theta" for name, function in BY_NAME.items() if function.theta}
+    with_theta = {f"{name}_theta" for name in DEFAULT if SIGNATURES[name].theta}
     assert set(states.expected) == with_theta | {"regressor", "regressor_slotine_li", "jacobian"}
     assert len(states.given["q"]) == COUNT
 

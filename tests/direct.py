@@ -12,6 +12,7 @@ import numpy as np
 from psdmc.emit.package import PackageView, library_files
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
+from psdmc.program.signature import Sizes
 
 
 def write_sources(package: PackageView, folder: Path) -> Path:
@@ -48,24 +49,35 @@ class Direct:
         return argument
 
 
-def states(kernel: Kernel, count: int, n: int, l: int, seed: int = 7) -> dict[str, np.ndarray]:
+def states(
+    kernel: Kernel, count: int, n: int, l: int, seed: int = 7, frames: int = 1
+) -> dict[str, np.ndarray]:
     """Random inputs of a kernel, rows of n; theta_b (l,) where it takes one."""
     random = np.random.default_rng(seed)
-    given = {name: random.normal(size=(count, n)) for name in kernel.function.inputs}
+    sizes = Sizes.of_chain(n, l, frames)
+    given = {q.name: random.normal(size=(count, sizes.size(q))) for q in kernel.function.inputs}
     if kernel.theta:
         given["theta_b"] = random.normal(size=l)
     return given
 
 
 def expected(kernel: Kernel, given: Mapping[str, np.ndarray], n: int, l: int) -> np.ndarray:
-    """The interpreted PROGRAM's output, one row per state; NaN where a pivot is not positive."""
-    output = kernel.function.output
-    sizes = {output: kernel.function.size(n, l), "pivot": n if kernel.function.pivots else 0}
-    values = interpret(kernel.single, given, sizes)
-    rows = values[output]
-    if kernel.function.pivots:
-        rows[~(values["pivot"] > 0).all(axis=-1)] = np.nan
-    return rows
+    """The interpreted PROGRAM's first output, one row per state; NaN where a pivot is not positive."""
+    (first, *_) = all_expected(kernel, given, n, l).values()
+    return first
+
+
+def all_expected(
+    kernel: Kernel, given: Mapping[str, np.ndarray], n: int, l: int, frames: int = 1
+) -> dict[str, np.ndarray]:
+    """Every output of the interpreted PROGRAM, rows of states; NaN where what must be positive is not."""
+    function = kernel.function
+    values = interpret(kernel.single, given, function.sizes(Sizes.of_chain(n, l, frames)))
+    if function.positive is not None:
+        failed = ~(values.pop(function.positive.quantity.name) > 0).all(axis=-1)
+        for rows in values.values():
+            rows[failed] = np.nan
+    return values
 
 
 def error(found: np.ndarray, reference: np.ndarray) -> float:

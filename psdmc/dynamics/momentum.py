@@ -1,0 +1,61 @@
+"""Momentum of bodies, one by one and of all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.body import Body
+from psdmc.dynamics.frames import BASE, Frame, inward, joint_angle, joint_offset, to_previous
+from psdmc.dynamics.motion import JointState
+from psdmc.dynamics.regressor import Twist, carried, own_twist
+from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale
+
+
+def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Twist]:
+    """Of every joint frame: velocity of its origin and angular velocity, along its axes."""
+    found: list[Twist] = []
+    for frame, state, rate in zip(frames, _states(frames, q), qd, strict=True):
+        before = (ZERO, ZERO) if frame.parent == BASE else found[frame.parent]
+        linear, angular = carried(frame, state, before)
+        own_linear, own_angular = own_twist(frame)
+        found.append((add(linear, scale(own_linear, rate)), add(angular, scale(own_angular, rate))))
+    return found
+
+
+def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
+    """Momentum m v + w x h and angular momentum h x v + I w about the frame's origin."""
+    linear, (wx, wy, wz) = twist
+    xx, yy, zz, xy, xz, yz = body.second
+    own = (
+        (yy + zz) * wx - xy * wy - xz * wz,
+        (xx + zz) * wy - xy * wx - yz * wz,
+        (xx + yy) * wz - xz * wx - yz * wy,
+    )
+    moved = add(scale(linear, body.mass), cross((wx, wy, wz), body.moment))
+    return moved, add(cross(body.moment, linear), own)
+
+
+def total_momentum(
+    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], qd: Sequence[Scalar]
+) -> tuple[Vector, Vector]:
+    """Momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, along and about the frame that the first joint
+    frame turns from. Torques do not show it: the bodies must be the real ones."""
+    moving = [momentum_of(body, twist) for body, twist in zip(bodies, twists(frames, q, qd), strict=True)]
+    states, total = _states(frames, q), (ZERO, ZERO)
+    for i in reversed(range(len(frames))):
+        frame, (linear, angular) = frames[i], moving[i]
+        linear = to_previous(frame, inward(states[i].turn, linear))
+        angular = add(to_previous(frame, inward(states[i].turn, angular)), cross(states[i].offset, linear))
+        if frame.parent == BASE:
+            total = add(total[0], linear), add(total[1], angular)
+        else:
+            before = moving[frame.parent]
+            moving[frame.parent] = add(before[0], linear), add(before[1], angular)
+    return total
+
+
+def _states(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[JointState]:
+    return [
+        JointState(joint_angle(frame, value).turn(), joint_offset(frame, value))
+        for frame, value in zip(frames, q, strict=True)
+    ]

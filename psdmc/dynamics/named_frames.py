@@ -1,0 +1,96 @@
+"""Named frames: where they are, how they move with the joints' rates, and what accelerates them besides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.frames import Frame, as_matrix, as_vector
+from psdmc.dynamics.kinematics import AT_BASE, column, forward_kinematics, path_to
+from psdmc.dynamics.motion import sweep_outward
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, scale, transform
+from psdmc.robot.chain import NamedFrame
+
+Root = tuple[Matrix, Vector]
+"""Axes that the first joint frame turns from, as columns in the base frame, and their origin there."""
+
+
+def placed_frames(
+    frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
+) -> list[tuple[Vector, Matrix]]:
+    """Origin (m) and rotation of each named frame in the base frame."""
+    joints = _in_base(frames, q, root)
+    return [
+        (_point(joints[each.joint], each), multiply(joints[each.joint][0], _rotation(each))) for each in named
+    ]
+
+
+def frame_jacobians(
+    frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
+) -> list[list[list[Scalar]]]:
+    """6 x n per named frame: linear velocity of its origin, then angular, per unit joint rate, along the base's axes."""
+    joints = _in_base(frames, q, root)
+    found = []
+    for each in named:
+        point = _point(joints[each.joint], each)
+        columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * len(frames)
+        for j in path_to(frames, each.joint):
+            columns[j] = column(frames[j], joints[j], point)
+        found.append([[each_column[row] for each_column in columns] for row in range(6)])
+    return found
+
+
+def frame_drifts(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> list[tuple[Scalar, ...]]:
+    """Six per named frame: acceleration of its origin, then angular, at constant joint rates, along the base's axes."""
+    joints = _in_base(frames, q, root)
+    forward = sweep_outward(frames, q, qd, None, [0.0] * len(frames), ZERO)
+    found = []
+    for each in named:
+        rotation, motion = joints[each.joint][0], forward.motions[each.joint]
+        arm = as_vector(each.placement.translation.tolist())
+        linear = add(motion.acceleration, transform(motion.spin.field, arm))
+        angular = forward.rates[each.joint].dw_r
+        found.append((*transform(rotation, linear), *transform(rotation, angular)))
+    return found
+
+
+def link_wrenches(
+    named: Sequence[NamedFrame], wrenches: Sequence[Sequence[Scalar]], unit: float = 1.0
+) -> dict[int, tuple[Vector, Vector]]:
+    """Force and moment about a joint frame's origin along its axes, by joint, from a force and a moment per named frame
+    along that frame's own axes about its origin.
+
+    unit   m, unit of length of the algorithm that they enter: what it calls a force is `unit` times as many N
+    """
+    found: dict[int, tuple[Vector, Vector]] = {}
+    for each, (fx, fy, fz, mx, my, mz) in zip(named, wrenches, strict=True):
+        force = transform(_rotation(each), (fx, fy, fz))
+        arm = as_vector(each.placement.translation.tolist())
+        moment = add(transform(_rotation(each), (mx, my, mz)), cross(arm, force))
+        force = force if unit == 1.0 else scale(force, unit)
+        own = found.get(each.joint, (ZERO, ZERO))
+        found[each.joint] = (add(own[0], force), add(own[1], moment))
+    return found
+
+
+def _in_base(frames: Sequence[Frame], q: Sequence[Scalar], root: Root) -> list[tuple[Matrix, Vector]]:
+    """Rotation and origin of every joint frame in the base frame."""
+    axes, origin = root
+    placed = forward_kinematics(frames, q)
+    if root is AT_BASE:
+        return list(placed)
+    return [(multiply(axes, turned), add(origin, transform(axes, point))) for turned, point in placed]
+
+
+def _rotation(frame: NamedFrame) -> Matrix:
+    return as_matrix(frame.placement.rotation.tolist())
+
+
+def _point(joint: tuple[Matrix, Vector], frame: NamedFrame) -> Vector:
+    rotation, origin = joint
+    return add(origin, transform(rotation, as_vector(frame.placement.translation.tolist())))

@@ -1,0 +1,28 @@
+"""The functions that psdmc generates: every file of this folder is one, its RECIPE says all that is known of it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+from psdmc.errors import InternalError
+from psdmc.program.signature import in_order
+from psdmc.recipes.recipe import Recipe
+
+
+def _recipe(file: str) -> Recipe:
+    recipe: Recipe = import_module(f"{__name__}.{file}").RECIPE
+    if recipe.name != file:
+        raise InternalError(f"psdmc/functions/{file}.py is the file of {recipe.name}")
+    return recipe
+
+
+_FOUND = {name: _recipe(name) for name in sorted(module.name for module in iter_modules(__path__))}
+
+SIGNATURES = {signature.name: signature for signature in in_order([r.signature for r in _FOUND.values()])}
+"""By name, in the order of headers and documents."""
+
+RECIPES = {name: _FOUND[name] for name in SIGNATURES}
+
+DEFAULT = tuple(name for name, recipe in RECIPES.items() if recipe.default)
+"""What is generated where no functions are named."""

@@ -1,0 +1,60 @@
+"""The Coriolis matrix of Slotine and Li."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.scalar import ZERO, Scalar
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.torques import torques
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    """Column j is the Slotine-Li torque of a unit reference rate of joint j, without gravity."""
+    n = len(g.bodies)
+    columns = []
+    for j in range(n):
+        unit: list[Scalar] = [1.0 if i == j else 0.0 for i in range(n)]
+        columns.append(torques(g, g.inputs["qd"], g.still, ZERO, unit))
+    return {"C": list(zip(*columns, strict=True))}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    """Column j is what the velocities qd do where qd_r is joint j's unit rate."""
+    q, qd = given["q"], given["qd"]
+    rest = np.zeros_like(q)
+    units = [np.broadcast_to(unit, q.shape) for unit in np.eye(robot.n)]
+    columns = [robot.torques(q, qd, rest, ZERO, qd_r=unit) for unit in units]
+    return {"C": np.stack(columns, axis=-1)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return {"C": robot.coriolis_matrix(given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "coriolis_matrix",
+        50,
+        "C(q, qd) with dM/dt - 2 C skew-symmetric",
+        (Q, QD),
+        (Quantity("C", ("nv", "nv")),),
+        theta=True,
+    ),
+    "Coriolis matrix",
+    trace,
+    reference,
+    "computeCoriolisMatrix",
+    pinocchio,
+    shares="inverse_dynamics",
+    default=True,
+)

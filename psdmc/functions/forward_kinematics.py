@@ -1,0 +1,57 @@
+"""Forward kinematics: where the named frames are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.named_frames import placed_frames
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    points, rotations = zip(*placed_frames(g.frames, g.named, g.inputs["q"], g.root), strict=True)
+    return {"position": points, "rotation": rotations}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    placed = placed_frames(robot.frames, robot.chain.frames, list(q.T))
+    points, rotations = zip(*placed, strict=True)
+    return {"position": entries(points, len(q)), "rotation": entries(rotations, len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def poses(model: Any, data: Any, q: Array) -> Array:
+        pin.framesForwardKinematics(model, data, q)
+        return np.array([data.oMf[frame].homogeneous for frame in robot.frame_ids])
+
+    found = robot.each(poses, given["q"])
+    return {"position": found[..., :3, 3], "rotation": found[..., :3, :3]}
+
+
+RECIPE = Recipe(
+    Signature(
+        "forward_kinematics",
+        100,
+        "origin (m) and rotation matrix of every named frame in the base frame",
+        (Q,),
+        (Quantity("position", ("frames", "3")), Quantity("rotation", ("frames", "3", "3"))),
+        theta=False,
+    ),
+    "forward kinematics",
+    trace,
+    reference,
+    "framesForwardKinematics",
+    pinocchio,
+)

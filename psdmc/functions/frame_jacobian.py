@@ -1,0 +1,54 @@
+"""Geometric Jacobians of the named frames in the base frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.named_frames import frame_jacobians
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"J": frame_jacobians(g.frames, g.named, g.inputs["q"], g.root)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    return {"J": entries(frame_jacobians(robot.frames, robot.chain.frames, list(q.T)), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def jacobians(model: Any, data: Any, q: Array) -> Array:
+        aligned = pin.LOCAL_WORLD_ALIGNED
+        found = [pin.computeFrameJacobian(model, data, q, frame, aligned) for frame in robot.frame_ids]
+        return np.reshape(found, (-1, 6, model.nv))
+
+    return {"J": robot.each(jacobians, given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "frame_jacobian",
+        110,
+        "linear then angular velocity of every named frame per unit joint rate, base frame",
+        (Q,),
+        (Quantity("J", ("frames", "6", "nv")),),
+        theta=False,
+    ),
+    "frame Jacobian",
+    trace,
+    reference,
+    "computeFrameJacobian",
+    pinocchio,
+)

@@ -1,0 +1,45 @@
+"""Gravity's torques."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.recipes.torques import torques
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    still = g.still
+    return {"g": torques(g, still, still, g.base)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    rest = np.zeros_like(given["q"])
+    return {"g": robot.torques(given["q"], rest, rest, robot.base)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return {"g": robot.gravity(given["q"])}
+
+
+RECIPE = Recipe(
+    Signature("gravity", 60, "g(q)", (Q,), (Quantity("g", ("nv",)),), theta=True),
+    "gravity",
+    trace,
+    reference,
+    "computeGeneralizedGravity",
+    pinocchio,
+    shares="inverse_dynamics",
+    polynomials=Polynomials.GRAVITY,
+    default=True,
+    benched=True,
+)

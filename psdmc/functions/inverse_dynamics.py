@@ -1,0 +1,40 @@
+"""Inverse dynamics: joint torques by Newton-Euler."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.program.signature import QD, QDD, TAU, Q, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.recipes.torques import torques
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"tau": torques(g, g.inputs["qd"], g.inputs["qdd"], g.base)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return {"tau": robot.torques(given["q"], given["qd"], given["qdd"], robot.base)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return {"tau": robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
+
+
+RECIPE = Recipe(
+    Signature("inverse_dynamics", 10, "tau = M(q) qdd + h(q, qd)", (Q, QD, QDD), (TAU,), theta=True),
+    "inverse dynamics",
+    trace,
+    reference,
+    "rnea",
+    pinocchio,
+    polynomials=Polynomials.TORQUE,
+    default=True,
+    benched=True,
+)

@@ -1,0 +1,53 @@
+"""The tip's geometric Jacobian in the base frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.dynamics.kinematics import jacobian
+from psdmc.dynamics.scalar import dot
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, matrix
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    rows = jacobian(g.frames, g.tip_body, g.tip, g.inputs["q"])
+    turned = [
+        [dot(axes, (rows[k][j], rows[k + 1][j], rows[k + 2][j])) for j in range(len(g.frames))]
+        for k in (0, 3)
+        for axes in g.base_axes
+    ]
+    return {"J": turned}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    return {"J": matrix(jacobian(robot.frames, robot.chain.tip_body, robot.chain.tip, list(q.T)), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return {"J": robot.jacobian(given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "jacobian",
+        90,
+        "linear then angular velocity of the tip per unit joint rate, base frame",
+        (Q,),
+        (Quantity("J", ("6", "nv")),),
+        theta=False,
+    ),
+    "Jacobian",
+    trace,
+    reference,
+    "computeFrameJacobian",
+    pinocchio,
+    default=True,
+)

@@ -1,0 +1,56 @@
+"""The drift of the named frames: what their Jacobians' rates add to their accelerations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.named_frames import frame_drifts
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"drift": frame_drifts(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, qd = given["q"], given["qd"]
+    drifts = frame_drifts(robot.frames, robot.chain.frames, list(q.T), list(qd.T))
+    return {"drift": entries(drifts, len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def accelerations(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        pin.forwardKinematics(model, data, q, qd, np.zeros(model.nv))
+        aligned = pin.LOCAL_WORLD_ALIGNED
+        found = [pin.getFrameClassicalAcceleration(model, data, frame, aligned) for frame in robot.frame_ids]
+        return np.array([motion.vector for motion in found])
+
+    return {"drift": robot.each(accelerations, given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "jacobian_dot_qd",
+        120,
+        "linear then angular acceleration of every named frame at constant qd (dJ/dt qd), base frame",
+        (Q, QD),
+        (Quantity("drift", ("frames", "6")),),
+        theta=False,
+    ),
+    "frame drift",
+    trace,
+    reference,
+    "getFrameClassicalAcceleration",
+    pinocchio,
+)

@@ -1,0 +1,62 @@
+"""Kinetic energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.energy import kinetic_energy
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"T": kinetic_energy(g.frames, g.bodies, g.drives, g.inputs["q"], g.inputs["qd"])}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, qd = given["q"], given["qd"]
+    return {
+        "T": entries(kinetic_energy(robot.frames, robot.bodies, robot.drives, list(q.T), list(qd.T)), len(q))
+    }
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """Pinocchio's energy of the links, and that of the drives beside: Pinocchio 4.1 leaves out the armature of joints about
+    oblique axes, which its mass matrix has."""
+    import pinocchio as pin
+
+    links = pin.Model(robot.model)
+    links.armature = np.zeros(links.nv)
+    own = links.createData()
+
+    def energy(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        return np.asarray(pin.computeKineticEnergy(links, own, q, qd) + 0.5 * qd**2 @ model.armature)
+
+    return {"T": robot.each(energy, given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "kinetic_energy",
+        130,
+        "T = qd^T M(q) qd / 2 in J, drive inertias included",
+        (Q, QD),
+        (Quantity("T"),),
+        theta=True,
+    ),
+    "kinetic energy",
+    trace,
+    reference,
+    "computeKineticEnergy",
+    pinocchio,
+    shares="inverse_dynamics",
+    matters=(),
+)

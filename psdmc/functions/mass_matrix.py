@@ -1,0 +1,42 @@
+"""The mass matrix, by composite rigid bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"M": mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return {"M": robot.mass_matrix(given["q"])}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return {"M": robot.mass_matrix(given["q"])}
+
+
+RECIPE = Recipe(
+    Signature("mass_matrix", 30, "M(q), both triangles", (Q,), (Quantity("M", ("nv", "nv")),), theta=True),
+    "mass matrix",
+    trace,
+    reference,
+    "crba",
+    pinocchio,
+    starts="inverse_dynamics",
+    matters=("fold_double_angle",),
+    polynomials=Polynomials.MASS,
+    default=True,
+    benched=True,
+)

@@ -1,0 +1,65 @@
+"""Spatial momentum of the whole robot about the base frame's origin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.momentum import total_momentum
+from psdmc.dynamics.parameters import bodies_about
+from psdmc.dynamics.scalar import add, cross, transform
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    """Of the links' own bodies: those that theta_b stands for have other momenta."""
+    bodies = bodies_about(g.link_frames, g.standard)
+    linear, angular = total_momentum(g.frames, bodies, g.inputs["q"], g.inputs["qd"])
+    axes, origin = g.root
+    turned = transform(axes, linear)
+    return {"h": (*turned, *add(transform(axes, angular), cross(origin, turned)))}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, qd = given["q"], given["qd"]
+    linear, angular = total_momentum(robot.frames, robot.solids, list(q.T), list(qd.T))
+    return {"h": entries((*linear, *angular), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """Pinocchio's momentum about the centre of mass, moved to the base's origin: L_O = L_C + c x p."""
+    import pinocchio as pin
+
+    def moved(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        about_centre = pin.computeCentroidalMomentum(model, data, q, qd)
+        linear = np.array(about_centre.linear)
+        return np.concatenate([linear, about_centre.angular + np.cross(data.com[0], linear)])
+
+    return {"h": robot.each(moved, given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "momentum",
+        150,
+        "linear momentum (kg m/s), then angular momentum about the base frame's origin (kg m^2/s) of all links, along the "
+        "base frame's axes, drive inertias not included",
+        (Q, QD),
+        (Quantity("h", ("6",)),),
+        theta=False,
+    ),
+    "momentum",
+    trace,
+    reference,
+    "computeCentroidalMomentum",
+    pinocchio,
+    needs=Needs.STANDARD,
+)

@@ -1,0 +1,50 @@
+"""Nonlinear effects: the torques of motion at constant speed, and gravity's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.recipes.torques import torques
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"h": torques(g, g.inputs["qd"], g.still, g.base)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return {"h": robot.torques(given["q"], given["qd"], np.zeros_like(given["q"]), robot.base)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return {"h": robot.nonlinear_effects(given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "nonlinear_effects",
+        40,
+        "h(q, qd) = C(q, qd) qd + g(q)",
+        (Q, QD),
+        (Quantity("h", ("nv",)),),
+        theta=True,
+    ),
+    "nonlinear effects",
+    trace,
+    reference,
+    "nonLinearEffects",
+    pinocchio,
+    shares="inverse_dynamics",
+    polynomials=Polynomials.BIAS,
+    default=True,
+    benched=True,
+)

@@ -1,0 +1,56 @@
+"""Potential energy, but for the constant that no torque shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.energy import potential_energy
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"U": potential_energy(g.frames, g.bodies, g.inputs["q"], g.base)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    return {"U": entries(potential_energy(robot.frames, robot.bodies, list(q.T), robot.base), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """Pinocchio's energy less its energy at q = 0."""
+    import pinocchio as pin
+
+    def energy(model: Any, data: Any, q: Array) -> Array:
+        at_zero = pin.computePotentialEnergy(model, data, np.zeros(model.nq))
+        return np.asarray(pin.computePotentialEnergy(model, data, q) - at_zero)
+
+    return {"U": robot.each(energy, given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "potential_energy",
+        140,
+        "U with dU/dq = g(q) in J; U(0) = 0, as theta_b does not show the energy there",
+        (Q,),
+        (Quantity("U"),),
+        theta=True,
+    ),
+    "potential energy",
+    trace,
+    reference,
+    "computePotentialEnergy",
+    pinocchio,
+    shares="inverse_dynamics",
+    matters=(),
+)

@@ -1,0 +1,43 @@
+"""The torques' regressor in theta_b."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
+from psdmc.recipes.base_regressor import rows_on_arrays, traced_rows
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"Y": traced_rows(g, g.inputs["qdd"])}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return {"Y": rows_on_arrays(robot, given["q"], given["qd"], given["qdd"])}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return {"Y": robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "regressor", 70, "Y with tau = Y theta_b", (Q, QD, QDD), (Quantity("Y", ("nv", "l")),), theta=False
+    ),
+    "joint-torque regressor",
+    trace,
+    reference,
+    "rnea",
+    pinocchio,
+    polynomials=Polynomials.REGRESSOR,
+    times_theta=True,
+    default=True,
+    benched=True,
+)

@@ -1,0 +1,51 @@
+"""The regressor in theta_b of Slotine and Li's control law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.base_regressor import rows_on_arrays, traced_rows
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"Y": traced_rows(g, g.inputs["qdd_r"], g.inputs["qd_r"])}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return {"Y": rows_on_arrays(robot, given["q"], given["qd"], given["qdd_r"], given["qd_r"])}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    turned = np.einsum("...ij,...j->...i", robot.mass_matrix(given["q"]), given["qdd_r"])
+    coriolis = robot.coriolis_matrix(given["q"], given["qd"])
+    carried = np.einsum("...ij,...j->...i", coriolis, given["qd_r"])
+    return {"Y": turned + carried + robot.gravity(given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "regressor_slotine_li",
+        80,
+        "Y with M(q) qdd_r + C(q, qd) qd_r + g(q) = Y theta_b",
+        (Q, QD, Quantity("qd_r", ("nv",), 3.0), Quantity("qdd_r", ("nv",), 5.0)),
+        (Quantity("Y", ("nv", "l")),),
+        theta=False,
+    ),
+    "Slotine-Li regressor",
+    trace,
+    reference,
+    "crba, computeCoriolisMatrix",
+    pinocchio,
+    times_theta=True,
+    default=True,
+)

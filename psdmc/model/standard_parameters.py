@@ -1,0 +1,26 @@
+"""Whether a model's links are known one by one, which torques alone do not show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from psdmc.model.dynamics_model import DynamicsModel
+
+BELONGS = 1e-9
+"""Share of the largest base parameter by which those of the links may miss theta_b: both were rounded."""
+
+
+def lack_of_standard_parameters(model: DynamicsModel) -> str | None:
+    """Why mass, centre and inertia of every link cannot be taken from the model's chain; None where they can."""
+    parameters = model.chain.parameters
+    if np.isnan(parameters).any():
+        return "it needs mass and inertia of every link, and some are unknown"
+    if not parameters[:, 0].sum() > 0.0:
+        return "it needs mass, and the links have none"
+    theta = model.B @ parameters.reshape(-1)
+    if model.theta_b is None or np.abs(theta - model.theta_b).max() > BELONGS * np.abs(theta).max():
+        return (
+            "it needs mass and inertia of every link, which torques do not show, and the model's base parameters are "
+            "not those of the links in its file"
+        )
+    return None

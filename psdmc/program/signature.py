@@ -1,0 +1,132 @@
+"""What a generated function reads and puts out: named quantities with sizes in words. Lowering fills signatures in, emission
+prints them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from psdmc.errors import InternalError
+
+WORDS = ("n", "nq", "nv", "l", "frames")
+"""Sizes that depend on the robot: joints, length of q, length of qd, base parameters, named frames."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """What the words of a signature mean for one robot."""
+
+    n: int
+    nq: int
+    nv: int
+    l: int
+    frames: int
+
+    @staticmethod
+    def of_chain(n: int, l: int, frames: int = 1) -> Sizes:
+        """Of a robot whose joints have one coordinate each."""
+        return Sizes(n, n, n, l, frames)
+
+    def shape(self, axes: Sequence[str]) -> tuple[int, ...]:
+        """Lengths of axes that are each a word of WORDS or a number."""
+        return tuple(getattr(self, axis) if axis in WORDS else int(axis) for axis in axes)
+
+    def size(self, quantity: Quantity) -> int:
+        """Reals per state."""
+        return math.prod(self.shape(quantity.axes))
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A named scalar (no axes), vector or matrix (row-major).
+
+    axes     each a word of WORDS or a number
+    largest  SI; tests draw an input from plus or minus this
+    """
+
+    name: str
+    axes: tuple[str, ...] = ()
+    largest: float = 1.0
+
+    def __post_init__(self) -> None:
+        wrong = [axis for axis in self.axes if axis not in WORDS and not axis.isdecimal()]
+        if wrong or not self.name.isidentifier():
+            raise ValueError(f"{self.name!r} with axes {self.axes}: an axis is a number or one of {WORDS}")
+
+
+@dataclass(frozen=True, slots=True)
+class Positive:
+    """What a function computes beside its outputs and must find positive, entry by entry, to have any.
+
+    which   the entry that is not, in words, and
+    reason  the same by what it means
+    spoilt  what becomes NaN then, in words
+    """
+
+    quantity: Quantity
+    which: str
+    reason: str
+    spoilt: str
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """One generated function.
+
+    name      of the function, in C behind the robot's name
+    order     its place in headers, documents and lists: ascending
+    meaning   what a user reads in the header
+    inputs    read, in this order
+    outputs   written, in this order
+    theta     whether a variant exists that takes theta_b (length l) at run time
+    positive  computed beside the outputs and not put out: where an entry is not above zero the function fails, its outputs
+              are NaN and it returns which; None: it cannot fail
+    """
+
+    name: str
+    order: int
+    meaning: str
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    theta: bool
+    positive: Positive | None = None
+
+    def __post_init__(self) -> None:
+        names = [quantity.name for quantity in (*self.inputs, *self.stored)]
+        if len(set(names)) != len(names):
+            raise ValueError(f"{self.name}: a name stands for two of {', '.join(names)}")
+        if not self.inputs or not self.outputs:
+            raise ValueError(f"{self.name}: a function has inputs and outputs")
+
+    @property
+    def stored(self) -> tuple[Quantity, ...]:
+        """Everything that its PROGRAMs put out."""
+        return (*self.outputs, *((self.positive.quantity,) if self.positive else ()))
+
+    def label(self, output: Quantity, theta: bool = False) -> str:
+        """What values of one output are called: as the function, and the output where there are several."""
+        kernel = self.name + ("_theta" if theta else "")
+        return kernel if len(self.outputs) == 1 else f"{kernel}_{output.name}"
+
+    def sizes(self, sizes: Sizes) -> dict[str, int]:
+        """Reals per state of everything that its PROGRAMs put out."""
+        return {quantity.name: sizes.size(quantity) for quantity in self.stored}
+
+
+def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
+    """By `order`; InternalError where two have the same."""
+    found = tuple(sorted(signatures, key=lambda signature: signature.order))
+    for one, other in pairwise(found):
+        if one.order == other.order:
+            raise InternalError(f"{one.name} and {other.name} both have the order {one.order}")
+    return found
+
+
+Q = Quantity("q", ("nq",), math.pi)
+"""Positions, rad or m."""
+QD, QDD = Quantity("qd", ("nv",), 3.0), Quantity("qdd", ("nv",), 5.0)
+"""Their rates."""
+TAU = Quantity("tau", ("nv",))
+"""Torques, N m or N; those of q, qd and qdd wherever states are drawn."""

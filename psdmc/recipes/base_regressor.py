@@ -1,0 +1,43 @@
+"""The torques' coefficients of theta_b, over symbols and on arrays: what both regressors are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from psdmc.dynamics.regressor import regressor
+from psdmc.dynamics.scalar import Scalar
+from psdmc.recipes.on_arrays import RobotOnArrays, columns
+from psdmc.recipes.recipe import Ingredients
+from psdmc.robot.chain import Array
+from psdmc.robot.small import times
+
+
+def traced_rows(
+    g: Ingredients, qdd: Sequence[Scalar], qd_r: Sequence[Scalar] | None = None
+) -> list[list[Scalar]]:
+    """n rows of l entries: torques M qdd + C(q, qd) qd_r + g by theta_b, qd_r = qd if not given."""
+    needed = [j for j in range(len(g.lift)) if g.lift[j].any()]
+    q, qd = g.inputs["q"], g.inputs["qd"]
+    found = regressor(g.frames, g.link_frames, set(needed), q, qd, qdd, g.base, qd_r)
+    return [[_entry(g.lift[:, k], needed, row) for k in range(g.lift.shape[1])] for row in found]
+
+
+def _entry(weights: Array, needed: Sequence[int], row: dict[int, Scalar]) -> Scalar:
+    total: Scalar = 0.0
+    for j in needed:
+        if weights[j] and j in row:
+            total = total + row[j] * float(weights[j])
+    return total
+
+
+def rows_on_arrays(robot: RobotOnArrays, q: Array, qd: Array, qdd: Array, qd_r: Array | None = None) -> Array:
+    """(k, n, l): the same on arrays."""
+    wanted = np.flatnonzero(robot.lift.any(axis=1)).tolist()
+    places = [joint.link_frame for joint in robot.chain.joints]
+    states = (list(q.T), list(qd.T), list(qdd.T))
+    rates = None if qd_r is None else list(qd_r.T)
+    rows = regressor(robot.frames, places, frozenset(wanted), *states, robot.base, rates)
+    full = np.stack([columns([row.get(c, 0.0) for c in wanted], len(q)) for row in rows], axis=1)
+    return np.asarray(times(full, robot.lift[wanted]))

@@ -1,0 +1,102 @@
+"""A robot's dynamics on arrays of states by psdmc.dynamics: what references are computed with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.body import Body
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
+from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
+from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
+from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.robot.chain import Array, Chain
+from psdmc.robot.small import times
+
+if TYPE_CHECKING:
+    from psdmc.model.dynamics_model import DynamicsModel
+
+
+@dataclass(frozen=True, eq=False)
+class RobotOnArrays:
+    """A chain with standard parameters x, (11 n,) about the link frames, that theta_b stands for.
+
+    lift   (11 n, l) theta_b to such parameters
+    """
+
+    chain: Chain
+    x: Array
+    lift: Array
+
+    @staticmethod
+    def of(model: DynamicsModel, theta_b: Array) -> RobotOnArrays:
+        """A model with these base parameters."""
+        return RobotOnArrays(model.chain, times(model.representative, theta_b), model.representative)
+
+    @property
+    def n(self) -> int:
+        return len(self.chain)
+
+    @cached_property
+    def frames(self) -> tuple[Frame, ...]:
+        return frames_of(self.chain)
+
+    @cached_property
+    def base(self) -> Vector:
+        return base_acceleration(self.chain)
+
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        return bodies_of(self.chain, self.x)
+
+    @cached_property
+    def drives(self) -> list[float]:
+        return drive_inertia_of(self.x)
+
+    @cached_property
+    def solids(self) -> tuple[Body, ...]:
+        """The links' own bodies, which the chain knows."""
+        return bodies_of(self.chain, self.chain.parameters)
+
+    def torques(
+        self,
+        q: Array,
+        qd: Array,
+        qdd: Array,
+        base: Vector,
+        qd_r: Array | None = None,
+        external: Mapping[int, Wrench] = NO_WRENCHES,
+    ) -> Array:
+        """(k, n)"""
+        rates = None if qd_r is None else list(qd_r.T)
+        given = (list(q.T), list(qd.T), list(qdd.T))
+        torques = inverse_dynamics(
+            self.frames, self.bodies, self.drives, *given, base, qd_r=rates, external=external
+        )
+        return columns(torques, len(q))
+
+    def mass_matrix(self, q: Array) -> Array:
+        """(k, n, n)"""
+        return matrix(mass_matrix(self.frames, self.bodies, self.drives, list(q.T)), len(q))
+
+
+def columns(values: Sequence[Scalar], count: int) -> Array:
+    """(count, len(values)) from numbers or (count,) arrays."""
+    return np.stack([np.broadcast_to(np.asarray(v, dtype=np.float64), (count,)) for v in values], axis=1)
+
+
+def matrix(rows: Sequence[Sequence[Scalar]], count: int) -> Array:
+    """(count, rows, columns) from numbers or (count,) arrays."""
+    return np.stack([columns(row, count) for row in rows], axis=1)
+
+
+def entries(values: Any, count: int) -> Array:
+    """(count, ...) from a number, a (count,) array, or nested sequences of them."""
+    if isinstance(values, list | tuple):
+        return np.stack([entries(value, count) for value in values], axis=1)
+    return np.broadcast_to(np.asarray(values, dtype=np.float64), (count,))

@@ -1,0 +1,133 @@
+"""How one generated function is made and held against others: what a file of psdmc/functions says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from psdmc.dynamics.body import Body
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.motion import Choices
+from psdmc.dynamics.scalar import Matrix, Scalar, Vector
+from psdmc.program.signature import Signature
+from psdmc.robot.chain import Array, NamedFrame, Placement
+
+if TYPE_CHECKING:
+    from psdmc.recipes.on_arrays import RobotOnArrays
+    from psdmc.robot.reference import Reference
+
+Outputs = Mapping[str, Any]
+"""A scalar, or nested sequences of them, for each quantity of a signature that is stored, in the signature's order."""
+
+Arrays = dict[str, Array]
+"""Quantity's name -> (k, ...) values at k states, trailing axes as in the signature."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ingredients:
+    """What a trace runs on: symbols, and one robot's constants.
+
+    frames       n joint frames
+    base         base acceleration, minus gravity, along the axes that the first frame turns from
+    bodies       n bodies about the joint frames and
+    drives       n drive inertias that belong to theta_b; only torques are those of the real bodies. Empty for functions
+                 without theta_b
+    choices      how the recursions are arranged
+    unit         m, unit of all lengths above: forces come out in 1/unit N; 1 for functions without theta_b
+    base_axes    axes that the first frame turns from as columns in the base frame, and
+    base_origin  m, their origin there
+    link_frames  n, the file's link frames in the joint frames
+    named        the named frames, placed in the joint frames
+    tip          the tip frame in the joint frame of
+    tip_body     the body that it is fixed to
+    lift         (11 n, l) theta_b to standard parameters about the link frames
+    standard     (n, 11) the robot's own standard parameters about the link frames, NaN where unknown
+    inputs       the function's inputs by name
+    """
+
+    frames: tuple[Frame, ...]
+    base: Vector
+    bodies: tuple[Body, ...]
+    drives: tuple[Scalar, ...]
+    choices: Choices
+    unit: float
+    base_axes: Matrix
+    base_origin: Vector
+    link_frames: tuple[Placement, ...]
+    named: tuple[NamedFrame, ...]
+    tip: Placement
+    tip_body: int
+    lift: Array
+    standard: Array
+    inputs: Mapping[str, list[Any]]
+
+    @property
+    def root(self) -> tuple[Matrix, Vector]:
+        """Axes that the first frame turns from and their origin, in the base frame, lengths in m."""
+        return self.base_axes, self.base_origin
+
+    @property
+    def still(self) -> list[Scalar]:
+        """n zero rates."""
+        return [0.0] * len(self.frames)
+
+
+class Polynomials(StrEnum):
+    """Which part of the torques that E, P and theta_b expand a function is: what the expanded lowering makes it from."""
+
+    TORQUE = "all terms"
+    MASS = "terms of qdd"
+    BIAS = "terms without qdd"
+    GRAVITY = "terms of q alone"
+    SOLVED = "terms of qdd, solved for it"
+    REGRESSOR = "coefficients of theta_b"
+
+
+class Needs(StrEnum):
+    """What a model must have beyond theta_b."""
+
+    POSITIVE_MASS = "a positive definite mass matrix"
+    STANDARD = "standard parameters of its links"
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """One generated function.
+
+    signature    what it reads and puts out
+    title        its name in prose
+    trace        its arithmetic over psdmc.dynamics on symbols
+    reference    the same in NumPy on the MODEL's own frames and bodies, no lowering involved: (robot, given) to the values
+                 of all outputs. `given` holds every quantity of states, tau being the torques of q, qd and qdd
+    against      Pinocchio's function that it is held against, and
+    pinocchio    that function's values: (model on arrays, given)
+    starts       name of the function whose search decides where frames sit and the unit of length
+    shares       name of the function whose arrangement is taken over whole; only the choices in it are made anew
+    matters      fields of Choices that make a difference to it
+    polynomials  what the expanded lowering makes it from; None: it does not
+    times_theta  its outputs times theta_b are torques and are compared so: `pinocchio` gives these torques
+    needs        what the model must have
+    default      whether it is generated where no functions are named
+    benched      whether `make bench` measures it
+    """
+
+    signature: Signature
+    title: str
+    trace: Callable[[Ingredients], Outputs]
+    reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays]
+    against: str
+    pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays]
+    starts: str | None = None
+    shares: str | None = None
+    matters: tuple[str, ...] = Choices.__slots__
+    polynomials: Polynomials | None = None
+    times_theta: bool = False
+    needs: Needs | None = None
+    default: bool = False
+    benched: bool = False
+
+    @property
+    def name(self) -> str:
+        return self.signature.name

@@ -1,0 +1,139 @@
+"""A compiled package's functions on NumPy arrays, broadcasting over leading axes like ufuncs."""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import cffi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from psdmc.errors import InputError, ToolchainError
+from psdmc.program.signature import Quantity, Signature
+from psdmc.toolchain.interface import Interface, batch_symbol
+from psdmc.toolchain.stubs import result_name
+
+Array = NDArray[Any]
+
+
+class CompiledFunctions:
+    """The library of a compiled package, called by a function's signature."""
+
+    def __init__(self, interface: Interface, library: Path) -> None:
+        self._ffi = cffi.FFI()
+        self._ffi.cdef(interface.cdef)
+        self._library = _opened(self._ffi, library, interface.robot)
+        self._robot = interface.robot
+        self._sizes = interface.sizes
+        self._dtype = np.dtype(interface.dtype)
+        self._pointer = self._ffi.typeof(f"{interface.real} *")
+        self._kernels = {name: _bound(interface, self._library, name) for name in interface.kernels}
+        self.joint_names = interface.joint_names
+        self.frame_names = interface.frame_names
+        self.library = library
+
+    def call(self, function: Signature, inputs: Sequence[ArrayLike], theta_b: ArrayLike | None = None) -> Any:
+        """The output, or a named tuple of the outputs, of a function at these states."""
+        name = function.name
+        kernel = self._kernel(name if theta_b is None else f"{name}_theta")
+        arrays = [self._states(name, q, x) for q, x in zip(function.inputs, inputs, strict=True)]
+        lead, rows = self._rows(function, arrays)
+        if theta_b is not None:
+            rows.append(self._parameters(name, theta_b))
+        outs = [np.empty(lead + tail, self._dtype) for tail in kernel.tails]
+        kernel.batch(math.prod(lead), *map(self._address, rows), *map(self._address, outs))
+        return outs[0] if len(outs) == 1 else results(function)(*outs)
+
+    def _kernel(self, name: str) -> _Kernel:
+        try:
+            return self._kernels[name]
+        except KeyError:
+            compiled = ", ".join(self._kernels)
+            raise InputError(f"{self._robot}: {name} was not compiled", f"compiled are {compiled}") from None
+
+    def _states(self, name: str, quantity: Quantity, values: ArrayLike) -> Array:
+        array = np.asarray(values, self._dtype)
+        tail = self._sizes.shape(quantity.axes)
+        if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:
+            expected = ", ".join(("...", *map(str, tail)))
+            raise InputError(
+                f"{name}: {quantity.name} has shape {array.shape}, expected ({expected})",
+                self._hint(quantity),
+            )
+        return array
+
+    def _hint(self, quantity: Quantity) -> str:
+        if "frames" in quantity.axes:
+            return f"the frames are {', '.join(self.frame_names)}"
+        return f"the robot has {self._sizes.n} joints: {', '.join(self.joint_names)}"
+
+    def _rows(self, function: Signature, arrays: list[Array]) -> tuple[tuple[int, ...], list[Array]]:
+        """The common leading shape, and the arrays as contiguous rows of it."""
+        leads = [
+            array.shape[: array.ndim - len(q.axes)] for q, array in zip(function.inputs, arrays, strict=True)
+        ]
+        lead = leads[0]
+        if any(other != lead for other in leads):
+            lead = self._common_lead(function, arrays, leads)
+            tails = [array.shape[len(own) :] for own, array in zip(leads, arrays, strict=True)]
+            arrays = [np.broadcast_to(array, lead + tail) for array, tail in zip(arrays, tails, strict=True)]
+        return lead, [np.ascontiguousarray(array) for array in arrays]
+
+    def _common_lead(
+        self, function: Signature, arrays: list[Array], leads: list[tuple[int, ...]]
+    ) -> tuple[int, ...]:
+        try:
+            return np.broadcast_shapes(*leads)
+        except ValueError:
+            pairs = zip(function.inputs, arrays, strict=True)
+            shapes = ", ".join(f"{quantity.name} {array.shape}" for quantity, array in pairs)
+            raise InputError(
+                f"{function.name}: shapes do not broadcast: {shapes}",
+                "give arrays of one shape, or shapes that NumPy broadcasts",
+            ) from None
+
+    def _parameters(self, name: str, theta_b: ArrayLike) -> Array:
+        array = np.ascontiguousarray(theta_b, self._dtype)
+        if array.shape != (self._sizes.l,):
+            raise InputError(
+                f"{name}: theta_b has shape {array.shape}, expected ({self._sizes.l},)",
+                "give one value per base parameter",
+            )
+        return array
+
+    def _address(self, array: Array) -> Any:
+        return self._ffi.from_buffer(self._pointer, array)
+
+
+def _opened(ffi: cffi.FFI, library: Path, robot: str) -> Any:
+    try:
+        return ffi.dlopen(str(library))
+    except OSError as error:
+        raise ToolchainError(
+            f"{robot}: the compiled library cannot be loaded: {error}",
+            "set CC to a compiler that makes libraries for this machine, or unset it",
+        ) from error
+
+
+@dataclass(frozen=True, slots=True)
+class _Kernel:
+    """One compiled kernel: its batch function in C, and the trailing axes of its results."""
+
+    tails: tuple[tuple[int, ...], ...]
+    batch: Callable[..., int | None]
+
+
+def _bound(interface: Interface, library: Any, name: str) -> _Kernel:
+    return _Kernel(interface.kernels[name], getattr(library, batch_symbol(interface.robot, name)))
+
+
+@cache
+def results(function: Signature) -> Any:
+    """The named tuple that a function with several outputs returns."""
+    return namedtuple(result_name(function), [output.name for output in function.outputs])

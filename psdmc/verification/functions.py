@@ -1,0 +1,66 @@
+"""What functions are made of beyond E, P and theta_b, against Pinocchio: every recipe's own reference and counterpart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from psdmc.functions import RECIPES
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.standard_parameters import lack_of_standard_parameters
+from psdmc.program.signature import TAU, Sizes
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Needs, Recipe
+from psdmc.robot.chain import Array
+from psdmc.robot.reference import Reference
+
+STATES = 100
+SEED = 14_631
+
+NOTHING = 1e-9
+"""Values below this share of the largest torque (N m, N) and of one (m, J, kg m/s) are compared on that scale: a robot on
+which gravity acts along no joint has no potential energy but rounding."""
+
+
+def function_errors(
+    model: DynamicsModel, theta: Array, robot: Reference
+) -> Iterator[tuple[str, str, float, str]]:
+    """(name, Pinocchio's function, largest error relative to each output's largest value, why there is none) for all
+    functions that are no part of the expansion."""
+    arrays = RobotOnArrays.of(model, theta)
+    given = _states(model, robot)
+    least = NOTHING * max(1.0, float(np.abs(given[TAU.name]).max(initial=0.0)))
+    for recipe in RECIPES.values():
+        if recipe.polynomials is not None:
+            continue
+        lack = lack_of_standard_parameters(model) if recipe.needs is Needs.STANDARD else None
+        error = np.nan if lack else _error(recipe, arrays, robot, given, theta, least)
+        yield recipe.title, recipe.against, error, lack or ""
+
+
+def _states(model: DynamicsModel, robot: Reference) -> dict[str, Array]:
+    """(STATES, ...) of everything that functions read."""
+    rng, sizes = np.random.default_rng(SEED), Sizes.of_chain(model.n, model.l, len(model.chain.frames))
+    read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
+    given = {
+        q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()
+    }
+    return given | {TAU.name: robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
+
+
+def _error(
+    recipe: Recipe,
+    arrays: RobotOnArrays,
+    robot: Reference,
+    given: Mapping[str, Array],
+    theta: Array,
+    least: float,
+) -> float:
+    expected, found = recipe.pinocchio(robot, given), recipe.reference(arrays, given)
+    if recipe.times_theta:
+        found = {name: values @ theta for name, values in found.items()}
+    return max(
+        float(np.abs(found[name] - values).max() / max(float(np.abs(values).max()), least))
+        for name, values in expected.items()
+    )

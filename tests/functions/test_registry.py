@@ -1,0 +1,104 @@
+"""Functions are told of in one place each: every file of psdmc/functions is one, and nothing else lists them."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import psdmc.functions
+from psdmc.functions import DEFAULT, RECIPES, SIGNATURES
+from psdmc.program.signature import WORDS
+from psdmc.toolchain.call import CompiledRobot
+from psdmc.toolchain.stubs import STUB, stub
+
+PACKAGE = Path(psdmc.functions.__file__).parents[1]
+
+NAMES_SEVERAL = {
+    "bench/rivals/casadi_c.py": "what this rival has, and under which names",
+    "bench/rivals/mujoco_c.py": "what this rival has",
+    "bench/rivals/pinocchio_cpp.py": "what this rival has, and under which names",
+    "report/bench_markdown.py": "the columns of README's table",
+}
+"""Files that name more than one function, and why they must."""
+
+
+def texts(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+def test_every_file_of_the_folder_is_a_function_in_its_order() -> None:
+    files = {path.stem for path in (PACKAGE / "functions").glob("*.py")} - {"__init__"}
+    assert files == set(RECIPES) == set(SIGNATURES)
+    orders = [recipe.signature.order for recipe in RECIPES.values()]
+    assert orders == sorted(set(orders))
+
+
+def test_nothing_else_lists_functions() -> None:
+    found = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        inside = path.relative_to(PACKAGE).as_posix()
+        named = set(texts(path)) & set(RECIPES)
+        if len(named) > 1 and not inside.startswith("functions/"):
+            found[inside] = sorted(named)
+    assert set(found) == set(NAMES_SEVERAL), found
+
+
+def test_recipes_only_lean_on_functions_that_there_are() -> None:
+    for recipe in RECIPES.values():
+        for other in (recipe.starts, recipe.shares):
+            assert other is None or (other in RECIPES and RECIPES[other].starts is None), recipe.name
+        assert not (recipe.starts and recipe.shares), recipe.name
+        assert recipe.signature.theta or not (recipe.starts or recipe.shares), recipe.name
+        if recipe.name in DEFAULT:
+            assert "frames" not in {axis for q in recipe.signature.stored for axis in q.axes}
+
+
+def test_every_function_is_a_method_with_its_arguments_and_meaning() -> None:
+    for name, signature in SIGNATURES.items():
+        method = getattr(CompiledRobot, name)
+        assert method.__name__ == name
+        assert signature.meaning in method.__doc__
+        expected = ["self", *(q.name for q in signature.inputs), *(["theta_b"] if signature.theta else [])]
+        assert list(method.__signature__.parameters) == expected
+
+
+def test_the_stub_is_what_the_signatures_say() -> None:
+    """After a change: python -m psdmc.toolchain.stubs"""
+    assert STUB.read_text(encoding="utf-8") == stub(SIGNATURES.values())
+
+
+def test_the_documents_table_has_every_function() -> None:
+    text = (PACKAGE.parent / "docs" / "functions.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    for name, recipe in RECIPES.items():
+        (row,) = [row for row in rows if row.startswith(f"| `{name}` |")]
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        signature = recipe.signature
+        assert cells[1] == ", ".join(_shape(q) for q in signature.inputs), name
+        assert cells[2] == ", ".join(_shape(q) for q in signature.outputs), name
+        assert cells[3] == ("yes" if signature.theta else ""), name
+        assert cells[4] == ("yes" if recipe.default else ""), name
+        assert cells[5] == f"`{recipe.against}`", name
+    assert len(rows) == len(RECIPES)
+
+
+def _shape(quantity) -> str:  # type: ignore[no-untyped-def]
+    words = {"nq": "n", "nv": "n"}
+    axes = " x ".join(words.get(axis, axis) for axis in quantity.axes) or "1"
+    return f"{quantity.name} ({axes})"
+
+
+def test_sizes_have_one_meaning_each() -> None:
+    for signature in SIGNATURES.values():
+        for quantity in (*signature.inputs, *signature.stored):
+            assert all(axis in WORDS or axis.isdecimal() for axis in quantity.axes)
+
+
+@pytest.mark.parametrize("name", list(RECIPES))
+def test_every_function_has_a_test_file_or_is_tested_with_all(name: str) -> None:
+    assert name in DEFAULT or (Path(__file__).parent / f"test_{name}.py").is_file()
