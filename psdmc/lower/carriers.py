@@ -68,6 +68,9 @@ decided well where they miss more."""
 EFFECT = 1e-15
 """Share of the longest column, lengths in the chain's unit, that a carrier adds at least where chosen so."""
 
+RANK = 1e-12
+"""Share of the longest column, all brought to the same length, that an independent one has at least; see MISS."""
+
 STATES = 48
 SEED = 20211
 
@@ -202,10 +205,8 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     columns = samples.astype(np.float64)
     scale = np.linalg.norm(columns, axis=0)
     scale[scale < 1e-12 * np.max(scale)] = 1.0
-    triangle = np.linalg.qr(columns / scale, mode="r")  # a small matrix with the same singular values
-    u, sizes, _ = np.linalg.svd(triangle, full_matrices=False)
-    rank = int(np.sum(sizes > 1e-12 * sizes[0]))
-    compact = u[:, :rank].T @ (triangle * scale)
+    compact = _in_their_span(columns / scale) * scale
+    rank = len(compact)
     compact[:, np.linalg.norm(columns, axis=0) < 1e-12 * np.max(scale)] = 0.0
     basis = _lightest(compact, [1.0] * compact.shape[1])
     target = _combined(samples, lift)
@@ -216,6 +217,32 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     if rank >= len(whole) and _is_fair(space, samples, target, units):
         return space
     return _careful_space(samples, target, units[0])
+
+
+def _in_their_span(columns: Array) -> Array:
+    """(rank, k) coordinates of k columns along some orthonormal basis of their span, by Householder's reflections with
+    column pivots; columns of which less than RANK is left beside the others are taken to depend on them.
+
+    Written out: LAPACK shares such small matrices among all cores, which takes longer than one.
+    """
+    rest, order = columns.copy(), np.arange(columns.shape[1])
+    rank, least = 0, 0.0
+    for j in range(min(columns.shape)):
+        squares = np.einsum("ij,ij->j", rest[j:, j:], rest[j:, j:])
+        pivot = j + int(np.argmax(squares))
+        left = math.sqrt(squares[pivot - j])
+        least = least or RANK * left
+        if left <= least:
+            break
+        rest[:, [j, pivot]], order[[j, pivot]] = rest[:, [pivot, j]], order[[pivot, j]]
+        normal = rest[j:, j].copy()
+        normal[0] += math.copysign(left, normal[0])
+        along = np.einsum("i,ij->j", normal, rest[j:, j:]) * (2.0 / np.einsum("i,i", normal, normal))
+        rest[j:, j:] -= normal[:, None] * along
+        rank = j + 1
+    coordinates = np.zeros((rank, len(order)))
+    coordinates[:, order] = np.triu(rest[:rank])
+    return coordinates
 
 
 def _combined(columns: Long, weights: Long) -> Long:

@@ -32,12 +32,13 @@ Outputs = Sequence[tuple[Slot, "Symbol | Number"]]
 class Tracer:
     """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
 
-    __slots__ = ("constants", "known", "steps")
+    __slots__ = ("_places", "constants", "known", "steps")
 
     def __init__(self) -> None:
         self.steps: list[Step] = []
         self.known: dict[Step, int] = {}
         self.constants: dict[int, float] = {}
+        self._places: dict[float, int] = {}
 
     def symbols(self, vector: str, count: int) -> list[Symbol]:
         """Inputs vector[0] ... vector[count - 1]."""
@@ -58,11 +59,14 @@ class Tracer:
     def constant(self, value: float) -> Symbol:
         """A constant; its sign is kept beside it."""
         number = float(value)  # of NumPy's too: signs are told apart by identity, which its booleans lack
-        return Symbol(self, self._constant(abs(number)), number < 0)
+        return Symbol(self, self.magnitude(abs(number)), number < 0)
 
-    def _constant(self, value: float) -> int:
-        index = self.record((_CONST, value, None))
-        self.constants[index] = value
+    def magnitude(self, value: float) -> int:
+        """The index of a constant."""
+        index = self._places.get(value)
+        if index is None:
+            index = self._places[value] = self.record((_CONST, value, None))
+            self.constants[index] = value
         return index
 
     def finish(self, outputs: Outputs) -> Program:
@@ -102,7 +106,7 @@ class Tracer:
         stored: list[tuple[Slot, int]] = []
         for slot, value in outputs:
             if not isinstance(value, Symbol):
-                index = self._constant(float(value) + 0.0)
+                index = self.magnitude(float(value) + 0.0)
             elif value.negative:
                 index = self.record((_NEG, value.index, None))
             else:
@@ -209,19 +213,20 @@ def _sum(tracer: Tracer, a: int, a_negative: bool, b: int, b_negative: bool) -> 
 
 def _scaled(a: Symbol, factor: Number) -> Symbol | float:
     """A constant times a value; constants along a product become one."""
-    own = a.constant_value()
+    tracer, index, constants = a.tracer, a.index, a.tracer.constants
+    own = constants.get(index)
     if own is not None:
-        return own * factor
-    tracer = a.tracer
-    op, left, right = tracer.steps[a.index]
+        return (-own if a.negative else own) * factor
+    op, left, right = tracer.steps[index]
     if op is _MUL:
         for this, rest in ((left, right), (right, left)):
-            inner = tracer.constants.get(this)
+            inner = constants.get(this)
             if inner is not None:
                 return Symbol(tracer, rest, a.negative) * (inner * factor)
-    constant = tracer.constant(factor)
-    low, high = (a.index, constant.index) if a.index < constant.index else (constant.index, a.index)
-    return Symbol(tracer, tracer.record((_MUL, low, high)), a.negative is not constant.negative)
+    number = float(factor)  # of NumPy's too, as in `constant`
+    constant = tracer.magnitude(abs(number))
+    step = (_MUL, index, constant) if index < constant else (_MUL, constant, index)
+    return Symbol(tracer, tracer.record(step), a.negative is not (number < 0))
 
 
 def _quotient(a: Symbol, b: Symbol) -> Symbol:

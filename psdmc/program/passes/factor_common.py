@@ -48,9 +48,10 @@ def factor_common(program: Program) -> Program:
     for i, instr in enumerate(program.body):
         grouped = None
         if instr.op in _SIGNED_SUM and not inside[i]:
-            terms = tuple(_terms(program.body, uses, i, 1))
-            grouped = _grouped(terms)
-            grouped = None if len(grouped) == len(terms) else grouped
+            signed = _signed_factors(program.body, uses, i)
+            if _shares_a_factor(signed):
+                grouped = _grouped(tuple(_Term(sign, tuple(factors)) for sign, factors in signed))
+                grouped = None if len(grouped) == len(signed) else grouped
         builder.new_index.append(
             builder.append(instr.renumbered(builder.new_index)) if grouped is None else builder.total(grouped)
         )
@@ -67,22 +68,35 @@ def _parts_of_larger_sums(program: Program, uses: list[int]) -> list[bool]:
     return inside
 
 
-def _terms(body: tuple[Instr, ...], uses: list[int], index: int, sign: int) -> list[_Term]:
-    """Terms of a chain of sums, left to right (a stack, since chains can be thousands long)."""
-    terms: list[_Term] = []
-    stack = [(index, sign)]
+def _signed_factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[tuple[int, list[int]]]:
+    """Sign and factors of the terms of a chain of sums, left to right (a stack, since chains can be thousands long)."""
+    terms: list[tuple[int, list[int]]] = []
+    stack = [(index, 1)]
     while stack:
         i, own = stack.pop()
-        instr = body[i]
-        if instr.op in _SIGNED_SUM and (i == index or uses[i] == 1):
-            pairs = zip(instr.args, _SIGNED_SUM[instr.op], strict=True)
-            stack.extend([(a, own * s) for a, s in pairs][::-1])
+        op, args, _, _ = body[i]
+        if op in _SIGNED_SUM and (i == index or uses[i] == 1):
+            stack.append((args[1], own if op is Op.ADD else -own))
+            stack.append((args[0], own))
         else:
-            terms.append(_Term(own, tuple(_factors(body, uses, i))))
+            terms.append((own, _factors(body, uses, i)))
     return terms
 
 
+def _shares_a_factor(terms: list[tuple[int, list[int]]]) -> bool:
+    """Whether two of the terms are products with a common factor: in most sums there are none."""
+    seen: set[int] = set()
+    for _, factors in terms:
+        if len(factors) > 1:
+            if not seen.isdisjoint(factors):
+                return True
+            seen.update(factors)
+    return False
+
+
 def _factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[int]:
+    if body[index].op is not Op.MUL or uses[index] != 1:
+        return [index]
     factors: list[int] = []
     stack = [index]
     while stack:
