@@ -8,7 +8,7 @@ from typing import Literal
 from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, RECIPES
-from psdmc.lower.expanded import lower_expanded
+from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.factored import Arrangement, trace_geometry
 from psdmc.lower.search import BATCH, SINGLE, Search, Spaces, Target
 from psdmc.model.dynamics_model import DynamicsModel

@@ -17,7 +17,7 @@ from random_chains import Oracle, random_chain, relative_error, states
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
-from psdmc.lower.expanded import lower_expanded
+from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.lower.expanded_constants import Constants
-from psdmc.lower.expanded_diagram import Diagram, nested_horner, operations, with_constants
-from psdmc.lower.expanded_orders import base_first, candidates, tip_first
-from psdmc.lower.expanded_terms import Terms
-from psdmc.lower.expanded_values import polynomial_values
+from psdmc.lower.expanded.constants import Constants
+from psdmc.lower.expanded.diagram import Diagram, nested_horner, operations, with_constants
+from psdmc.lower.expanded.orders import base_first, candidates, tip_first
+from psdmc.lower.expanded.terms import Terms
+from psdmc.lower.expanded.values import polynomial_values
 from psdmc.program.cost import cost
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Slot

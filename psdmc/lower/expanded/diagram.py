@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.lower.expanded_constants import Constants
-from psdmc.lower.expanded_terms import Terms
+from psdmc.lower.expanded.constants import Constants
+from psdmc.lower.expanded.terms import Terms
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.scalar import Scalar
-from psdmc.lower.expanded_diagram import NOTHING, ONE, Diagram, Level
+from psdmc.lower.expanded.diagram import NOTHING, ONE, Diagram, Level
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.trace import Tracer
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, solve
-from psdmc.lower.expanded_diagram import Diagram, nested_horner, operations, with_constants
-from psdmc.lower.expanded_orders import Joints, base_first, candidates, tip_first
-from psdmc.lower.expanded_terms import (
+from psdmc.lower.expanded.diagram import Diagram, nested_horner, operations, with_constants
+from psdmc.lower.expanded.orders import Joints, base_first, candidates, tip_first
+from psdmc.lower.expanded.terms import (
     Terms,
     baked_torque_terms,
     gravity_terms,
@@ -22,7 +22,7 @@ from psdmc.lower.expanded_terms import (
     torque_terms,
     with_gravity,
 )
-from psdmc.lower.expanded_values import polynomial_values, row_symbols
+from psdmc.lower.expanded.values import polynomial_values, row_symbols
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.pipeline import optimize
