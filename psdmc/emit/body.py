@@ -145,6 +145,7 @@ class _Writer:
         for slot, index in program.outputs:
             self.stores.setdefault(index, []).append(slot)
         self.done = [False] * len(program)
+        self.taken = {(op, args) for op, args, _, _ in program.body if op in (Op.SIN, Op.COS)}
 
     def sections(self, sizes: dict[str, int]) -> tuple[Section, ...]:
         sections: list[Section] = []
@@ -217,9 +218,8 @@ class _Writer:
         return GroupStore(first.vector, first.index, texts)
 
     def _angle(self, a: int) -> Angle:
-        taken = {(instr.op, *instr.args) for instr in self.program}
-        sine = f"sin_{a}" if (Op.SIN, a) in taken else None
-        cosine = f"cos_{a}" if (Op.COS, a) in taken else None
+        sine = f"sin_{a}" if (Op.SIN, (a,)) in self.taken else None
+        cosine = f"cos_{a}" if (Op.COS, (a,)) in self.taken else None
         return Angle(spread(self._value(a).text, self.names.uniform[a]), sine, cosine)
 
     def _value(self, i: int) -> Expr:

@@ -88,10 +88,10 @@ def literal(value: float, suffix: str) -> Expr:
 
 def combine(op: Op, operands: list[Expr]) -> Expr:
     """One operation on texts, brackets only where they change the meaning."""
-    depth = 1 + max(operand.depth for operand in operands)
     if op is Op.NEG:
-        return Expr(f"-{operands[0].beside(_UNARY, is_right=True)}", _UNARY, depth)
+        return Expr(f"-{operands[0].beside(_UNARY, is_right=True)}", _UNARY, 1 + operands[0].depth)
     symbol, binding = _SYMBOL[op]
     left, right = operands
+    depth = 1 + max(left.depth, right.depth)
     text = f"{left.beside(binding, is_right=False)} {symbol} {right.beside(binding, is_right=True)}"
     return Expr(text, binding, depth)
