@@ -23,7 +23,7 @@ from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, joint_frame_map
 from psdmc.functions import RECIPES
-from psdmc.lower import expanded
+from psdmc.lower.expanded import lowering as expanded
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.reframe import reframe
 from psdmc.lower.search import SINGLE, Search, all_feet

@@ -1,0 +1,95 @@
+"""How long the compiler itself takes: prints the table of docs/pipeline.md. Run: python docs/compile_time.py [ROBOT ...]
+
+User CPU time on one core, the least of several runs, each with a compile cache of its own; of whole processes, imports
+included, but for the rows that name a call. The C compiler's own time is not in it.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROBOTS = Path(__file__).resolve().parents[1] / "examples" / "robots"
+DEFAULT = ("kr6", "lbr7")
+RUNS = 3
+FUNCTIONS = "inverse_dynamics"
+"""What `compile` is timed with where the C compiler runs too: all that is timed there is the second call."""
+
+LOWER = """
+from psdmc.lower.kernels import lower
+begin = user()
+lower(model)
+print(user() - begin)
+"""
+SECOND = f"""
+begin = user()
+compile(model, functions=["{FUNCTIONS}"])
+print(user() - begin, user())
+"""
+PRELUDE = """
+import resource, sys, psdmc
+def user(): return resource.getrusage(resource.RUSAGE_SELF).ru_utime
+model, compile = psdmc.load(sys.argv[1]), psdmc.compile
+"""
+
+
+def main(robots: tuple[str, ...]) -> None:
+    columns = {robot: measured(ROBOTS / f"{robot}.toml") for robot in robots}
+    print("| user CPU, s |", " | ".join(columns), "|")
+    print("|---|" + "---|" * len(columns))
+    for row in next(iter(columns.values())):
+        print(f"| {row} |", " | ".join(f"{times[row]:.2f}" for times in columns.values()), "|")
+
+
+def measured(robot: Path) -> dict[str, float]:
+    """Seconds by what was done, the least of RUNS."""
+    runs = []
+    for _ in range(RUNS):
+        with tempfile.TemporaryDirectory() as folder:
+            runs.append(one_run(robot, Path(folder)))
+    return {row: min(run[row] for run in runs) for row in runs[0]}
+
+
+def one_run(robot: Path, folder: Path) -> dict[str, float]:
+    model = folder / "model.npz"
+    command = (sys.executable, "-m", "psdmc")
+    times = {"`psdmc --version`": process(folder, *command, "--version")}
+    times["`psdmc derive`"] = process(folder, *command, "derive", str(robot), "-o", str(model))
+    times["`lower`, every function: the call"] = python(folder, model, LOWER)[0]
+    emit = (*command, "emit-c", str(model), "-o")
+    times["`psdmc emit-c`, empty cache"] = process(folder, *emit, "first")
+    times["`psdmc emit-c`, again"] = process(folder, *emit, "second")
+    python(folder, model, SECOND)
+    call, whole = python(folder, model, SECOND)
+    times["`psdmc.compile`, again: the call"] = call
+    times["`psdmc.compile`, again: the process"] = whole
+    return times
+
+
+def process(folder: Path, *words: str) -> float:
+    """User CPU time of a command."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    subprocess.run(words, cwd=folder, env=surroundings(folder), check=True, stdout=subprocess.DEVNULL)
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def python(folder: Path, model: Path, code: str) -> list[float]:
+    """What a piece of code prints of its own time."""
+    words = [sys.executable, "-c", PRELUDE + code, str(model)]
+    done = subprocess.run(
+        words, cwd=folder, env=surroundings(folder), check=True, stdout=subprocess.PIPE, text=True
+    )
+    return [float(word) for word in done.stdout.split()]
+
+
+def surroundings(folder: Path) -> dict[str, str]:
+    one_core = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return os.environ | one_core | {"PSDMC_CACHE_DIR": str(folder / "cache")}
+
+
+if __name__ == "__main__":
+    main(tuple(sys.argv[1:]) or DEFAULT)
