@@ -31,10 +31,11 @@ KINDS = ("RRRRRRRR", "RPRRPRPR", "PRPPRRRP", "RHRPHRRH")
 class RandomTree:
     """Frames and bodies by psdmc, and Pinocchio's model of the same numbers.
 
-    parallel   axes are parallel to their parents' where a fair coin says so, so that compound turns have something to do
+    parallel   how probable it is that an axis is parallel to its parent's, so that compound turns have something to do;
+               where it is not zero, other placements have right angles
     """
 
-    def __init__(self, seed: int, parents: tuple[int, ...], kinds: str, parallel: bool = False) -> None:
+    def __init__(self, seed: int, parents: tuple[int, ...], kinds: str, parallel: float = 0.0) -> None:
         rng = np.random.default_rng(seed)
         self.parents, self.n = parents, len(parents)
         self.types = [TYPES[kind] for kind in kinds[: self.n]]
@@ -46,8 +47,8 @@ class RandomTree:
         self.data = self.model.createData()
 
     @staticmethod
-    def _place(rng: np.random.Generator, parallel: bool) -> Placement:
-        if parallel and rng.random() < 0.6:
+    def _place(rng: np.random.Generator, parallel: float) -> Placement:
+        if rng.random() < parallel:
             return Placement(np.eye(3), rng.uniform(-0.5, 0.5, 3))
         return _tidy(rng) if parallel else Placement(_rotation(rng), rng.uniform(-0.5, 0.5, 3))
 

@@ -28,6 +28,9 @@ CHECK_FAILED_STATUS = 5
 LARGEST_EXPANDED = 2000
 """`show --cost` prints the expanded lowering too up to this many functions; beyond, it takes minutes."""
 
+ROBOT_SUFFIXES = (".urdf", ".xml", ".toml")
+"""Of files that `show` reads as a robot; all others are models."""
+
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="URDF, or DH table (.toml)")]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="model file made by psdmc derive (.npz)")]
 
@@ -113,14 +116,24 @@ def _drive_inertia(text: str | None) -> bool | tuple[float, ...]:
 
 @app.command()
 def show(
-    model: ModelFile,
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="model file (.npz), or a robot file (.urdf, .toml)")
+    ],
     terms: Annotated[bool, typer.Option("--terms", help="list the functions y")] = False,
     cost: Annotated[bool, typer.Option("--cost", help="operations per function and lowering")] = False,
 ) -> None:
-    """Print a model: joints, sizes, base parameters with equations, values and units, certificate."""
-    from psdmc.cli.show import print_cost, print_model, print_terms
+    """Print a model: joints, sizes, base parameters with equations, values and units, certificate. Of a robot file: all of
+    its joints, what each hangs on and follows."""
+    from psdmc.cli.show import print_cost, print_mechanism, print_model, print_terms
     from psdmc.model.load import load
 
+    if model.suffix.lower() in ROBOT_SUFFIXES:
+        from psdmc.robot.urdf_whole import whole_robot
+
+        if terms or cost:
+            raise InputError(f"{model}: --terms and --cost are of models", "derive one first: psdmc derive")
+        print_mechanism(whole_robot(model))
+        return
     found = load(model)
     if terms:
         print_terms(found)

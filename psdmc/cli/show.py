@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +13,16 @@ from rich.table import Table
 
 from psdmc.cli.one_line import one_line
 from psdmc.cli.show_calibration import print_calibration, standard_deviations
+from psdmc.errors import InputError
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import MassCheck
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
-from psdmc.robot.chain import Joint
+from psdmc.robot.chain import BASE, Chain, Joint
+from psdmc.robot.coordinates import leaders
+from psdmc.robot.derivable import require_derivable
 
 if TYPE_CHECKING:
     from psdmc.calibration.verdict.record import Calibration
@@ -178,3 +182,51 @@ def print_accuracy(record: Calibration) -> None:
         both = [step.joints.get(joint) for step in record.steps]
         table.add_row(escape(joint), *("" if b is None else f"{b.held_out.r2:.4f}" for b in both))
     console().print(table)
+
+
+def print_mechanism(found: Chain) -> None:
+    """What a robot file holds: its bodies, what each hangs on and follows, and whether psdmc derives it."""
+    out = console()
+    count, own = len(found), len(leaders(found.coordinates))
+    shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
+    name, base = escape(found.name), escape(found.base_name)
+    out.print(f"[bold]{name}[/bold]  {shape} of {count} joints with {own} coordinates, from {base}")
+    out.print(_bodies(found))
+    for note in found.notes:
+        out.print(f"note: {escape(note)}")
+    try:
+        require_derivable(found)
+    except InputError as refused:
+        out.print(f"not derived as a whole: {escape(str(refused))}")
+        out.print(f"hint: {escape(str(refused.hint))}")
+    for leaf in found.leaves if len(found.leaves) > 1 else ():
+        moving = len(found.path_to(leaf))
+        out.print(f"--tip {escape(shlex.quote(found.joints[leaf].link_name))}: {moving} joints")
+
+
+def _bodies(found: Chain) -> Table:
+    table = Table("joint", "link", "hangs on", "type", "q", "position", "mass")
+    for i, (joint, parent) in enumerate(zip(found.joints, found.parents, strict=True)):
+        unit, limits = joint.type.position_unit, joint.limits
+        table.add_row(
+            escape(joint.name),
+            escape(joint.link_name),
+            escape(found.base_name if parent == BASE else found.joints[parent].link_name),
+            joint.type.word,
+            escape(_followed(found, i)),
+            _range(limits.lower, limits.upper, unit),
+            f"{found.parameters[i, 0]:.6g} kg",
+        )
+    return table
+
+
+def _followed(found: Chain, i: int) -> str:
+    coordinate = found.coordinates[i]
+    if coordinate.leader is None:
+        return f"{coordinate.offset:g}"
+    if coordinate.leader == i:
+        return "its own"
+    offset = (
+        f" {'-' if coordinate.offset < 0 else '+'} {abs(coordinate.offset):g}" if coordinate.offset else ""
+    )
+    return f"{coordinate.ratio:g} q of {found.joints[coordinate.leader].name}{offset}"

@@ -63,7 +63,7 @@ def load_robot(
     """
     file = Path(path)
     return load_robot_text(
-        _text_of(file),
+        robot_text(file),
         "dh" if file.suffix.lower() == ".toml" else "urdf",
         source_name=file.name,
         base=base,
@@ -105,7 +105,8 @@ def _refuse_size(size: int, source: str) -> None:
         )
 
 
-def _text_of(file: Path) -> str:
+def robot_text(file: Path) -> str:
+    """The file's text; InputError where it cannot be read or is no text of a robot's size."""
     try:
         with file.open("rb") as opened:
             data = opened.read(limits.MAX_BYTES + 1)

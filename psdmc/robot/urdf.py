@@ -58,9 +58,18 @@ class UrdfInertial:
 
 
 @dataclass(frozen=True, slots=True)
+class Mimic:
+    """q = multiplier * q of the joint of that name + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """One <joint>. origin places the child link in the parent at q = 0; axis in the child; has_dynamics: it writes
-    of friction, damping or a spring."""
+    """One <joint>. origin places the child link in the parent at q = 0; axis in the child; mimic: the joint that it
+    follows, if any; has_dynamics: it writes of friction, damping or a spring."""
 
     name: str
     type: str
@@ -69,8 +78,12 @@ class UrdfJoint:
     origin: Origin
     axis: Triple
     limits: Limits
-    is_mimic: bool
+    mimic: Mimic | None
     has_dynamics: bool
+
+    @property
+    def is_mimic(self) -> bool:
+        return self.mimic is not None
 
     @property
     def is_movable(self) -> bool:
@@ -200,7 +213,7 @@ def _joint(element: Element) -> UrdfJoint:
         origin=_origin(element),
         axis=_axis(element, kind),
         limits=_limits(element, kind),
-        is_mimic=only(element, "mimic") is not None,
+        mimic=_mimic(element),
         has_dynamics=has_dynamics(element),
     )
 
@@ -246,6 +259,14 @@ def _link_of(joint: Element, tag: str) -> str:
     if element is None or element.get("link") is None:
         raise ValueError(f"<{tag} link=...> is missing")
     return element.get("link", "")
+
+
+def _mimic(joint: Element) -> Mimic | None:
+    element = only(joint, "mimic")
+    if element is None:
+        return None
+    factor = number(element, "multiplier", 1.0, limits.ANY)
+    return Mimic(element.get("joint", ""), factor, number(element, "offset", 0.0, limits.ANY))
 
 
 def _limits(joint: Element, kind: str) -> Limits:

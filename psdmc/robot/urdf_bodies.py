@@ -15,7 +15,7 @@ from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.small import times
 from psdmc.robot.snap import snap_rotation
 from psdmc.robot.tree import Route
-from psdmc.robot.urdf import LOCKABLE, Origin, UrdfInertial, UrdfRobot
+from psdmc.robot.urdf import LOCKABLE, Origin, UrdfInertial, UrdfJoint, UrdfRobot
 
 AGREEMENT = 1e-11
 """Relative to the largest parameter of the body's mass, moments or inertias: rounding of angles up to 1e3 rad leaves
@@ -34,12 +34,17 @@ def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
 
     Joints beside the chain and beyond the tip are locked at neutral.
     """
+    return merged_onto(robot, route.movable)
+
+
+def merged_onto(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[Array]:
+    """The same for any movable joints; all others are locked at neutral."""
     below: dict[str, list[tuple[str, Placement]]] = {}
-    on_chain = {joint.name for joint in route.movable}
+    moves = {joint.name for joint in movable}
     for joint in robot.joints:
-        if joint.name not in on_chain:
+        if joint.name not in moves:
             below.setdefault(joint.parent, []).append((joint.child, placement_of(joint.origin)))
-    return [without_noise(_with_all_below(robot, joint.child, below)) for joint in route.movable]
+    return [without_noise(_with_all_below(robot, joint.child, below)) for joint in movable]
 
 
 def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:

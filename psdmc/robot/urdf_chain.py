@@ -84,14 +84,15 @@ def _placed_joints(route: Route, snap: float) -> tuple[tuple[Joint, ...], Placem
         _record(snaps, f"axis of joint '{joint.name}'", angle, len(joints))
         link = Placement(link_rotation(axis), np.zeros(3))
         where = f"joint '{joint.name}', merged"
-        placement = _merged(so_far @ link.inverse(), where, snap, snaps, len(joints), reach)
-        joints.append(_joint(joint, placement, link))
+        placement = merged_placement(so_far @ link.inverse(), where, snap, snaps, len(joints), reach)
+        joints.append(movable_joint(joint, placement, link))
         so_far = link
-    tip = _merged(so_far, f"tip '{route.tip}', merged", snap, snaps, len(joints), reach)
+    tip = merged_placement(so_far, f"tip '{route.tip}', merged", snap, snaps, len(joints), reach)
     return tuple(joints), tip, snaps
 
 
-def _joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:
+def movable_joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:
+    """The joint with its child link, whose frame sits at `link` in the joint frame."""
     return Joint(joint.name, joint.child, URDF_TYPES[joint.type], placement, link, joint.limits)
 
 
@@ -113,9 +114,10 @@ def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap], segment: int) -> P
     return place
 
 
-def _merged(
+def merged_placement(
     place: Placement, where: str, snap: float, snaps: list[Snap], segment: int, reach: float
 ) -> Placement:
+    """What several merged placements came to, snapped; what was turned goes to `snaps`."""
     rotation, angle = snap_rotation(place.rotation, snap)
     _record(snaps, where, angle, segment)
     return Placement(rotation, snap_translation(place.translation, reach))

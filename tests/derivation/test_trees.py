@@ -11,15 +11,20 @@ from psdmc.derivation import derive
 from psdmc.derivation.link_by_link import reduction_link_by_link
 from psdmc.derivation.sampled import sampled_reduction
 from psdmc.derivation.units import scaled
+from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import jacobian
+from psdmc.dynamics.newton_euler import inverse_dynamics
+from psdmc.dynamics.parameters import moved
 from psdmc.errors import InputError
 from psdmc.lower import kernels
 from psdmc.lower.kernels import lower
+from psdmc.lower.reframe import reframe
 from psdmc.model import chain_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import file_bytes
 from psdmc.program.interpret import interpret
+from psdmc.robot.chain import Placement
 
 SMALL = [("a fork", "RRR"), ("a fork", "PRP"), ("two on the base", "RPR"), ("two on the base", "RRR")]
 LARGER = [("a trunk with two arms", "RRRPRR"), ("interleaved", "RPRRPRPR")]
@@ -71,8 +76,8 @@ def test_base_parameters_of_trees_are_as_many_as_pinocchios_rank(name: str, kind
 @pytest.mark.usefixtures("lets_trees_pass")
 @pytest.mark.parametrize("kinds", ["RRRR", "RPRR", "PRPP"])
 @pytest.mark.parametrize("parents", [(-1, 0, 1, 0), (-1, -1, 0, 1)])
-@pytest.mark.parametrize("parallel", [False, True])
-def test_link_by_link_finds_the_same_base_parameters(parents, kinds: str, parallel: bool) -> None:
+@pytest.mark.parametrize("parallel", [0.0, 0.6])
+def test_link_by_link_finds_the_same_base_parameters(parents, kinds: str, parallel: float) -> None:
     robot = scaled(RandomTree(13, parents, kinds, parallel).mechanism())
     one, other = reduction_link_by_link(robot), sampled_reduction(robot)
     assert len(one.pivots) == len(other.pivots)
@@ -86,13 +91,13 @@ def test_link_by_link_finds_the_same_base_parameters(parents, kinds: str, parall
 @pytest.mark.parametrize(
     ("name", "kinds", "parallel"),
     [
-        ("a fork", "RRR", True),
-        ("a fork", "PRP", False),
-        ("two on the base", "RPR", True),
-        ("a wrist with two fingers", "RRPR", True),
+        ("a fork", "RRR", 0.6),
+        ("a fork", "PRP", 0.0),
+        ("two on the base", "RPR", 0.6),
+        ("a wrist with two fingers", "RRPR", 1.0),
     ],
 )
-def test_lowered_trees_are_pinocchios(name: str, kinds: str, parallel: bool) -> None:
+def test_lowered_trees_are_pinocchios(name: str, kinds: str, parallel: float) -> None:
     """Re-framed, searched, traced, optimised: every choice of the search on a tree."""
     tree = RandomTree(14, TREES[name], kinds, parallel)
     model = derived(tree, expand=False)
@@ -133,6 +138,29 @@ def test_lowered_trees_are_pinocchios(name: str, kinds: str, parallel: bool) -> 
     expected = jacobian(frames_of(chain), chain.tip_body, chain.tip, list(q.T))
     expected = np.stack([np.broadcast_to(entry, (20,)) for row in expected for entry in row], axis=-1)
     np.testing.assert_allclose(run("jacobian", "J", 6 * n), expected, atol=1e-12)
+
+
+def test_a_second_child_may_lie_along_its_parents_x() -> None:
+    """Re-framing turns a body's x along the normal to its first child's axis: here the second child's axis."""
+    tree = RandomTree(17, TREES["a fork"], "RRR")
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    about_y = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    tree.places = [Placement.identity(), Placement(about_x, np.zeros(3)), Placement(about_y, np.zeros(3))]
+    tree.model, tree.joints = tree._pinocchio()
+    tree.data = tree.model.createData()
+    chain = tree.mechanism()
+    for foot in ("previous", "next"):
+        reframed = reframe(chain, (foot,) * 3)
+        axes = [np.array(frame.rotation) for frame in reframed.frames]
+        assert all(np.allclose(axis @ axis.T, np.eye(3)) for axis in axes)
+        states = [list(v.T) for v in tree.states(20, 3)]
+        bodies = [
+            body_from_parameters(moved(row[:10], place).tolist())
+            for row, place in zip(chain.parameters, reframed.link_frames, strict=True)
+        ]
+        tau = inverse_dynamics(reframed.frames, bodies, tree.drives, *states, reframed.base)
+        expected = tree.each(pin.rnea, *tree.states(20, 3))
+        np.testing.assert_allclose(np.stack(tau, axis=1), expected, atol=1e-11)
 
 
 @pytest.mark.parametrize("name", TREES)

@@ -29,7 +29,7 @@ trees = pytest.mark.parametrize(
         (parents, kinds, parallel)
         for parents in TREES.values()
         for kinds in KINDS
-        for parallel in (False, True)
+        for parallel in (0.0, 0.6, 1.0)
     ],
 )
 

@@ -1,0 +1,63 @@
+"""`psdmc show` of a robot file: the whole tree, what is derived of it, and which chains there are."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from bundled import robot_path
+
+HAND = """<robot name="hand">
+<link name="base"/><link name="palm"><inertial><mass value="0.5"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="left finger"/><link name="right"/>
+<joint name="wrist" type="continuous"><parent link="base"/><child link="palm"/></joint>
+<joint name="a" type="prismatic"><parent link="palm"/><child link="left finger"/><limit lower="0" upper="0.04"/></joint>
+<joint name="b" type="prismatic"><parent link="palm"/><child link="right"/><mimic joint="a" multiplier="-1" offset="0.01"/>
+</joint>
+</robot>"""
+
+
+def psdmc(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "psdmc", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+@pytest.fixture
+def hand(tmp_path: Path) -> Path:
+    path = tmp_path / "hand.urdf"
+    path.write_text(HAND, encoding="utf-8")
+    return path
+
+
+def test_a_tree_is_shown_whole_with_the_chains_to_choose(hand: Path) -> None:
+    run = psdmc("show", hand)
+    assert run.returncode == 0, run.stderr
+    assert "a tree with 2 ends of 3 joints with 2 coordinates, from base" in run.stdout
+    rows = [line.split() for line in run.stdout.splitlines()]
+    assert any("b" in row and "-1" in row and "a" in row and "0.01" in row for row in rows)
+    assert "not derived as a whole: 'hand': link 'palm' carries joints 'a' and 'b'" in run.stdout
+    assert "hint: choose a chain in it with --base and --tip" in run.stdout
+    assert "--tip 'left finger': 2 joints" in run.stdout
+
+
+def test_the_chain_that_it_names_is_derived(hand: Path, tmp_path: Path) -> None:
+    run = psdmc("derive", hand, "--tip", "left finger", "-o", tmp_path / "hand.npz")
+    assert run.returncode == 0, run.stderr
+    assert psdmc("show", tmp_path / "hand.npz").returncode == 0
+
+
+def test_a_chain_is_shown_as_one() -> None:
+    run = psdmc("show", robot_path("scara"))
+    assert run.returncode == 0, run.stderr
+    assert "a serial chain of 4 joints with 4 coordinates" in run.stdout
+    assert "not derived" not in run.stdout
+
+
+def test_what_needs_a_model_is_refused_of_a_robot(hand: Path) -> None:
+    run = psdmc("show", hand, "--cost")
+    assert run.returncode == 2
+    assert "derive one first" in run.stderr
+    assert "Traceback" not in run.stderr
