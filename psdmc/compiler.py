@@ -41,6 +41,8 @@ def derive(
     snap: float = DEFAULT_SNAP,
     expand: bool = True,
     progress: Progress = silent,
+    frames: Sequence[str] = (),
+    tool: Sequence[float] | None = None,
 ) -> DynamicsModel:
     """A robot file (URDF, or DH table in TOML) to its model (E, P, theta_b), certified.
 
@@ -50,6 +52,8 @@ def derive(
     assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com"
     snap           rad; constant rotations this near to one with exact zeros become it; 0 turns it off
     expand         False leaves E and P out, for chains whose functions would not fit
+    frames         links that functions of frames are about, in this order; none: the tip
+    tool           x y z (m), roll pitch yaw (rad) of one more frame, 'tool', in the tip's
     Raises InputError for a wrong file or option, DerivationError where the model does not fit.
     """
     from psdmc.derivation.derive import (
@@ -66,6 +70,8 @@ def derive(
         drive_inertia=drive_inertia,
         assume_zero=assume_zero,
         snap=snap,
+        frames=frames,
+        tool=tool,
     )
     return derive_model(loaded.chain, expand=expand, progress=progress, provenance=provenance(loaded))
 

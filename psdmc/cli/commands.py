@@ -76,6 +76,16 @@ def derive(
     expand: Annotated[
         bool, typer.Option("--expand/--no-expand", help="derive E and P beside theta_b")
     ] = True,
+    frames: Annotated[
+        str,
+        typer.Option(metavar="LINK,...", help="links that kinematic functions are about; default: the tip"),
+    ] = "",
+    tool: Annotated[
+        tuple[float, float, float, float, float, float] | None,
+        typer.Option(
+            metavar="X Y Z R P Y", help="one more such frame, 'tool', in the tip's: m, rad as in URDF"
+        ),
+    ] = None,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
@@ -93,6 +103,8 @@ def derive(
             snap,
             expand,
             progress,
+            tuple(name.strip() for name in frames.split(",") if name.strip()),
+            tool,
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"

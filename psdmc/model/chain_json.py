@@ -6,17 +6,19 @@ JSON has no NaN and no infinity: an unknown parameter and an absent limit are nu
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from psdmc.model.json_values import entries, number, numbers, part, text, whole
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Limits, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Limits, NamedFrame, Placement
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.joints import joint_type
 
 MOST_JOINTS = 256
 """Joints of a model file: its span alone takes 0.5 kB times the square of that, 64 MB."""
+MOST_FRAMES = 1000
 MOST_NOTES = 100_000
 ORTHONORMAL = 1e-6
 """Largest entry of R R^T - 1 of a rotation: rounding leaves 1e-15, and files' own matrices are made exact."""
@@ -46,7 +48,31 @@ def chain_to_json(chain: Chain) -> dict[str, Any]:
             "values": values.tolist(),
         },
         "notes": list(chain.notes),
-    }
+    } | ({} if _is_tip_alone(chain) else {"frames": [_frame_to_json(frame) for frame in chain.frames]})
+
+
+def _frames(data: object) -> Sequence[object]:
+    """None in files of models without."""
+    return (
+        entries(data["frames"], "the chain's frames", MOST_FRAMES)
+        if isinstance(data, dict) and "frames" in data
+        else ()
+    )
+
+
+def _is_tip_alone(chain: Chain) -> bool:
+    """Whether the frames are those of every model file before there were any."""
+    return [frame.name for frame in chain.frames] == [chain.tip_name]
+
+
+def _frame_to_json(frame: NamedFrame) -> dict[str, Any]:
+    return {"name": frame.name, "joint": frame.joint, "placement": _placement_to_json(frame.placement)}
+
+
+def _frame_from_json(data: object, joints: int) -> NamedFrame:
+    name = text(part(data, "name", "a frame"), "a frame's name")
+    joint = whole(part(data, "joint", "a frame"), "a frame's joint", 0, joints - 1)
+    return NamedFrame(name, joint, _placement_from_json(part(data, "placement", "a frame"), "a frame"))
 
 
 def chain_from_json(data: object) -> Chain:
@@ -70,6 +96,7 @@ def chain_from_json(data: object) -> Chain:
         notes=tuple(
             text(note, "a note") for note in entries(part(data, "notes", "the chain"), "notes", MOST_NOTES)
         ),
+        frames=tuple(_frame_from_json(frame, len(listed)) for frame in _frames(data)),
     )
 
 

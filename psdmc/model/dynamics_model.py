@@ -197,21 +197,23 @@ class DynamicsModel:
         inertia: ArrayLike | None = None,
         frame: Placement | str | None = None,
     ) -> DynamicsModel:
-        """The model with a rigid load fixed to the link that carries its tip.
+        """The model with a rigid load fixed to the link that carries its tip, or another named frame.
 
         mass      kg
         com       (3,) m, centre of mass in `frame`
         inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
-        frame     where the load's numbers are given: a Placement in the tip frame, or the tip's name; None: the tip
+        frame     where the load's numbers are given: the name of the tip or of another of the model's frames, or a
+                  Placement in the tip frame; None: the tip
 
         InputError where the numbers are no rigid body's, beyond the ranges of robot files, or the model's assumptions
         do not admit the load.
         """
         load = payload.load_parameters(self.chain, mass, com, inertia, frame)
-        chain = payload.loaded(self.chain, load, float(mass))
+        body = payload.carrying_frame(self.chain, frame).joint
+        chain = payload.loaded(self.chain, load, float(mass), body)
         if self.theta_b is None:
             raise InputError(
                 f"the base parameters of '{self.chain.name}' are unknown", "calibrate before adding a load"
             )
-        index = payload.tip_link(self.chain)
+        index = payload.body_parameters(body)
         return replace(self, theta_b=self.theta_b + self.B[:, index] @ load, chain=chain)

@@ -138,6 +138,10 @@ def _check_options(options: dict[str, Any], n: int) -> None:
     for statement in json.entries(options.get("assume_zero", []), "the option assume_zero", MOST_ROWS):
         json.text(statement, "an entry of the option assume_zero")
     json.number(options.get("snap", 0.0), "the option snap")
+    for name in json.entries(options.get("frames", []), "the option frames", MOST_ROWS):
+        json.text(name, "the option frames")
+    if options.get("tool") is not None:
+        json.numbers(options["tool"], "the option tool", 6)
 
 
 def _check_calibration(calibration: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""A rigid load on the tip, as standard parameters of the last link: theta_b = B x then follows, E, P and B stay."""
+"""A rigid load on a frame, as standard parameters of its link: theta_b = B x then follows, E, P and B stay."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.dynamics.parameters import BODY_PARAMETERS, moved, standard_parameters
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, NamedFrame, Placement
 from psdmc.robot.inertia import physical_fault, six_of
 
 Array = NDArray[np.float64]
@@ -22,22 +22,23 @@ SPAN_TOLERANCE = 1e-9
 """Share of the load by which it may miss the parameters that the model admits: rounding only."""
 
 
-def loaded(chain: Chain, load: Array, mass: float) -> Chain:
-    """The chain with the load on the link that carries its tip; InputError where the chain's assumptions do not admit it.
+def loaded(chain: Chain, load: Array, mass: float, body: int) -> Chain:
+    """The chain with the load on one of its links; InputError where the chain's assumptions do not admit it.
 
     load  (10,) standard parameters of `load_parameters`
     mass  kg, for the note
+    body  number of the joint that the link moves with
     """
-    _check_admitted(chain, load)
+    _check_admitted(chain, load, body)
     parameters = chain.parameters.copy()
-    parameters[chain.tip_body, :BODY_PARAMETERS] += load
-    note = f"payload of {mass:g} kg on link '{chain.joints[chain.tip_body].link_name}'"
+    parameters[body, :BODY_PARAMETERS] += load
+    note = f"payload of {mass:g} kg on link '{chain.joints[body].link_name}'"
     return replace(chain, parameters=parameters, notes=(*chain.notes, note))
 
 
-def tip_link(chain: Chain) -> NDArray[np.int64]:
-    """(10,) where the body parameters of the link that carries the tip are in x."""
-    return PARAMETERS_PER_LINK * chain.tip_body + np.arange(BODY_PARAMETERS)
+def body_parameters(body: int) -> NDArray[np.int64]:
+    """(10,) where the body parameters of the link that moves with a joint are in x."""
+    return PARAMETERS_PER_LINK * body + np.arange(BODY_PARAMETERS)
 
 
 def load_parameters(
@@ -47,24 +48,27 @@ def load_parameters(
     inertia: ArrayLike | None = None,
     frame: Placement | str | None = None,
 ) -> Array:
-    """(10,) the load's standard parameters about the frame of the link that carries the tip; arguments as in
+    """(10,) the load's standard parameters about the frame of the link that carries it; arguments as in
     DynamicsModel.with_payload."""
     centre, about_com = _checked(mass, com, inertia)
     kilograms = float(mass)
     about_frame = about_com + kilograms * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     own = standard_parameters(kilograms, kilograms * centre, about_frame)
-    in_tip = chain.tip @ _frame(chain, frame)
-    return moved(own, chain.joints[chain.tip_body].link_frame.inverse() @ in_tip)
+    place = carrying_frame(chain, frame)
+    return moved(own, chain.joints[place.joint].link_frame.inverse() @ place.placement)
 
 
-def _frame(chain: Chain, frame: Placement | str | None) -> Placement:
+def carrying_frame(chain: Chain, frame: Placement | str | None) -> NamedFrame:
+    """Where a load's numbers are given, in the joint frame of the link that carries it."""
+    tip = chain.tip_frame
     if isinstance(frame, Placement):
-        return _checked_frame(frame)
-    if frame is None or frame == chain.tip_name:
-        return Placement.identity()
+        return replace(tip, placement=tip.placement @ _checked_frame(frame))
+    known = {each.name: each for each in (tip, *chain.frames)}
+    if frame is None or frame in known:
+        return tip if frame is None else known[frame]
     raise InputError(
-        f"payload frame {limits.shown(frame)} is not the tip {limits.shown(chain.tip_name)}",
-        "give the tip's name, or a Placement in the tip frame",
+        f"payload frame {limits.shown(frame)} is not the tip {limits.shown(chain.tip_name)} or another frame of the model",
+        f"give one of {', '.join(map(limits.shown, known))}, or a Placement in the tip frame",
     )
 
 
@@ -126,15 +130,15 @@ def array_of(values: ArrayLike) -> Array | None:
 _SHAPES = {(): "a finite number", (3,): "three finite numbers", (3, 3): "3 x 3 finite numbers"}
 
 
-def _check_admitted(chain: Chain, load: Array) -> None:
+def _check_admitted(chain: Chain, load: Array, body: int) -> None:
     """The load must lie in the span: a link whose mx is assumed zero cannot carry one off its axis."""
     x = np.zeros(PARAMETERS_PER_LINK * len(chain))
-    x[tip_link(chain)] = load
+    x[body_parameters(body)] = load
     span = chain.parameter_span
     leads = np.argmax(span != 0.0, axis=0)
     missed = np.abs(x - span @ x[leads]).max()
     if missed > SPAN_TOLERANCE * np.abs(x).max(initial=0.0):
-        link = chain.joints[chain.tip_body].link_name
+        link = chain.joints[body].link_name
         raise InputError(
             f"link '{link}' cannot carry this load: the model assumes some of its parameters zero",
             "derive the model again without those assumptions",

@@ -8,19 +8,23 @@ joint adds q to d instead, which commutes with Rz(theta).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from psdmc.robot.chain import Array, Joint, Placement
+from psdmc.errors import InputError
+from psdmc.robot.chain import Array, Joint, NamedFrame, Placement
 from psdmc.robot.dh import DhJoint, DhLink, DhRobot, read_dh
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, standard_parameters
+from psdmc.robot.limits import shown
 from psdmc.robot.rotation import about
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, snap_rotation
 from psdmc.robot.zeros import COM_NAMES, canonical
 
 
-def dh_draft(text: str, source: str, gravity: Array | None, snap: float) -> Draft:
+def dh_draft(text: str, source: str, gravity: Array | None, snap: float, frames: Sequence[str] = ()) -> Draft:
     """The robot in the file; gravity overrides the file's; rotations near exact ones snapped (rad)."""
     robot = read_dh(text, source)
     joints, snaps = _placed_joints(robot, snap)
@@ -37,7 +41,17 @@ def dh_draft(text: str, source: str, gravity: Array | None, snap: float) -> Draf
         tip=joints[-1].link_frame,
         snaps=snaps,
         notes=_faults(robot),
+        frames=tuple(_frame(joints, name, source) for name in frames),
     )
+
+
+def _frame(joints: Sequence[Joint], name: str, source: str) -> NamedFrame:
+    """A link's own frame; InputError where there is no such link."""
+    names = [joint.link_name for joint in joints]
+    if name not in names:
+        raise InputError(f"{source}: frame {shown(name)} is no link", f"a DH table has {', '.join(names)}")
+    number = names.index(name)
+    return NamedFrame(name, number, joints[number].link_frame)
 
 
 def link_name(number: int) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from psdmc.robot.chain import Array, Joint, Placement
+from psdmc.robot.chain import Array, Joint, NamedFrame, Placement
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +33,7 @@ class Draft:
     zeros          n tuples of names assumed zero (psdmc.robot.zeros.ZERO_NAMES), by the file
     drives         n flags: the file makes this joint's drive inertia a parameter
     gravity        (3,) m/s^2 in the base frame
+    frames         named frames; empty: the tip alone
     """
 
     name: str
@@ -47,3 +48,4 @@ class Draft:
     tip: Placement
     snaps: tuple[Snap, ...]
     notes: tuple[str, ...]
+    frames: tuple[NamedFrame, ...] = ()

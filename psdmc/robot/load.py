@@ -11,11 +11,12 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, NamedFrame
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
+from psdmc.robot.tool import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
 
@@ -56,6 +57,8 @@ def load_robot(
     drive_inertia: bool | Sequence[float] = False,
     assume_zero: Sequence[str] = (),
     snap: float = DEFAULT_SNAP,
+    frames: Sequence[str] = (),
+    tool: Sequence[float] | None = None,
 ) -> LoadedRobot:
     """The robot in a URDF or DH TOML file (told apart by the suffix .toml). Options as in LoadOptions.
 
@@ -72,6 +75,8 @@ def load_robot(
         drive_inertia=drive_inertia,
         assume_zero=assume_zero,
         snap=snap,
+        frames=frames,
+        tool=tool,
     )
 
 
@@ -86,10 +91,12 @@ def load_robot_text(
     drive_inertia: bool | Sequence[float] = False,
     assume_zero: Sequence[str] = (),
     snap: float = DEFAULT_SNAP,
+    frames: Sequence[str] = (),
+    tool: Sequence[float] | None = None,
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
-    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap)
+    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool)
     if not text.strip():
         raise InputError(f"{source_name}: the file is empty", "give a URDF or a DH .toml file")
     draft = _draft(text, source_format, source_name, options)
@@ -124,10 +131,10 @@ def robot_text(file: Path) -> str:
 def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> Draft:
     gravity = None if options.gravity is None else np.array(options.gravity)
     if source_format == "urdf":
-        return urdf_draft(text, source, options.base, options.tip, gravity, options.snap)
+        return urdf_draft(text, source, options.base, options.tip, gravity, options.snap, options.frames)
     if options.base is not None or options.tip is not None:
         raise InputError(f"{source}: --base and --tip name links of a URDF", "leave them out for a DH table")
-    return dh_draft(text, source, gravity, options.snap)
+    return dh_draft(text, source, gravity, options.snap, options.frames)
 
 
 def _settled(draft: Draft, options: LoadOptions, source: str) -> Chain:
@@ -155,7 +162,19 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Chain:
         gravity=draft.gravity,
         tip=draft.tip,
         notes=(*_snap_notes(draft.snaps), *draft.notes, *_zero_notes(draft, said, values)),
+        frames=_frames(draft, options, source),
     )
+
+
+def _frames(draft: Draft, options: LoadOptions, source: str) -> tuple[NamedFrame, ...]:
+    """The named frames, the tip where none are named, then the tool."""
+    tip = NamedFrame(draft.tip_name, len(draft.joints) - 1, draft.tip)
+    if options.tool is None:
+        return draft.frames
+    named = draft.frames or (tip,)
+    if any(frame.name == TOOL for frame in named):
+        raise InputError(f"{source}: a frame of the file is called '{TOOL}' too", "leave --tool out")
+    return (*named, tool_frame(tip, options.tool))
 
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:

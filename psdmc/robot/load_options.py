@@ -27,6 +27,8 @@ class LoadOptions:
     drive_inertia  True: drive inertias are parameters; numbers: with these values, one a joint, kg m^2 (kg)
     assume_zero    texts such as "link5:mx" or "link5:Ixz@com"
     snap           rad; 0 keeps the file's rotations but for floating-point noise
+    frames         names of links that functions are about; empty: the tip
+    tool           x y z (m), roll pitch yaw (rad) of a frame 'tool' in the tip frame, beside them; None: no such frame
     """
 
     base: str | None = None
@@ -35,10 +37,14 @@ class LoadOptions:
     drive_inertia: bool | tuple[float, ...] = False
     assume_zero: tuple[str, ...] = ()
     snap: float = DEFAULT_SNAP
+    frames: tuple[str, ...] = ()
+    tool: tuple[float, ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Keyword arguments of load_robot_text as plain JSON values."""
-        return asdict(self)
+        """Keyword arguments of load_robot_text as plain JSON values; frames only where there are any, so that models
+        without them keep the hash that they had before frames were."""
+        plain = asdict(self)
+        return {name: value for name, value in plain.items() if name not in ("frames", "tool") or value}
 
 
 def checked_options(
@@ -48,6 +54,8 @@ def checked_options(
     drive_inertia: bool | Sequence[float],
     assume_zero: Sequence[str],
     snap: float,
+    frames: Sequence[str] = (),
+    tool: Sequence[float] | None = None,
 ) -> LoadOptions:
     """The options; InputError names the first that is wrong."""
     for name, value in (("base", base), ("tip", tip)):
@@ -56,7 +64,32 @@ def checked_options(
     if isinstance(assume_zero, str) or not _all_are_texts(assume_zero):
         raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
     drives = _drive_inertia(drive_inertia)
-    return LoadOptions(base, tip, _gravity(gravity), drives, tuple(assume_zero), _snap(snap))
+    return LoadOptions(
+        base, tip, _gravity(gravity), drives, tuple(assume_zero), _snap(snap), _frames(frames), _tool(tool)
+    )
+
+
+def _frames(frames: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(frames, str) or not _all_are_texts(frames):
+        raise InputError(f"frames are {shown(frames)}, expected links' names", "such as tcp,camera")
+    twice = [name for k, name in enumerate(frames) if name in frames[:k]]
+    if twice:
+        raise InputError(f"frame {shown(twice[0])} is named twice", "name each once")
+    return tuple(frames)
+
+
+def _tool(tool: Sequence[float] | None) -> tuple[float, ...] | None:
+    if tool is None:
+        return None
+    values = _floats(tool)
+    if values is None or len(values) != 6:
+        raise InputError(
+            f"tool {_listed(tool)} is not six finite numbers", "x y z in m, roll pitch yaw in rad"
+        )
+    faults = [f"{value:g} {fault}" for value in values[:3] if (fault := limits.LENGTH.fault(value))]
+    if faults:
+        raise InputError(f"tool: {faults[0]}", "x y z in m")
+    return values
 
 
 def _all_are_texts(values: object) -> bool:

@@ -23,6 +23,7 @@ from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Placement, froz
 from psdmc.robot.dh_textbook import dh_model
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
+from psdmc.robot.tool import TOOL
 
 DRIVE = PARAMETERS_PER_LINK - 1
 
@@ -56,9 +57,20 @@ def reference_model(
 
 def as_written(loaded: LoadedRobot) -> pinocchio.Model:
     """Pinocchio's own model of the file, nothing of the chain in it but names; bodies as far as the file gives them."""
-    if loaded.source_format == "urdf":
-        return _urdf_model(loaded)
-    return dh_model(loaded.source_text, loaded.options.gravity)
+    is_urdf = loaded.source_format == "urdf"
+    model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
+    if loaded.options.tool is not None:
+        _add_tool(model, loaded.chain.tip_name, loaded.options.tool)
+    return model
+
+
+def _add_tool(model: pinocchio.Model, tip: str, tool: tuple[float, ...]) -> None:
+    """The tool frame in the tip's, by Pinocchio's own reading of the angles."""
+    number = model.getFrameId(tip)
+    place = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*tool[3:]), np.array(tool[:3]))
+    above = model.frames[number]
+    kind = pinocchio.FrameType.OP_FRAME
+    model.addFrame(pinocchio.Frame(TOOL, above.parentJoint, number, above.placement * place, kind))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

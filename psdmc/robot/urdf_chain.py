@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.robot.chain import Array, Joint, Placement
+from psdmc.robot.chain import Array, Joint, NamedFrame, Placement
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.joints import URDF_TYPES
@@ -15,15 +16,23 @@ from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, 
 from psdmc.robot.tree import Route, find_route, listed
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import hold_against_pinocchio, merged_parameters, placement_of
+from psdmc.robot.urdf_frames import urdf_frames
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""
 
 
 def urdf_draft(
-    text: str, source: str, base: str | None, tip: str | None, gravity: Array | None, snap: float
+    text: str,
+    source: str,
+    base: str | None,
+    tip: str | None,
+    gravity: Array | None,
+    snap: float,
+    frames: Sequence[str] = (),
 ) -> Draft:
-    """The chain from base to tip; gravity in the root frame; rotations near exact ones snapped (rad)."""
+    """The chain from base to tip; gravity in the root frame; rotations near exact ones snapped (rad); the links `frames`
+    as named frames."""
     robot = read_urdf(text, source)
     route = find_route(robot, base, tip, source)
     joints, tip_frame, snaps = _placed_joints(route, snap)
@@ -51,7 +60,12 @@ def urdf_draft(
             *_unmodelled(route),
             *_faults(robot),
         ),
+        frames=urdf_frames(robot, route, joints, _tip(route, joints, tip_frame), frames, source),
     )
+
+
+def _tip(route: Route, joints: Sequence[Joint], place: Placement) -> NamedFrame:
+    return NamedFrame(route.tip, len(joints) - 1, place)
 
 
 def link_rotation(axis: Array) -> Array:
