@@ -102,6 +102,7 @@ def emit_c(
     name: str | None = None,
     force: bool = False,
     progress: Progress = silent,
+    payload: bool = False,
 ) -> list[str]:
     """Write the model's C package; returns the files that changed.
 
@@ -112,8 +113,10 @@ def emit_c(
     trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"
     name       the robot's name in C; None: the robot's own
     force      whether to overwrite files that psdmc did not write
+    payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
+               do not admit every load
     """
-    package = _package(model, lowering, functions, _options(lowering, real, trig), name, progress)
+    package = _package(model, lowering, functions, _options(lowering, real, trig), name, progress, payload)
     progress("writing")
     return write_package(directory, package_files(package), force)
 
@@ -145,6 +148,7 @@ def _package(
     options: EmitOptions,
     name: str | None,
     progress: Progress,
+    payload: bool = False,
 ) -> PackageView:
     names = wanted(functions)
     require(model, names)
@@ -152,7 +156,8 @@ def _package(
         (model.content_hash, lowering, *names), lambda: lower(model, lowering, names, progress)
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
-    return package_view(package_info(model, name, shown), kernels, options, reference_states(model, names))
+    info = package_info(model, name, shown, payload)
+    return package_view(info, kernels, options, reference_states(model, names))
 
 
 def _options(lowering: str, real: Real, trig: Trig) -> EmitOptions:

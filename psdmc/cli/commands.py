@@ -203,6 +203,7 @@ def emit_c(
     ] = "inline",
     name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
+    payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
 ) -> None:
     """Write a model's C package: header, sources, build files, self-test."""
     from psdmc import compiler
@@ -222,6 +223,7 @@ def emit_c(
             name,
             force,
             progress,
+            payload,
         )
     print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
     for note in run_time_only(found, wanted):

@@ -12,7 +12,7 @@ from psdmc.program.signature import Signature
 
 
 def description(
-    info: PackageInfo, options: EmitOptions, functions: Sequence[FunctionView]
+    info: PackageInfo, options: EmitOptions, functions: Sequence[FunctionView], with_frames: bool
 ) -> tuple[str, ...]:
     """Joints, limits, gravity, parameters, model and options, one line each; untrusted names still
     unescaped."""
@@ -40,7 +40,7 @@ def description(
     if any(len(function.signature.outputs) > 1 for function in functions):
         lines += ["Several outputs of one call must not overlap each other."]
     lines += [line for function in functions for line in _failure(function.signature)]
-    if uses_frames(functions):
+    if with_frames:
         lines += ["", "Frames, in the order of every array over them:"]
         lines += [f"  {i}  {name}" for i, name in enumerate(info.frames)]
     return tuple(lines)

@@ -6,7 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
 from psdmc.version import psdmc_version
 
@@ -47,6 +51,8 @@ class PackageInfo:
     model_hash  content hash of the MODEL
     options     what the user chose, as printed in header and manifest
     frames      names of the named frames, untrusted text; empty: the tip alone
+    payload     (l, 10) what a load adds to theta_b, at the tip and, where there are others, at each named frame; empty
+                where the package has no function for loads
     """
 
     name: str
@@ -59,6 +65,7 @@ class PackageInfo:
     psdmc_version: str
     options: Mapping[str, str] = field(default_factory=dict)
     frames: tuple[str, ...] = ()
+    payload: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
         if not self.joints:
@@ -82,9 +89,13 @@ class PackageInfo:
 
 
 def package_info(
-    model: DynamicsModel, name: str | None = None, options: Mapping[str, str] | None = None
+    model: DynamicsModel,
+    name: str | None = None,
+    options: Mapping[str, str] | None = None,
+    payload: bool = False,
 ) -> PackageInfo:
-    """Metadata of a MODEL; `name` replaces the robot's own."""
+    """Metadata of a MODEL; `name` replaces the robot's own; `payload`: with what functions for loads need, InputError
+    where the model's assumptions do not admit every load."""
     chain = model.chain
     joints = tuple(
         JointInfo(
@@ -112,7 +123,15 @@ def package_info(
         psdmc_version=psdmc_version(),
         options=dict(options or {}),
         frames=tuple(frame.name for frame in chain.frames),
+        payload=_load_maps(model) if payload else (),
     )
+
+
+def _load_maps(model: DynamicsModel) -> tuple[NDArray[np.float64], ...]:
+    chain = model.chain
+    is_tip_alone = [frame.name for frame in chain.frames] == [chain.tip_name]
+    frames = (chain.tip_frame,) if is_tip_alone else (chain.tip_frame, *chain.frames)
+    return tuple(load_map(chain, model.B, frame) for frame in frames)
 
 
 def _parameters(model: DynamicsModel) -> tuple[BaseParameterInfo, ...]:

@@ -14,12 +14,13 @@ from psdmc.emit.lanes import VectorWidth, vector_widths
 from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
+from psdmc.emit.prototypes import Prototype, payload_prototypes
 from psdmc.emit.reals import check_range
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.references import ReferenceView, reference_view
 from psdmc.emit.render import render
 from psdmc.emit.self_test import GivenVector, SelfCheck, given_vectors, labels, self_checks
-from psdmc.emit.tables import Table, tables
+from psdmc.emit.tables import Table, number, tables
 from psdmc.emit.trig import (
     HAS_VECTORS,
     ScalarTrig,
@@ -94,7 +95,7 @@ class PackageView:
 
     @property
     def description(self) -> tuple[str, ...]:
-        return description(self.info, self.options, self.functions)
+        return description(self.info, self.options, self.functions, self.uses_frames)
 
     @property
     def tables(self) -> tuple[Table, ...]:
@@ -117,7 +118,21 @@ class PackageView:
     @property
     def sources(self) -> tuple[str, ...]:
         """C files of the library, relative to the package."""
-        return ("src/tables.c", *(f"src/{function.name}.c" for function in self.functions))
+        payload = ("src/payload.c",) if self.info.payload else ()
+        return ("src/tables.c", *(f"src/{function.name}.c" for function in self.functions), *payload)
+
+    @property
+    def payload_prototypes(self) -> tuple[Prototype, ...]:
+        """Functions that add a load to theta_b."""
+        return payload_prototypes(self.robot, self.real) if self.info.payload else ()
+
+    @property
+    def payload_rows(self) -> tuple[tuple[str, ...], ...]:
+        """Rows of the constant matrices that they multiply with."""
+        return tuple(
+            tuple(", ".join(number(value, self.real) for value in row) for row in matrix.tolist())
+            for matrix in self.info.payload
+        )
 
     @property
     def version(self) -> str:
@@ -190,7 +205,7 @@ class PackageView:
     @property
     def uses_frames(self) -> bool:
         """Whether some function is about the named frames."""
-        return uses_frames(self.functions)
+        return uses_frames(self.functions) or bool(self.info.payload)
 
     @property
     def cdef(self) -> str:
@@ -203,6 +218,7 @@ class PackageView:
         for function in self.functions:
             for kernel in function.kernels:
                 lines += [prototype.text for prototype in kernel.prototypes.values()]
+        lines += [prototype.text for prototype in self.payload_prototypes]
         return "".join(f"{line};\n" for line in lines)
 
 
@@ -264,6 +280,8 @@ def library_files(package: PackageView) -> dict[str, str]:
             bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
             for file, body in bodies.items():
                 files[f"src/{file}"] = render("body.inc.jinja", body=body)
+    if package.info.payload:
+        files["src/payload.c"] = render("payload.c.jinja", package=package)
     return files
 
 

@@ -49,6 +49,15 @@ def prototype(function: Signature, variant: Variant, robot: str, real: str) -> P
     return Prototype(_returns(function, variant), f"{robot}_{function.name}{variant.suffix}", arguments)
 
 
+def payload_prototypes(robot: str, real: str) -> tuple[Prototype, Prototype]:
+    """The functions that add a load to theta_b: at the tip, and at a frame by its number."""
+    load = (f"{real} mass", f"const {real} *com", f"const {real} *inertia", f"{real} *theta_b")
+    return (
+        Prototype("void", f"{robot}_add_payload", load),
+        Prototype("int", f"{robot}_add_payload_at", ("size_t frame", *load)),
+    )
+
+
 def _returns(function: Signature, variant: Variant) -> str:
     """A function that can fail says which entry failed (one state), or which row (many)."""
     if function.positive is None:

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from psdmc.dynamics.parameters import BODY_PARAMETERS, moved, standard_parameters
+from psdmc.dynamics.parameters import BODY_PARAMETERS, moved, moving_map, standard_parameters
 from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, NamedFrame, Placement
 from psdmc.robot.inertia import physical_fault, six_of
+from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,18 @@ def load_parameters(
     own = standard_parameters(kilograms, kilograms * centre, about_frame)
     place = carrying_frame(chain, frame)
     return moved(own, chain.joints[place.joint].link_frame.inverse() @ place.placement)
+
+
+def load_map(chain: Chain, B: Array, frame: NamedFrame) -> Array:
+    """(l, 10) what a load at a frame adds to theta_b = B x, by its mass, first moment and inertia about that frame's origin.
+
+    InputError where the chain's assumptions do not admit every load there.
+    """
+    place = chain.joints[frame.joint].link_frame.inverse() @ frame.placement
+    moving = moving_map(place.rotation, place.translation)
+    for load in moving.T:
+        _check_admitted(chain, load, frame.joint)
+    return np.asarray(times(B[:, body_parameters(frame.joint)], moving))
 
 
 def carrying_frame(chain: Chain, frame: Placement | str | None) -> NamedFrame:

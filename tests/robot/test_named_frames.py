@@ -35,7 +35,8 @@ URDF = """<robot name="arm">
     <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
   <joint name="to_hand" type="fixed"><parent link="lower"/><child link="hand"/><origin xyz="0 0 0.1" rpy="0 0.5 0"/></joint>
   <joint name="to_tcp" type="fixed"><parent link="hand"/><child link="tcp"/><origin xyz="0 0 0.2" rpy="0.2 0 0"/></joint>
-  <joint name="to_camera" type="fixed"><parent link="hand"/><child link="camera"/><origin xyz="0.1 0 0" rpy="0 0 0.9"/></joint>
+  <joint name="to_camera" type="fixed"><parent link="hand"/><child link="camera"/>
+    <origin xyz="0.1 0 0" rpy="0 0 0.9"/></joint>
   <joint name="grip" type="prismatic"><parent link="hand"/><child link="finger"/>
     <axis xyz="0 1 0"/><limit lower="0" upper="0.1" effort="1" velocity="1"/></joint>
   <joint name="to_nail" type="fixed"><parent link="finger"/><child link="nail"/></joint>
