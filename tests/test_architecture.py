@@ -70,6 +70,7 @@ ROOMS = {
         "plant": {"logs", "identify", "motions"},
         "verdict": {"logs", "identify"},
     },
+    "lower": {"expanded": set()},
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
