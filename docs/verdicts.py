@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_campaign, calibrate_logs
-from psdmc.calibration.campaign import CampaignOptions, plan_campaign, read_campaign, write_campaign
+from psdmc.calibration.campaign import CampaignOptions, plan_campaign, write_campaign
+from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log
