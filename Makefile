@@ -42,7 +42,7 @@ test: $(READY) ## run all tests
 CAMPAIGN ?= --robots 10000
 campaign: $(READY) ## 10,000 random robots against Pinocchio and MuJoCo, an hour or more of two cores; CAMPAIGN='--robots 500' for less
 	@mkdir -p $(GENERATED)
-	$(RUN)/python tests/campaign/campaign_run.py $(CAMPAIGN) --json $(GENERATED)/campaign.json
+	$(RUN)/python tests/campaign/campaign_run.py $(CAMPAIGN) --journal $(GENERATED)/campaign.jsonl --json $(GENERATED)/campaign.json
 
 test-processes: $(READY) ## kill every command 50 times at random moments, and whatever else takes long
 	PSDMC_KILLS=50 $(RUN)/python -m pytest -q -rs tests/end_to_end/test_killed.py tests/end_to_end/test_full_disk.py

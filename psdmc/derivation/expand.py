@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from psdmc.derivation.extended import extended, has_small_entries
+from psdmc.derivation.extended import extended, has_small_entries, is_of_many_scales
 from psdmc.derivation.functions import Functions
 from psdmc.derivation.gravity import gravity_terms
 from psdmc.derivation.inertia import mass_matrix_terms
@@ -56,11 +56,16 @@ EXTENDED = Precision(1e-15, 1e-16)
 """Where columns are nearly dependent: coefficients of size tilt^2 count. Rounding leaves less than 1e-17 there."""
 
 
+FINEST = Precision(1e-18, 1e-19)
+"""For robots of many scales: the coefficients of a joint whose lengths are 1e-5 of the robot's are 1e-10 of others. Some of
+1e-18 that are rounding are kept with them, which costs functions, not digits."""
+
+
 def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int | None = None) -> Expansion:
     """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of
     what is free)."""
     types, precision = scaled.types, precision_for(scaled, reduction)
-    if precision is EXTENDED:
+    if precision is not IN_DOUBLE:
         scaled = extended(scaled)
     functions = Functions(types)
     available = available_memory() if memory is None else memory
@@ -84,6 +89,8 @@ def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int
 
 def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
     """Double where every coefficient is either rounding or far from it."""
+    if is_of_many_scales(scaled) and np.finfo(np.longdouble).eps < FINEST.zero:
+        return FINEST
     return IN_DOUBLE if reduction.is_clear and not has_small_entries(scaled) else EXTENDED
 
 

@@ -6,6 +6,7 @@ could not be told from the effect of axes that are 1e-8 rad from parallel, which
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -29,6 +30,11 @@ STEPS = 2
 SMALL = 1e-3
 """A direction cosine, or a length in the robot's unit, below this makes coefficients of all sizes when it is multiplied by
 itself. Right angles that a file rounds, tilts of calibrated axes and offsets of a tenth of a millimetre are such."""
+
+
+MANY_SCALES = 1e-2
+"""A joint that moves nothing farther away than this, in the robot's unit of length, has coefficients of 1e-4 and less, and
+differences of theirs that count: thresholds made for a robot of one size would lose digits of its torque."""
 
 
 class LongPlacement(NamedTuple):
@@ -83,3 +89,15 @@ def has_small_entries(robot: Scaled) -> bool:
     entries += [np.vstack([place.rotation, place.translation]) for place in robot.link_frames]
     sizes = np.abs(np.stack([*entries, np.broadcast_to(robot.up, (4, 3))]))
     return bool(np.any((sizes > 0.0) & (sizes < SMALL)))
+
+
+def is_of_many_scales(robot: Scaled) -> bool:
+    """Whether the lengths from some joint outward are all small, and not all zero: a finger of millimetres on an arm of
+    metres."""
+    steps = [_length(frame.translation) for frame in robot.frames]
+    links = [_length(place.translation) for place in robot.link_frames]
+    return any(0.0 < max(*steps[k + 1 :], *links[k:], 0.0) < MANY_SCALES for k in range(len(steps)))
+
+
+def _length(translation: Sequence[Any] | Long) -> float:
+    return math.hypot(*(float(x) for x in translation))

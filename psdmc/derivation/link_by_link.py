@@ -48,7 +48,8 @@ thousand long, and so is its rounding."""
 def reduction_link_by_link(robot: Scaled) -> Reduction:
     """The base parameters within the span's columns, by graded passes over rows that hold nothing but rank."""
     rows = torque_rows(extended(robot))
-    return _reduced(np.asarray((sparse.csr_array(robot.span.T) @ rows.T).T))
+    links = robot.leads // PARAMETERS_PER_LINK
+    return _reduced(np.asarray((sparse.csr_array(robot.span.T) @ rows.T).T), links)
 
 
 def torque_rows(robot: Scaled) -> Long:
@@ -107,12 +108,18 @@ def echelon_rows(samples: Long) -> Long:
     return np.asarray(work[: len(pivots)])
 
 
-def _reduced(rows: Long) -> Reduction:
+def _reduced(rows: Long, links: NDArray[np.int64]) -> Reduction:
     """A small column is no pivot before its time: its torque would be a large parameter times small numbers, which
-    double precision knows to fewer digits. So residuals are compared as they are, not with their columns."""
+    double precision knows to fewer digits. So residuals are compared as they are, not with their columns.
+
+    But a link's columns come before the next link's, small or not: else a parameter of a heavy link could be taken into
+    one of a light link farther out, whose torque would then be a small difference of large numbers.
+
+    links  (k,) which link each column belongs to
+    """
     work = np.array(rows, order="C")
     last = EXACT * max(1.0, float(lengths(work).max(initial=0.0)))
-    found, _, _ = graded_pivots(work, np.ones(work.shape[1]), halving_shares(last))
+    found, _, _ = graded_pivots(work, np.ones(work.shape[1]), halving_shares(last), links)
     pivots = np.array(found, dtype=np.int64)
     others = np.setdiff1d(np.arange(work.shape[1]), pivots)
     shares = _solved(work[: len(pivots), pivots], work[: len(pivots), others])

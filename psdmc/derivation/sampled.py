@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from psdmc.derivation.extended import is_of_many_scales
 from psdmc.derivation.link_by_link import reduction_link_by_link
 from psdmc.derivation.reduce import Reduction, reduced
 from psdmc.derivation.units import Scaled
@@ -27,9 +28,9 @@ SAMPLED_JOINTS = 10
 
 
 def reduction_of(scaled: Scaled) -> Reduction:
-    """The base parameters: from sampled rows of doubles where these are few and no column is nearly dependent, else
-    link by link in extended precision."""
-    if len(scaled.types) <= SAMPLED_JOINTS:
+    """The base parameters: from sampled rows of doubles where these are few, of one scale, and no column is nearly
+    dependent, else link by link in extended precision."""
+    if len(scaled.types) <= SAMPLED_JOINTS and not is_of_many_scales(scaled):
         reduction = sampled_reduction(scaled)
         if reduction.is_clear:
             return reduction

@@ -6,6 +6,7 @@ kinetic energy, and a controller that divides by the mass matrix pushes the wron
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.chain import Joint
+from psdmc.robot.chain import PARAMETERS_PER_LINK, Joint
 
 Array = NDArray[np.float64]
 
@@ -21,7 +22,8 @@ POSES = 2000
 """Poses tried, each joint drawn evenly within its limits."""
 SEED = 88_061
 ROUNDING = 64 * float(np.finfo(float).eps)
-"""Share of a matrix's largest eigenvalue below which its smallest one is rounding, and counts as zero."""
+"""Share of the magnitudes summed in an inertia below which it is rounding, and counts as zero; and of a matrix's largest
+eigenvalue, every joint in its own unit, below which the smallest one is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,11 +65,42 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
         return None
     low, high = (np.array(bound) for bound in zip(*map(_range, model.chain.joints), strict=True))
     poses = np.random.default_rng(SEED).uniform(low, high, size=(POSES, model.n))
-    values, vectors = np.linalg.eigh(recursive.mass_matrix(model.chain, model.standard_parameters(), poses))
-    failing = ~(values[:, 0] > ROUNDING * np.abs(values).max(axis=1))
-    worst = int(np.argmin(values[:, 0]))
+    mass = recursive.mass_matrix(model.chain, model.standard_parameters(), poses)
+    failing = ~_is_definite(mass, ROUNDING * _magnitudes(model, np.abs(poses).max(axis=0)))
+    values, vectors = np.linalg.eigh(mass)
+    worst = int(np.argmin(np.where(failing == failing.any(), values[:, 0], np.inf)))
     joint = model.joint_names[int(np.argmax(np.abs(vectors[worst, :, 0])))]
     return MassCheck(POSES, int(failing.sum()), float(values[worst, 0]), poses[worst], joint)
+
+
+def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:
+    """(poses,) whether M is positive definite, each joint in the unit in which its own inertia is one: a finger's inertia
+    is no rounding of its arm's. `smallest` (n,) is what counts as no inertia at all."""
+    inertias = np.einsum("pii->pi", mass)
+    roots = np.sqrt(np.where(inertias > 0.0, inertias, 1.0))
+    values = np.linalg.eigvalsh(mass / roots[:, :, None] / roots[:, None, :])
+    sound: NDArray[np.bool_] = np.all(inertias > smallest, axis=1) & (values[:, 0] > ROUNDING * values[:, -1])
+    return sound
+
+
+def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
+    """(n,) at most what the parameters add up to in each joint's own inertia, whatever their signs. `travel` (n,), how far
+    sliding joints go."""
+    x = np.abs(model.standard_parameters()).reshape(model.n, PARAMETERS_PER_LINK)
+    joints = model.chain.joints
+    masses, firsts, seconds, drives = x[:, 0], x[:, 1:4].sum(axis=1), x[:, 4:10].sum(axis=1), x[:, 10]
+    steps = np.array([math.hypot(*joint.placement.translation) for joint in joints])
+    slides = [joint.type.turn(1.0) is None for joint in joints]
+    steps += np.where(slides, travel, 0.0)
+    links = np.array([math.hypot(*joint.link_frame.translation) for joint in joints])
+    result = drives.copy()
+    for i in range(model.n):
+        if slides[i]:
+            result[i] += masses[i:].sum()
+            continue
+        far = np.cumsum(np.concatenate([[0.0], steps[i + 1 :]])) + links[i:]
+        result[i] += (seconds[i:] + 2.0 * far * firsts[i:] + far**2 * masses[i:]).sum()
+    return result
 
 
 def _range(joint: Joint) -> tuple[float, float]:

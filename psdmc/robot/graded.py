@@ -23,19 +23,22 @@ def halving_shares(last: float) -> tuple[float, ...]:
 
 
 def graded_pivots(
-    work: NDArray[Any], norms: NDArray[Any], shares: Sequence[float]
+    work: NDArray[Any], norms: NDArray[Any], shares: Sequence[float], groups: NDArray[Any] | None = None
 ) -> tuple[list[int], float, float]:
     """Columns of `work` (m, k) in the order they become pivots, the smallest share at which one did, and the largest
     share left of any other. Turns `work` in place so that its first rows are triangular in them.
 
     norms   (k,)  the columns' lengths beforehand
+    groups  (k,)  ascending; the columns of one are gone through with all shares before the next one's are looked at.
+                  None: all are one group
     """
     pivots: list[int] = []
     taken = 1.0
     others = np.ones(work.shape[1], dtype=bool)
-    for share in shares:
+    group = np.zeros(work.shape[1], dtype=np.int64) if groups is None else groups
+    for share, current in ((share, own) for own in np.unique(group) for share in shares):
         rest = work[len(pivots) :]
-        hopeful = others & (lengths(rest) > 0.5 * share * norms)
+        hopeful = others & (group == current) & (lengths(rest) > 0.5 * share * norms)
         for column in np.flatnonzero(hopeful).tolist():
             residual = np.linalg.norm(work[len(pivots) :, column])
             if residual > share * norms[column]:

@@ -2,67 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import partial
-from unittest import mock
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from campaign_oracles import MuJoCo, Pinocchio
+from campaign_lowered import lowered_errors
+from campaign_oracles import MuJoCo, Pinocchio, Textbook
+from campaign_reference import Reference, States, random_states
 from campaign_robots import RandomRobot, random_robot
 
-from psdmc.compiler import compile
+from psdmc.derivation.certify import certificate
 from psdmc.derivation.derive import derive_model
-from psdmc.lower import kernels, search
-from psdmc.lower.kernels import lower
+from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.program.interpret import interpret
+from psdmc.robot.chain import Chain
 from psdmc.robot.load import DEFAULT_SNAP, load_robot_text
 
 Array = np.ndarray
-States = tuple[Array, Array, Array]
-Errors = dict[str, float]
-
-RANGES = (np.pi, 3.0, 5.0)
-"""q (rad or m), qd and qdd are drawn from plus or minus these."""
 
 EXPANDED_JOINTS = 7
 """E and P are made for robots up to this length."""
 
-VALUES = 20_000_000
-"""Values of functions that E and P may take per robot: with 250,000 functions, 80 states instead of all."""
+VALUES = 3_000_000
+"""Values of functions that E and P may take per robot and comparison: with 30,000 functions, 100 states instead of all."""
 
 MUJOCO_LIMIT, LIMIT, SINGLE_LIMIT = 1e-10, 1e-11, 1e-3
 """Errors that pass: against MuJoCo, which makes each inertia tensor diagonal by iteration until it is so to 1e-12; against
 Pinocchio; of code in float32."""
 
-BUDGET = 12
-"""Programs that the search for cheap arrangements may trace: whichever it takes must be right."""
 
-WHAT_IS_COMPILED = (
-    ("auto", "float64", "inline"),
-    ("auto", "float64", "libm"),
-    ("factored", "float64", "freestanding"),
-    ("auto", "float32", "inline"),
-)
+@dataclass(slots=True)
+class Found:
+    """What one robot showed.
+
+    errors    by what was compared with what
+    states    states at which torques were compared: of base parameters, and of E and P, of every chain made of the robot
+    refused   by chain: psdmc's own words, where the robot's numbers are beyond double precision
+    """
+
+    errors: dict[str, float] = field(default_factory=dict)
+    states: dict[str, int] = field(default_factory=lambda: {"base parameters": 0, "E and P": 0})
+    refused: dict[str, str] = field(default_factory=dict)
 
 
-def measured(seed: int, count: int, *, lowered: bool) -> Errors:
-    """Errors by what was compared with what, of the robot of a seed at `count` random states. Raises whatever psdmc does:
-    nothing is expected to."""
+def measured(seed: int, count: int, *, lowered: bool) -> Found:
+    """The robot of a seed at `count` random states, lowered and compiled as well where asked. Raises whatever psdmc does:
+    nothing is expected to, but refusals of robots of many scales."""
     robot = random_robot(seed)
     states = random_states(seed, len(robot.joints), count)
-    as_written = Pinocchio.of_text(robot.text).torques(*states)
-    errors = {"MuJoCo, Pinocchio": error(MuJoCo(robot.text).torques(*states), as_written)}
+    found = Found()
+    as_written = _reference(robot, Pinocchio.of_text(robot.text), states)
+    if not robot.is_mixed:
+        _of_mujoco(robot, as_written, found)
     exact = load_robot_text(robot.text, "urdf", snap=0.0)
-    errors |= _of_chain(exact.chain, "snap 0", states, as_written, lowered)
     snapped = load_robot_text(robot.text, "urdf", snap=DEFAULT_SNAP)
+    chains = {"snap 0": (exact.chain, as_written)}
     if snapped.snap_report:
-        reference = Pinocchio.of_chain(snapped.chain).torques(*states)
-        errors |= _of_chain(snapped.chain, "snapped", states, reference, lowered)
-    return errors
+        chains["snapped"] = (snapped.chain, _reference(robot, Pinocchio.of_chain(snapped.chain), states))
+    turn = _turn(seed)
+    for k, (name, (chain, reference)) in enumerate(chains.items()):
+        try:
+            _of_chain(chain, name, reference, found, turn if lowered and k == turn % len(chains) else None)
+        except DerivationError as refusal:
+            if not robot.is_mixed:
+                raise
+            found.refused[name] = str(refusal)
+    return found
 
 
-def failures(errors: Errors) -> Errors:
+def _reference(robot: RandomRobot, oracle: Pinocchio, states: States) -> Reference:
+    return Reference.of(Textbook(oracle) if robot.is_mixed else oracle, states)
+
+
+def failures(errors: dict[str, float]) -> dict[str, float]:
     """The errors that do not pass, NaN included."""
     return {what: e for what, e in errors.items() if not e <= limit_of(what)}
 
@@ -73,51 +84,55 @@ def limit_of(what: str) -> float:
     return SINGLE_LIMIT if "float32" in what else LIMIT
 
 
-def random_states(seed: int, n: int, count: int) -> States:
-    rng = np.random.default_rng([20, seed])
-    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (count, n)) for limit in RANGES)
-    return q, qd, qdd
+def _turn(seed: int) -> int:
+    """Which chain of a lowered robot is lowered and with which options: each in turn, whatever seeds are lowered."""
+    return int(np.random.default_rng([40, seed]).integers(1_000_000))
 
 
-def error(found: Array, expected: Array) -> float:
-    """Largest difference of any joint, relative to that joint's largest torque over the states."""
-    largest = np.abs(expected).max(axis=0)
-    return float((np.abs(found - expected).max(axis=0) / np.where(largest > 0, largest, 1.0)).max())
+def _of_mujoco(robot: RandomRobot, reference: Reference, found: Found) -> None:
+    """Not of robots of many scales: MuJoCo refuses masses and inertias below 1e-15."""
+    mujoco = MuJoCo(robot.text)
+    q, qd, _ = reference.few
+    found.errors |= {
+        "MuJoCo, Pinocchio inverse_dynamics": reference.torque_error(
+            mujoco.torques(*reference.states), reference.tau
+        ),
+        "MuJoCo, Pinocchio mass_matrix": reference.mass_error(mujoco.mass_matrix(q)),
+        "MuJoCo, Pinocchio nonlinear_effects": reference.torque_error(
+            mujoco.nonlinear_effects(q, qd), reference.nonlinear
+        ),
+    }
 
 
-def _of_chain(chain, name: str, states: States, expected: Array, lowered: bool) -> Errors:
-    plain = derive_model(chain, expand=False)
-    errors = {f"{name}, base parameters": error(plain.inverse_dynamics(*states), expected)}
-    model = plain
-    if len(chain) <= EXPANDED_JOINTS:
-        model = derive_model(chain)
-        part = slice(0, max(1, min(len(expected), VALUES // model.p)))
-        found = model.inverse_dynamics(*(vector[part] for vector in states))
-        largest = np.abs(expected).max(axis=0)
-        errors[f"{name}, E and P"] = float((np.abs(found - expected[part]).max(axis=0) / largest).max())
-    errors[f"{name}, certificate"] = float(model.certificate.max())
-    if lowered:
-        with mock.patch.object(kernels, "Search", partial(search.Search, budget=BUDGET)):
-            errors |= {f"{name}, {what}": e for what, e in _lowered(model, states, expected)}
-    return errors
+def _of_chain(chain: Chain, name: str, reference: Reference, found: Found, turn: int | None) -> None:
+    expands = len(chain) <= EXPANDED_JOINTS
+    model = derive_model(chain, expand=expands)
+    plain = replace(model, E=None, P=None) if expands else model
+    plain = replace(plain, certificate=certificate(plain))
+    kinds = {"base parameters": plain} | ({"E and P": model} if expands else {})
+    for kind, one in kinds.items():
+        errors, states = _of_model(one, reference)
+        found.errors |= {f"{name}, {kind} {what}": e for what, e in errors.items()}
+        found.states[kind] += states
+    if turn is not None:
+        found.errors |= {f"{name}, {what}": e for what, e in lowered_errors(model, reference, turn)}
 
 
-def _lowered(model: DynamicsModel, states: States, expected: Array) -> Iterator[tuple[str, float]]:
-    """PROGRAMs interpreted, by both lowerings and in both forms; and the compiled C."""
-    given = dict(zip(("q", "qd", "qdd"), states, strict=True)) | {"theta_b": model.theta_b}
-    small = model.p is not None and model.p <= kernels.EXPANDED_LIMIT
-    for lowering in ("factored", "expanded") if small else ("factored",):
-        for name, kernel in lower(model, lowering, ["inverse_dynamics"]).items():
-            for form in ("single", "batch"):
-                found = interpret(getattr(kernel, form), given, {"tau": model.n})["tau"]
-                yield f"PROGRAM {lowering} {name} {form}", error(found, expected)
-    for lowering, real, trig in WHAT_IS_COMPILED:
-        robot = compile(model, lowering, ["inverse_dynamics"], real, trig)
-        for label, theta in (("", {}), (" theta", {"theta_b": model.theta_b})):
-            found = np.asarray(robot.inverse_dynamics(*states, **theta), dtype=np.float64)
-            yield f"C {lowering} {real} {trig}{label}", error(found, expected)
+def _of_model(model: DynamicsModel, reference: Reference) -> tuple[dict[str, float], int]:
+    """Errors in NumPy, and at how many states torques were compared."""
+    count = len(reference.tau) if model.p is None else max(1, min(len(reference.tau), VALUES // model.p))
+    torques = model.inverse_dynamics(*(vector[:count] for vector in reference.states))
+    q, qd, _ = reference.few
+    return {
+        "inverse_dynamics": reference.torque_error(torques, reference.tau[:count]),
+        "mass_matrix": reference.mass_error(model.mass_matrix(q)),
+        "nonlinear_effects": reference.torque_error(model.nonlinear_effects(q, qd), reference.nonlinear),
+        "gravity": reference.torque_error(model.gravity(q), reference.gravity),
+        "certificate": float(model.certificate.max()),
+    }, count
 
 
 def described(robot: RandomRobot) -> str:
     tilts = f", tilts {min(robot.tilts):.1g} to {max(robot.tilts):.1g} rad" if robot.tilts else ""
-    return f"{len(robot.joints)} joints, {robot.style}{tilts}"
+    mixed = ", of many scales" if robot.is_mixed else ""
+    return f"{len(robot.joints)} joints, {robot.style}{tilts}{mixed}"

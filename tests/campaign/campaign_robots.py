@@ -33,13 +33,29 @@ JOINT_SHARES = (1, 2, 3, 3, 3, 4, 2, 2, 2)
 
 LARGEST = len(JOINT_SHARES)
 
+MIXED = 10, 7
+"""Robots whose seed leaves this remainder are of many scales:"""
+
+SHRUNK, WEIGHED = (1e-6, 1.0), (1e-3, 1e3)
+"""every link's lengths (its body's, and the way to the next joint), and its mass besides, are multiplied by factors drawn
+log-uniformly from these."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Factors of one link's lengths and mass."""
+
+    length: float = 1.0
+    mass: float = 1.0
+
 
 @dataclass(frozen=True, slots=True)
 class RandomRobot:
     """A robot's file.
 
-    joints   their names, base to tip
-    tilts    rad, the tilts drawn, zeros left out
+    joints    their names, base to tip
+    tilts     rad, the tilts drawn, zeros left out
+    is_mixed  links a million times as long, or as heavy, as their neighbours
     """
 
     seed: int
@@ -47,6 +63,7 @@ class RandomRobot:
     style: str
     joints: tuple[str, ...]
     tilts: tuple[float, ...]
+    is_mixed: bool
 
 
 def random_robot(seed: int) -> RandomRobot:
@@ -54,29 +71,42 @@ def random_robot(seed: int) -> RandomRobot:
     rng = np.random.default_rng([10, seed])
     n = int(rng.choice(np.arange(1, LARGEST + 1), p=np.array(JOINT_SHARES) / sum(JOINT_SHARES)))
     style = str(rng.choice(STYLES))
+    is_mixed = seed % MIXED[0] == MIXED[1]
+    scales = _scales(seed, n) if is_mixed else (Scale(),) * n
     tilts: list[float] = []
     parts = ["<link name='base'/>"]
     previous = "base"
     for k in range(n):
         kind = str(rng.choice(KINDS, p=KIND_SHARES))
         if k and rng.random() < 0.15:
-            parts += [_fixed(rng, k, previous, tilts), _link(rng, f"plate{k}", 0.4)]
+            parts += [
+                _fixed(rng, k, previous, scales[k - 1], tilts),
+                _link(rng, f"plate{k}", 0.4, scales[k - 1]),
+            ]
             previous = f"plate{k}"
-        parts.append(_joint(rng, k, kind, previous, style, tilts))
-        parts.append(_link(rng, f"link{k}", 0.75**k))
+        parts.append(_joint(rng, k, kind, previous, style, scales[max(0, k - 1)], tilts))
+        parts.append(_link(rng, f"link{k}", 0.75**k, scales[k]))
         previous = f"link{k}"
     body = "\n".join(parts)
     text = f"<?xml version='1.0'?>\n<robot name='random{seed}'>\n{body}\n</robot>\n"
-    return RandomRobot(seed, text, style, tuple(f"joint{k}" for k in range(n)), tuple(tilts))
+    return RandomRobot(seed, text, style, tuple(f"joint{k}" for k in range(n)), tuple(tilts), is_mixed)
 
 
-def _fixed(rng: np.random.Generator, k: int, parent: str, tilts: list[float]) -> str:
-    place = _origin(_lengths(rng), _angles(rng, "mixed", tilts))
+def _scales(seed: int, n: int) -> tuple[Scale, ...]:
+    rng = np.random.default_rng([30, seed])
+    pairs = zip(_log_uniform(rng, SHRUNK, n), _log_uniform(rng, WEIGHED, n), strict=True)
+    return tuple(Scale(float(length), float(mass)) for length, mass in pairs)
+
+
+def _fixed(rng: np.random.Generator, k: int, parent: str, scale: Scale, tilts: list[float]) -> str:
+    place = _origin(_lengths(rng) * scale.length, _angles(rng, "mixed", tilts))
     return f"<joint name='mount{k}' type='fixed'><parent link='{parent}'/><child link='plate{k}'/>{place}</joint>"
 
 
-def _joint(rng: np.random.Generator, k: int, kind: str, parent: str, style: str, tilts: list[float]) -> str:
-    place = _origin(_lengths(rng), _angles(rng, style, tilts))
+def _joint(
+    rng: np.random.Generator, k: int, kind: str, parent: str, style: str, scale: Scale, tilts: list[float]
+) -> str:
+    place = _origin(_lengths(rng) * scale.length, _angles(rng, style, tilts))
     limit = "" if kind == "continuous" else "<limit lower='-3' upper='3' effort='100' velocity='3'/>"
     return (
         f"<joint name='joint{k}' type='{kind}'><parent link='{parent}'/><child link='link{k}'/>{place}"
@@ -131,11 +161,11 @@ def _log_uniform(rng: np.random.Generator, limits: tuple[float, float], count: i
     return np.exp(rng.uniform(low, high, count))
 
 
-def _link(rng: np.random.Generator, name: str, size: float) -> str:
+def _link(rng: np.random.Generator, name: str, size: float, scale: Scale) -> str:
     """A physical body: principal moments of a box, centre of mass and axes anywhere."""
-    mass = float(np.round(rng.uniform(1.0, 10.0) * size, 4))
-    a, b, c = rng.uniform(0.05, 0.3, 3) ** 2 * mass / 12.0
-    centre = np.round(rng.uniform(-0.15, 0.15, 3) * (rng.random(3) < 0.8), 4)
+    mass = float(np.round(rng.uniform(1.0, 10.0) * size, 4)) * scale.mass
+    a, b, c = (rng.uniform(0.05, 0.3, 3) * scale.length) ** 2 * mass / 12.0
+    centre = np.round(rng.uniform(-0.15, 0.15, 3) * (rng.random(3) < 0.8), 4) * scale.length
     turn = rng.uniform(-math.pi, math.pi, 3) if rng.random() < 0.5 else np.zeros(3)
     moments = f"ixx='{float(b + c)!r}' iyy='{float(a + c)!r}' izz='{float(a + b)!r}' ixy='0' ixz='0' iyz='0'"
     return (

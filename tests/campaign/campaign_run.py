@@ -1,6 +1,8 @@
 """The differential campaign: random robots through psdmc, Pinocchio and MuJoCo; worst errors and their robots.
 
 python tests/campaign/campaign_run.py --robots 1000          the robots of seeds 0 to 999
+python tests/campaign/campaign_run.py --robots 1000:2000 --journal generated/campaign.jsonl
+                                                             the next thousand, added to what that file holds
 python tests/campaign/campaign_run.py --seed 52 --urdf       one robot again, all its errors and its file
 """
 
@@ -9,72 +11,53 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
+from campaign_journal import Outcome, append, read, report, summary
 from campaign_measure import described, failures, limit_of, measured
 from campaign_robots import random_robot
 
 ROBOTS, STATES, LOWERED_EVERY = 10_000, 1_000, 50
-WORST_KEPT = 5
-"""Robots named for each comparison."""
 
 CHUNK = 4
 """Robots handed to a process at once."""
 
 
-def outcome(seed: int, states: int, lowered: bool) -> dict[str, object]:
+def outcome(seed: int, states: int, every: int, commit: str) -> Outcome:
     """Errors of one robot, or what psdmc raised, as plain JSON values."""
+    started = time.process_time()
+    lowered = is_lowered(seed, every)
+    one: Outcome = {"seed": seed, "commit": commit, "count": states, "lowered": lowered}
+    one["mixed"] = random_robot(seed).is_mixed
     try:
-        errors = measured(seed, states, lowered=lowered)
+        found = measured(seed, states, lowered=lowered)
     except Exception as raised:  # whatever a robot makes psdmc raise is a finding, and the campaign goes on
-        return {"seed": seed, "raised": f"{type(raised).__name__}: {raised}"}
-    return {"seed": seed, "errors": errors, "failed": sorted(failures(errors))}
+        one["raised"] = f"{type(raised).__name__}: {raised}"
+    else:
+        one |= {"states": found.states, "errors": found.errors, "failed": sorted(failures(found.errors))}
+        one |= {"refused": found.refused} if found.refused else {}
+    return one | {"cpu": round(time.process_time() - started, 3)}
 
 
-def outcomes(seeds: range, states: int, every: int, jobs: int) -> Iterator[dict[str, object]]:
-    lowered = [every > 0 and seed % every == 0 for seed in seeds]
-    counts = [states] * len(seeds)
+def is_lowered(seed: int, every: int) -> bool:
+    """One robot in `every`, at another place in each such block, so that robots of every kind are among them."""
+    return every > 0 and seed % every == seed // every % every
+
+
+def outcomes(seeds: Sequence[int], states: int, every: int, jobs: int, commit: str) -> Iterator[Outcome]:
+    one = partial(outcome, states=states, every=every, commit=commit)
     if jobs == 1:
-        yield from map(outcome, seeds, counts, lowered)
+        yield from map(one, seeds)
         return
     with ProcessPoolExecutor(jobs) as pool:
-        yield from pool.map(outcome, seeds, counts, lowered, chunksize=CHUNK)
-
-
-def summary(found: list[dict[str, object]], states: int, seconds: float) -> dict[str, object]:
-    """Worst errors per comparison with their seeds, what raised, what failed."""
-    compared: dict[str, list[tuple[float, int]]] = {}
-    for one in found:
-        for what, error in one.get("errors", {}).items():
-            compared.setdefault(what, []).append((error, one["seed"]))
-    worst = {
-        what: {"robots": len(rows), "limit": limit_of(what), "worst": sorted(rows, reverse=True)[:WORST_KEPT]}
-        for what, rows in sorted(compared.items())
-    }
-    return {
-        "robots": len(found),
-        "states": states * len(found),
-        "seconds": round(seconds, 1),
-        "worst": worst,
-        "raised": {one["seed"]: one["raised"] for one in found if "raised" in one},
-        "failed": {one["seed"]: one["failed"] for one in found if one.get("failed")},
-    }
-
-
-def report(result: dict[str, object]) -> str:
-    lines = [f"{result['robots']} robots, {result['states']} states, {result['seconds']} s"]
-    for what, row in result["worst"].items():
-        seeds = ", ".join(f"{error:.1e} (seed {seed})" for error, seed in row["worst"][:2])
-        lines.append(f"{what:60} {row['robots']:6} robots   limit {row['limit']:.0e}   worst {seeds}")
-    lines += [f"seed {seed} raised {text}" for seed, text in result["raised"].items()]
-    lines += [f"seed {seed} failed: {', '.join(names)}" for seed, names in result["failed"].items()]
-    lines.append("again: python tests/campaign/campaign_run.py --seed SEED --urdf")
-    return "\n".join(lines)
+        yield from pool.map(one, seeds, chunksize=CHUNK)
 
 
 def one_robot(seed: int, states: int, with_urdf: bool) -> int:
@@ -82,49 +65,72 @@ def one_robot(seed: int, states: int, with_urdf: bool) -> int:
     print(f"seed {seed}: {described(robot)}")
     if with_urdf:
         print(robot.text)
-    errors = measured(seed, states, lowered=True)
-    for what, error in errors.items():
-        print(f"{what:60} {error:.2e}{'' if error <= limit_of(what) else '   FAILS'}")
-    return 1 if failures(errors) else 0
+    found = measured(seed, states, lowered=True)
+    for what, error in found.errors.items():
+        print(f"{what:70} {error:.2e}{'' if error <= limit_of(what) else '   FAILS'}")
+    for name, refusal in found.refused.items():
+        print(f"{name}: refused: {refusal}")
+    return 1 if failures(found.errors) else 0
 
 
-def main() -> int:
+def seed_range(text: str) -> range:
+    """'A:B' are the seeds from A up to but not B, 'N' the first N."""
+    first, _, last = text.rpartition(":")
+    return range(int(first or 0), int(last))
+
+
+def this_commit() -> str:
+    """As git has it; 'unknown' outside a checkout."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--robots", type=int, default=ROBOTS)
-    parser.add_argument("--first", type=int, default=0, help="seed of the first robot")
-    parser.add_argument("--states", type=int, default=STATES, help="random states of each robot")
-    parser.add_argument(
-        "--lowered-every",
-        type=int,
-        default=LOWERED_EVERY,
-        help="lower and compile every so many robots; 0: none",
-    )
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--json", type=Path, help="where to write the figures")
-    parser.add_argument("--seed", type=int, help="this robot alone, with everything lowered and compiled")
-    parser.add_argument("--urdf", action="store_true", help="print that robot's file")
-    chosen = parser.parse_args()
+    add = parser.add_argument
+    add("--robots", type=seed_range, default=range(ROBOTS), help="seeds of robots: N or A:B")
+    add("--states", type=int, default=STATES, help="random states of each robot")
+    add("--lowered-every", type=int, default=LOWERED_EVERY, help="lower and compile one in so many; 0: none")
+    add("--jobs", type=int, default=os.cpu_count() or 1)
+    add("--journal", type=Path, help="file of outcomes: seeds that it holds are not run again")
+    add("--json", type=Path, help="where to write the figures of all that the journal holds")
+    add("--commit", default=this_commit(), help="what the journal says was run")
+    add("--seed", type=int, help="this robot alone, with everything lowered and compiled")
+    add("--urdf", action="store_true", help="print that robot's file")
+    return parser.parse_args()
+
+
+def main() -> int:
+    chosen = arguments()
     # Kernels found with a short search must not stay in the user's cache.
-    with tempfile.TemporaryDirectory() as cache:
-        os.environ["PSDMC_CACHE_DIR"] = cache
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["PSDMC_CACHE_DIR"] = str(Path(folder) / "cache")
         if chosen.seed is not None:
             return one_robot(chosen.seed, chosen.states, chosen.urdf)
-        started = time.perf_counter()
-        seeds = range(chosen.first, chosen.first + chosen.robots)
-        found = []
-        for one in outcomes(seeds, chosen.states, chosen.lowered_every, chosen.jobs):
-            found.append(one)
-            if "raised" in one or one["failed"]:
-                print(one, flush=True)
-            elif len(found) % 100 == 0:
-                print(f"{len(found)} of {len(seeds)}", flush=True)
-    result = summary(found, chosen.states, time.perf_counter() - started)
+        journal = chosen.journal or Path(folder) / "journal"
+        _run(chosen, journal)
+        result = summary(read(journal).values())
     print(report(result))
     if chosen.json:
         chosen.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     return 1 if result["raised"] or result["failed"] else 0
+
+
+def _run(chosen: argparse.Namespace, journal: Path) -> None:
+    known = read(journal)
+    seeds = [seed for seed in chosen.robots if seed not in known]
+    ran = outcomes(seeds, chosen.states, chosen.lowered_every, chosen.jobs, chosen.commit)
+    for count, one in enumerate(ran, 1):
+        append(journal, one)
+        if "raised" in one or one["failed"]:
+            print(one, flush=True)
+        elif count % 100 == 0:
+            print(f"{count} of {len(seeds)}", flush=True)
 
 
 if __name__ == "__main__":

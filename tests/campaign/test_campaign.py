@@ -5,38 +5,52 @@ from __future__ import annotations
 import math
 
 import pytest
-from campaign_measure import EXPANDED_JOINTS, failures, measured
+from campaign_journal import append, read, report, summary
+from campaign_lowered import FUNCTIONS
+from campaign_measure import EXPANDED_JOINTS, Found, failures, measured
+from campaign_oracles import Pinocchio, Textbook
+from campaign_reference import Reference, random_states
 from campaign_robots import LARGEST, STYLES, TILTS, random_robot
-from campaign_run import outcome, report, summary
+from campaign_run import is_lowered, outcome, seed_range
 
 SEEDS = range(40)
 STATES = 40
 
 
+def failing(seed: int, *, lowered: bool = False) -> dict[str, float]:
+    return failures(measured(seed, STATES, lowered=lowered).errors)
+
+
 @pytest.mark.parametrize("seed", [seed for seed in SEEDS if len(random_robot(seed).joints) < EXPANDED_JOINTS])
 def test_a_random_robot(seed: int) -> None:
-    assert failures(measured(seed, STATES, lowered=False)) == {}
+    assert failing(seed) == {}
 
 
-@pytest.mark.parametrize("seed", [453, 989])
+@pytest.mark.parametrize("seed", [453, 989, 317, 577, 2057])
 def test_robots_that_the_campaign_found(seed: int) -> None:
-    """989: a column of size 1e-9 as a pivot, E and P off by 5e-11."""
-    assert failures(measured(seed, STATES, lowered=False)) == {}
+    """989: a column of size 1e-9 as a pivot, E and P off by 5e-11. Of many scales: 317, coefficients of 1e-15 left out,
+    4e-10; 577, base parameters by double precision, 3e-11; 2057, a heavy link's inertia in a light one's base parameter,
+    7e-10."""
+    assert failing(seed) == {}
 
 
 def test_a_robot_whose_carriers_the_campaign_found_wrong(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     """2035: 25 carriers by singular values where there are 24, and a PROGRAM off by 2.5e-10."""
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr("campaign_measure.WHAT_IS_COMPILED", ())
-    assert failures(measured(2035, STATES, lowered=True)) == {}
+    monkeypatch.setattr("campaign_lowered._compiled", lambda *_: iter(()))
+    assert failing(2035, lowered=True) == {}
 
 
-def test_a_random_robot_lowered_and_compiled(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("mixed", [False, True])
+def test_a_random_robot_lowered_and_compiled(mixed: bool, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
-    seed = next(seed for seed in SEEDS if len(random_robot(seed).joints) == 2)
-    errors = measured(seed, STATES, lowered=True)
+    robots = map(random_robot, range(400))
+    seed = next(robot.seed for robot in robots if len(robot.joints) == 2 and robot.is_mixed is mixed)
+    errors = measured(seed, STATES, lowered=True).errors
     assert failures(errors) == {}
-    assert any("float32" in what for what in errors)
+    for function in FUNCTIONS:
+        assert any(what.endswith(f"C auto float64 inline {function}") for what in errors)
+        assert any(f"PROGRAM factored {function} batch" in what for what in errors)
 
 
 def test_robots_are_of_all_kinds() -> None:
@@ -60,12 +74,45 @@ def test_what_does_not_pass_is_named() -> None:
 
 
 def test_what_psdmc_raises_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(seed: int, states: int, *, lowered: bool) -> dict[str, float]:
+    def broken(seed: int, states: int, *, lowered: bool) -> Found:
         raise ValueError("broken")
 
-    good = outcome(3, 5, False)
+    good = outcome(3, 5, 0, "here")
     monkeypatch.setattr("campaign_run.measured", broken)
-    result = summary([good, outcome(4, 5, False)], 5, 1.0)
+    result = summary([good, outcome(4, 5, 0, "there")])
     assert result["raised"] == {4: "ValueError: broken"}
+    assert result["commits"] == {"here": 1, "there": 1}
+    assert result["states"] == 5
     assert "seed 4 raised ValueError: broken" in report(result)
-    assert result["worst"]["snap 0, base parameters"]["worst"][0][1] == 3
+    assert result["worst"]["snap 0, base parameters inverse_dynamics"]["worst"][0][1] == 3
+
+
+def test_pieces_add_up_and_an_unfinished_line_does_not_count(tmp_path) -> None:
+    journal = tmp_path / "journal"
+    append(journal, outcome(3, 5, 0, "first"))
+    with journal.open("a") as file:
+        file.write('{"seed": 4, "err')
+    append(journal, outcome(5, 5, 0, "second"))
+    assert sorted(read(journal)) == [3, 5]
+    assert summary(read(journal).values())["states"] == 10
+
+
+def test_seeds_and_which_are_lowered() -> None:
+    assert seed_range("40") == range(40)
+    assert seed_range("20:40") == range(20, 40)
+    lowered = [seed for seed in range(10_000) if is_lowered(seed, 50)]
+    assert len(lowered) == 200
+    assert sum(random_robot(seed).is_mixed for seed in lowered) == 20
+
+
+def test_the_textbook_agrees_with_pinocchio() -> None:
+    for seed in (0, 1, 3, 4):
+        robot = random_robot(seed)
+        oracle = Pinocchio.of_text(robot.text)
+        states = random_states(seed, len(robot.joints), STATES)
+        reference = Reference.of(Textbook(oracle), states)
+        q, qd, _ = reference.few
+        assert reference.torque_error(oracle.torques(*states), reference.tau) < 1e-13
+        assert reference.mass_error(oracle.mass_matrix(q)) < 1e-13
+        assert reference.torque_error(oracle.nonlinear_effects(q, qd), reference.nonlinear) < 1e-13
+        assert reference.torque_error(oracle.gravity(q), reference.gravity) < 1e-13

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio
 import pytest
 from bundled import bundled_model, bundled_robot
 
+from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix
+from psdmc.robot.load import load_robot_text
 from psdmc.robot.reference import reference
 
 ROBOTS = ("denso_floor", "denso_wall", "kr6", "lbr7", "rounded_arm", "scara", "two_link", "two_link_full")
@@ -65,3 +68,39 @@ def test_poses_keep_the_joint_limits():
 
 def test_unknown_parameters_are_not_tested():
     assert check_mass_matrix(replace(bundled_model("scara"), theta_b=None)) is None
+
+
+FINGER = """<robot name="finger"><link name="base"/>
+<link name="arm"><inertial><origin xyz="0.5 0 0"/><mass value="{arm}"/>
+  <inertia ixx="10" iyy="80" izz="80" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="tip"><inertial><origin xyz="{length} 0 0"/><mass value="1e-3"/>
+  <inertia ixx="{small}" iyy="{small}" izz="{small}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+  <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<joint name="knuckle" type="revolute"><parent link="arm"/><child link="tip"/><origin xyz="1 0 0" rpy="0.3 0.2 0"/>
+  <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+
+
+def test_a_finger_on_a_heavy_arm_has_a_mass_matrix():
+    """Inertias of 330 and 2e-15 kg m^2, both there: Pinocchio's Cholesky factor has pivots that multiply to what the
+    closed form says."""
+    text = FINGER.format(arm=1000, length=1e-6, small=1e-15)
+    found = check_mass_matrix(derive_model(load_robot_text(text, "urdf").chain))
+    assert found is not None
+
+    model = pinocchio.buildModelFromXML(text)
+    mass = pinocchio.crba(model, model.createData(), found.pose)
+
+    assert mass[1, 1] == pytest.approx(2e-15)
+    assert mass[0, 0] * mass[1, 1] > 100 * mass[0, 1] ** 2
+    assert found.passed
+
+
+def test_a_joint_that_moves_a_point_on_its_own_axis_has_no_inertia():
+    """What turning the point's frame leaves is rounding, however small the rest is."""
+    text = FINGER.format(arm=1, length=0, small=0)
+    found = check_mass_matrix(derive_model(load_robot_text(text, "urdf").chain))
+
+    assert found is not None
+    assert found.failing == 2000
+    assert "'knuckle'" in found.reason

@@ -1,10 +1,13 @@
 """`make test-sanitize`: every tool of sanitizers.py on every package of CASES; a table of what was built, called and found.
 
 Status 0 where nothing was found. Tools that are not installed are listed.
+
+python tests/toolchain/sanitize_campaign.py --jobs 1 scara     one robot, one build at a time
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 import tempfile
@@ -41,7 +44,12 @@ def packages(robots: tuple[str, ...]) -> Iterator[tuple[str, PackageView]]:
 
 
 def main() -> int:
-    robots = tuple(sys.argv[1:]) or ROBOTS
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("robots", nargs="*", choices=ROBOTS, help="default: all", default=[*ROBOTS])
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    chosen = parser.parse_args()
     found: list[tuple[str, Outcome]] = []
 
     def one(job: tuple[str, PackageView, Tool]) -> None:
@@ -54,8 +62,12 @@ def main() -> int:
         )
         print(f"{name}: {tool.name}: {outcome.calls} calls: {state}", flush=True)
 
-    jobs = [(name, package, tool) for name, package in packages(robots) for tool in (*DYNAMIC, *STATIC)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    jobs = [
+        (name, package, tool)
+        for name, package in packages(tuple(chosen.robots))
+        for tool in (*DYNAMIC, *STATIC)
+    ]
+    with ThreadPoolExecutor(chosen.jobs) as pool:
         list(pool.map(one, jobs))
     return _report(found)
 

@@ -1,0 +1,97 @@
+"""A model's PROGRAMs interpreted and its C compiled, against Pinocchio."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from unittest import mock
+
+import numpy as np
+from campaign_reference import Reference
+from psdmc.program.functions import BY_NAME, Function
+
+from psdmc.compiler import compile
+from psdmc.lower import kernels, search
+from psdmc.lower.kernels import lower
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.interpret import interpret
+
+Array = np.ndarray
+
+BUDGET = 6
+"""Programs that the search for cheap arrangements may trace: whichever it takes must be right."""
+
+INVERSE = "inverse_dynamics"
+FUNCTIONS = (INVERSE, "forward_dynamics", "mass_matrix", "nonlinear_effects", "gravity", "regressor")
+
+ALWAYS = ("auto", "float64", "inline")
+IN_TURN = (
+    ("auto", "float64", "libm"),
+    ("factored", "float64", "freestanding"),
+    ("auto", "float32", "inline"),
+    ("expanded", "float64", "inline"),
+    ("auto", "float32", "libm"),
+)
+"""Lowering, precision and sine of the builds: the first for every robot, of the others one each, of SOLVED alone."""
+
+SOLVED = (INVERSE, "forward_dynamics")
+"""Between them they run the arithmetic of all others but the regressor."""
+
+
+def lowered_errors(model: DynamicsModel, reference: Reference, turn: int) -> Iterator[tuple[str, float]]:
+    """Errors of the PROGRAMs of every function in both forms, and of two builds; `turn` chooses the second."""
+    second = IN_TURN[turn % len(IN_TURN)]
+    if second[0] == "expanded" and not _is_small(model):
+        second = (*ALWAYS[:2], "freestanding")
+    with mock.patch.object(kernels, "Search", partial(search.Search, budget=BUDGET)):
+        yield from _interpreted(model, reference)
+        yield from _compiled(model, reference, ALWAYS, FUNCTIONS)
+        yield from _compiled(model, reference, second, SOLVED)
+
+
+def _is_small(model: DynamicsModel) -> bool:
+    return model.p is not None and model.p <= kernels.EXPANDED_LIMIT
+
+
+def _interpreted(model: DynamicsModel, reference: Reference) -> Iterator[tuple[str, float]]:
+    """By both lowerings, with the parameters inside and as an argument, one state and lanes."""
+    for lowering in ("factored", "expanded") if _is_small(model) else ("factored",):
+        for name, kernel in lower(model, lowering, FUNCTIONS).items():
+            function = kernel.function
+            given = _arguments(function, reference) | {"theta_b": model.theta_b}
+            sizes = {function.output: function.size(model.n, model.l), "pivot": model.n}
+            for form in ("single", "batch"):
+                found = interpret(getattr(kernel, form), given, sizes)[function.output]
+                yield f"PROGRAM {lowering} {name} {form}", _error(function, found, reference, model)
+
+
+def _compiled(
+    model: DynamicsModel, reference: Reference, build: Sequence[str], functions: Sequence[str]
+) -> Iterator[tuple[str, float]]:
+    lowering, real, trig = build
+    robot = compile(model, lowering, functions, real, trig)
+    for function in (BY_NAME[name] for name in functions):
+        arguments = _arguments(function, reference).values()
+        for label, theta in (("", {}), (" theta", {"theta_b": model.theta_b}))[: 1 + function.theta]:
+            found = np.asarray(getattr(robot, function.name)(*arguments, **theta), dtype=np.float64)
+            error = _error(function, found, reference, model)
+            yield f"C {lowering} {real} {trig} {function.name}{label}", error
+
+
+def _arguments(function: Function, reference: Reference) -> dict[str, Array]:
+    """By name and in order. Forward dynamics gets the torques of known accelerations."""
+    states = reference.states if function.name == INVERSE else reference.few
+    given = dict(zip(("q", "qd", "qdd"), states, strict=True)) | {"tau": reference.tau[: len(states[0])]}
+    return {name: given[name] for name in function.inputs}
+
+
+def _error(function: Function, found: Array, reference: Reference, model: DynamicsModel) -> float:
+    count, n = len(found), model.n
+    if function.name == "forward_dynamics":
+        return reference.acceleration_error(found)
+    if function.name == "mass_matrix":
+        return reference.mass_error(found.reshape(count, n, n))
+    if function.name == "regressor":
+        found = found.reshape(count, n, model.l) @ model.theta_b
+    expected = {"nonlinear_effects": reference.nonlinear, "gravity": reference.gravity}
+    return reference.torque_error(found, expected.get(function.name, reference.tau[:count]))
