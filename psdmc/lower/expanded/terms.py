@@ -116,14 +116,18 @@ def _stacked(E: NDArray[np.uint8], weights: Entries, width: int) -> tuple[Terms,
 
 
 def mass_matrix_terms(torque: Terms, n: int) -> Terms:
-    """M[i, j], i <= j, as output i * n + j: what multiplies qdd[j] in tau[i]."""
+    """M[i, j], i <= j, as output i * n + j: what multiplies qdd[j] in tau[i], or qdd[i] in tau[j], out of the torque whose
+    coefficients are known the better: what is nothing beside an arm's inertia may be much of its finger's."""
     accelerations = torque.exponents[4 * n : 5 * n]
-    column = np.argmax(accelerations, axis=0)
-    upper = accelerations.any(axis=0) & (column >= torque.output)
+    own, other = torque.output, np.argmax(accelerations, axis=0)
+    doubt = np.zeros(n)
+    np.maximum.at(doubt, own, torque.uncertainty)
+    is_better = (doubt[own] < doubt[other]) | ((doubt[own] == doubt[other]) & (own <= other))
     exponents = torque.exponents.copy()
     exponents[4 * n : 5 * n] = 0
-    entries = Terms(torque.output * n + column, exponents, torque.coefficient, torque.uncertainty)
-    return entries.where(upper)
+    output = np.minimum(own, other) * n + np.maximum(own, other)
+    entries = Terms(output, exponents, torque.coefficient, torque.uncertainty)
+    return entries.where(accelerations.any(axis=0) & is_better)
 
 
 def nonlinear_terms(torque: Terms, n: int) -> Terms:
