@@ -43,11 +43,27 @@ class InternalError(Exception):
     """A broken invariant inside psdmc; never the input's fault."""
 
 
+INTERRUPTED_STATUS = 130
+"""Of a process that Ctrl-C ended, as shells say it: 128 + SIGINT."""
+
+
 def exit_status_of(action: Callable[[], int | None]) -> int:
-    """Run `action`, for `python -m` modules; its status (None: 0), or that of its PsdmcError, whose message and hint
-    are printed to standard error, a line each."""
+    """Run `action`, for `python -m` modules; its status (None: 0), or that of what ended it: a PsdmcError, Ctrl-C, or a
+    standard output that takes no more. The reason is printed to standard error, a line, its hint below."""
     try:
-        return action() or 0
+        status = action() or 0
+        sys.stdout.flush()
+        return status
     except PsdmcError as error:
-        print(f"error: {error.message}", f"hint: {error.hint}", sep="\n", file=sys.stderr)
-        return error.exit_status
+        return _failed(error.message, error.hint, error.exit_status)
+    except KeyboardInterrupt:
+        return _failed("interrupted", None, INTERRUPTED_STATUS)
+    except OSError as error:
+        where = error.filename or "standard output"
+        sys.stdout = None  # what is left in its buffer cannot be said either
+        return _failed(f"{where}: {error.strerror}", "free some space", ToolchainError.exit_status)
+
+
+def _failed(message: str, hint: str | None, status: int) -> int:
+    print(f"error: {message}", *([f"hint: {hint}"] if hint else []), sep="\n", file=sys.stderr)
+    return status

@@ -74,7 +74,7 @@ ROOMS = {
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
-SHARED = {"errors", "version", "atomic"}
+SHARED = {"errors", "version", "atomic", "processes"}
 ENTRY_POINTS = {"__init__", "__main__"}
 
 

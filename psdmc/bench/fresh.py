@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.processes import in_a_new_process
 from psdmc.robot.chain import Chain
 
 if sys.platform != "win32":
@@ -31,9 +30,7 @@ class Derivation:
 
 def derive_fresh(chain: Chain) -> Derivation:
     """Derive in a new process; without E and P where they do not fit into memory."""
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, mp_context=spawn) as pool:
-        return pool.submit(measured_derivation, chain).result()
+    return in_a_new_process(measured_derivation, chain)
 
 
 def measured_derivation(chain: Chain) -> Derivation:

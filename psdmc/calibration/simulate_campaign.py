@@ -10,7 +10,6 @@ from pathlib import Path
 
 from psdmc.atomic import make_folder, write_whole
 from psdmc.calibration.campaign_file import ListedRun, listed_runs
-from psdmc.calibration.identify.workers import in_processes
 from psdmc.calibration.logs.log_bag import is_folder
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.logs.wording import listed
@@ -19,6 +18,7 @@ from psdmc.calibration.plant import plant_file, virtual_robot
 from psdmc.calibration.plant.plant_file import plant_texts
 from psdmc.calibration.plant.virtual_robot import Payload, VirtualRobot, load_virtual_robot, simulate
 from psdmc.errors import InputError
+from psdmc.processes import in_processes
 
 INDEX = "simulated.json"
 LARGEST_SEED = 2**31

@@ -11,6 +11,7 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from command_line import files_in, typed
 from killable import run
 from test_killed import a_log, built_package
 
+from psdmc.bench.machine import this_machine
+from psdmc.bench.results import BenchResult
 from psdmc.compiler import compile as compile_model
 
 KILOBYTES_LEFT = 2
@@ -109,6 +112,46 @@ def test_a_full_cache_disk_is_one_line(tmp_path: Path, full_after, monkeypatch: 
     assert status == 4, said
     assert [line.split(":")[0] for line in said.splitlines()] == ["error", "hint"], said
     assert not [path for path in (tmp_path / "cache").glob("*") if path.name.startswith(".")]
+
+
+@pytest.mark.parametrize("options", [["--json", "x.json"], ["--report", "x.html"]])
+def test_a_full_disk_under_what_was_measured(
+    options: list[str], tmp_path: Path, full_after, monkeypatch: pytest.MonkeyPatch
+):
+    measured = BenchResult(this_machine(), {f"rival {k}": "1.0" for k in range(200)}, 1, 1, ())
+    monkeypatch.setattr("psdmc.cli.measuring.run", lambda *_: measured)
+    folder = tmp_path / "work"
+    folder.mkdir()
+    model_into(folder)
+    (folder / options[1]).write_text("old")
+    before = files_in(folder)
+
+    full_after(TOO_LITTLE)
+    status = run(["bench", "m.npz", *options], folder)
+
+    said = (tmp_path / "work.said").read_text(encoding="utf-8")
+    assert status == 4, said
+    assert [line.split(":")[0] for line in said.splitlines()[-2:]] == ["error", "hint"], said
+    assert "Traceback" not in said
+    assert files_in(folder) == before
+
+
+def test_a_full_disk_behind_the_benchmarks_table(tmp_path: Path):
+    """`python -m psdmc.bench > table`."""
+    code = (
+        "import sys; from psdmc.bench import __main__ as bench; from psdmc.bench.results import BenchResult\n"
+        "from psdmc.bench.machine import this_machine\n"
+        "bench.standard_cases = lambda *_, **__: []; sys.argv = ['bench', '--quick']\n"
+        "bench.run = lambda *_: BenchResult(this_machine(), {}, 1, 1, ())\n"
+        "sys.exit(bench.main())"
+    )
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 4
+    assert done.stderr.splitlines()[0].startswith("error: standard output: No space left")
+    assert [line.split(":")[0] for line in done.stderr.splitlines()] == ["error", "hint"]
 
 
 @pytest.fixture

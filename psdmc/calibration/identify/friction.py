@@ -21,8 +21,8 @@ from psdmc.calibration.identify.steps import (
     StepOptions,
     StepQuality,
 )
-from psdmc.calibration.identify.workers import in_processes
 from psdmc.calibration.logs.log import Array
+from psdmc.processes import in_processes
 from psdmc.robot.chain import Chain
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from psdmc.calibration.identify.workers import in_processes
+from psdmc.processes import in_a_new_process, in_processes
 
 
 def process_of(job: int) -> tuple[int, int]:
@@ -37,13 +37,19 @@ def test_an_error_of_a_job_is_the_callers():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def test_a_single_job_can_have_a_process_of_its_own():
+    job, process = in_a_new_process(process_of, 3)
+    assert job == 3
+    assert process != os.getpid()
+
+
 HANGING = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from psdmc.calibration.identify.workers import in_processes
+from psdmc.processes import in_processes
 from psdmc.cli.interrupt import Interrupted, as_error
-from test_workers import hang
+from test_processes import hang
 
 if __name__ == "__main__":
     try:
@@ -75,3 +81,31 @@ def test_ctrl_c_ends_the_workers_without_a_word(tmp_path: Path):
     os.killpg(process.pid, signal.SIGINT)
 
     assert process.communicate(timeout=30) == ("interrupted\n", "")
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="children are found in /proc")
+def test_ctrl_c_while_the_benchmark_derives_is_one_line(tmp_path: Path):
+    """As soon as the process that derives is there: it is importing then."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "psdmc.bench", "--quick", "KR6"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while not _is_spawning(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    time.sleep(0.5)
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+
+    words = [line for line in said.splitlines() if " s  " not in line]
+    assert words == ["error: interrupted"]
+    assert process.returncode == 130
+
+
+def _is_spawning(process: int) -> bool:
+    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    return any(b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes() for child in children)

@@ -22,6 +22,16 @@ def in_processes(work: Callable[[Job], Result], jobs: Sequence[Job], workers: in
     if workers <= 1 or len(jobs) <= 1:
         yield from map(work, jobs)
         return
+    yield from _elsewhere(work, jobs, workers)
+
+
+def in_a_new_process(work: Callable[[Job], Result], job: Job) -> Result:
+    """`work` of one job, in a process that has done nothing before; ended with this one's by Ctrl-C."""
+    (result,) = _elsewhere(work, [job], 1)
+    return result
+
+
+def _elsewhere(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
         with _deaf_to_interrupts():
             results = pool.map(work, jobs)
