@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -14,6 +15,7 @@ from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, LARGEST_STORED, d
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_date import date_of
 from psdmc.calibration.logs.mcap_size import require_mcap_size
+from psdmc.calibration.logs.packed_bag import PACKED, require_packed_file, require_packed_messages
 from psdmc.calibration.logs.row_store import RowStore
 from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
 from psdmc.calibration.logs.table_limits import (
@@ -30,6 +32,8 @@ BAGS = (".db3", ".mcap")
 METADATA = "metadata.yaml"
 LARGEST_METADATA = 1024**2
 """Bytes of a bag's metadata.yaml: thousands of topics."""
+PLAIN_MODE = re.compile(r"^\s*compression_mode:\s*(['\"]?)(none|file|)\1\s*$", re.MULTILINE)
+"""The line of metadata, in lower case, of a bag whose messages are not packed."""
 STEPS_PER_BYTE = 100
 """SQLite's instructions per byte of a bag; honest ones take less than one."""
 STEPS = 1_000_000
@@ -49,6 +53,10 @@ def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) 
             pass
         if file.suffix.lower() == ".mcap":
             require_mcap_size(file)
+        if file.suffix.lower() == PACKED:
+            require_packed_file(file)
+        elif _packs_messages(file.parent):
+            require_packed_messages(file)
     with decoding(str(path), "a ROS 2 bag"):
         names, stamps, store, has_velocity = _kept(path, topic, held)
     name = path.name or str(path)
@@ -108,7 +116,7 @@ def _files(path: Path) -> tuple[Path, ...]:
     """The files that reading a bag opens; InputError where a folder is no bag."""
     if not is_folder(path):
         return (path,)
-    found = tuple(sorted(entry for entry in path.iterdir() if entry.suffix.lower() in BAGS))
+    found = tuple(sorted(entry for entry in path.iterdir() if entry.suffix.lower() in (*BAGS, PACKED)))
     if not (path / METADATA).exists():
         raise InputError(
             f"{path}: a folder without {METADATA}, so no ROS 2 bag, and without campaign.toml, so no campaign",
@@ -117,6 +125,16 @@ def _files(path: Path) -> tuple[Path, ...]:
     with opened(path / METADATA, LARGEST_METADATA):
         pass
     return found
+
+
+def _packs_messages(folder: Path) -> bool:
+    """Whether a bag's metadata may say that its messages are packed one by one: YAML has many ways to write a word."""
+    try:
+        with (folder / METADATA).open("rb") as file:
+            text = file.read(LARGEST_METADATA).decode("utf-8", "replace").lower()
+    except OSError:
+        return False
+    return "compression_mode" in text and PLAIN_MODE.search(text) is None
 
 
 def is_folder(path: Path) -> bool:

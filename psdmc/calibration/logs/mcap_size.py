@@ -6,8 +6,9 @@ import struct
 from pathlib import Path
 from typing import BinaryIO
 
-from psdmc.calibration.logs.foreign_bytes import WRITE_AGAIN, opened
+from psdmc.calibration.logs.foreign_bytes import WRITE_AGAIN, decoding, opened
 from psdmc.calibration.logs.table_limits import ALWAYS_ALLOWED, LARGEST_EXPANSION
+from psdmc.calibration.logs.unpacked import unpacked_size
 from psdmc.errors import InputError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -18,12 +19,15 @@ FROM_FOOTER = len(MAGIC) + 20
 """Bytes from the footer's content to the end: two places, a checksum, and the magic again."""
 CHUNK_HEAD = struct.Struct("<QQQII")
 """Of a chunk: first and last time, unpacked size, checksum, length of the compression's name; packed size follows it."""
+LONGEST_PACKING = 100
+"""Bytes of a compression's name."""
 SIZES = struct.Struct("<QQ")
 """The end of a chunk's index: packed and unpacked size."""
 
 
 def require_mcap_size(path: Path) -> None:
-    """InputError where a record is longer than the file, or chunks or their index unpack to more than its size allows."""
+    """InputError where a record is longer than the file, or chunks or their index unpack to more than its size allows, or
+    than they say."""
     with opened(path) as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{path}: not an MCAP file", "give a file that ros2 bag recorded")
@@ -31,6 +35,8 @@ def require_mcap_size(path: Path) -> None:
         for kind in (CHUNK, CHUNK_INDEX):
             _require_size([_claims(file, *record) for record in records if record[0] == kind], file, path)
         _require_summary(file, records, path)
+        with decoding(str(path), "an MCAP file"):
+            _require_claims(file, records, path)
 
 
 def _require_size(claims: list[tuple[int, int]], file: BinaryIO, path: Path) -> None:
@@ -91,3 +97,44 @@ def _require_summary(file: BinaryIO, records: list[tuple[int, int, int]], path: 
     summary = struct.unpack("<Q", footer)[0] if len(footer) == 8 else 0
     if summary and summary not in [place for _, place, _ in records]:
         raise InputError(f"{path}: damaged: its summary is not where its footer says", WRITE_AGAIN)
+
+
+def _require_claims(file: BinaryIO, records: list[tuple[int, int, int]], path: Path) -> None:
+    """InputError where a chunk unpacks to more than it says, or an index says of a chunk what that does not say itself."""
+    chunks: dict[int, tuple[str, int, int]] = {}
+    for kind, place, length in records:
+        if kind == CHUNK and length >= CHUNK_HEAD.size + 8:
+            packed, unpacked = _claims(file, kind, place, length)
+            packing = _packing(file, place)
+            chunks[place] = (packing, packed, unpacked)
+            file.seek(place + HEAD.size + CHUNK_HEAD.size + len(packing.encode()) + 8)
+            found = unpacked_size(file, min(packed, length), packing, unpacked)
+            if found > unpacked:
+                raise InputError(
+                    f"{path}: damaged: the chunk at byte {place:,} unpacks to more than the {unpacked:,} bytes it says",
+                    WRITE_AGAIN,
+                )
+    for kind, place, length in records:
+        if kind == CHUNK_INDEX and _indexed(file, place, length) not in [
+            (where, *claims) for where, claims in chunks.items()
+        ]:
+            raise InputError(f"{path}: damaged: its index is not that of its chunks", WRITE_AGAIN)
+
+
+def _packing(file: BinaryIO, place: int) -> str:
+    """A chunk's compression."""
+    file.seek(place + HEAD.size + CHUNK_HEAD.size - 4)
+    (length,) = struct.unpack("<I", file.read(4))
+    return file.read(min(length, LONGEST_PACKING)).decode("ascii", "replace")
+
+
+def _indexed(file: BinaryIO, place: int, length: int) -> tuple[int, str, int, int]:
+    """What a chunk's index says: the chunk's place, compression, packed and unpacked size."""
+    file.seek(place + HEAD.size)
+    content = file.read(length)
+    (where,) = struct.unpack_from("<Q", content, 16)
+    (offsets,) = struct.unpack_from("<I", content, 32)
+    start = 36 + offsets + 8
+    (name,) = struct.unpack_from("<I", content, start)
+    packed, unpacked = SIZES.unpack_from(content, start + 4 + name)
+    return where, content[start + 4 : start + 4 + name].decode("ascii", "replace"), packed, unpacked
