@@ -6,8 +6,13 @@ The command line prints both on one line each and ends with `exit_status`; only 
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 from collections.abc import Callable
+
+INTERRUPTED_STATUS = 130
+"""Of a process that Ctrl-C ended, as shells say it: 128 + SIGINT."""
 
 
 class PsdmcError(Exception):
@@ -43,27 +48,32 @@ class InternalError(Exception):
     """A broken invariant inside psdmc; never the input's fault."""
 
 
-INTERRUPTED_STATUS = 130
-"""Of a process that Ctrl-C ended, as shells say it: 128 + SIGINT."""
-
-
 def exit_status_of(action: Callable[[], int | None]) -> int:
-    """Run `action`, for `python -m` modules; its status (None: 0), or that of what ended it: a PsdmcError, Ctrl-C, or a
-    standard output that takes no more. The reason is printed to standard error, a line, its hint below."""
+    """Run `action`, for `python -m` modules; its status (None: 0), or that of its PsdmcError, whose message and hint
+    are printed to standard error, a line each. Ctrl-C and a full disk behind standard output are a line, too."""
     try:
         status = action() or 0
         sys.stdout.flush()
         return status
     except PsdmcError as error:
-        return _failed(error.message, error.hint, error.exit_status)
+        return _said(error.message, error.hint, error.exit_status)
     except KeyboardInterrupt:
-        return _failed("interrupted", None, INTERRUPTED_STATUS)
+        return _said("interrupted", None, INTERRUPTED_STATUS)
     except OSError as error:
+        if error.filename is None:
+            _drop_output()
         where = error.filename or "standard output"
-        sys.stdout = None  # what is left in its buffer cannot be said either
-        return _failed(f"{where}: {error.strerror}", "free some space", ToolchainError.exit_status)
+        return _said(f"{where}: {error.strerror or error}", "free some space", ToolchainError.exit_status)
 
 
-def _failed(message: str, hint: str | None, status: int) -> int:
+def _said(message: str, hint: str | None, status: int) -> int:
     print(f"error: {message}", *([f"hint: {hint}"] if hint else []), sep="\n", file=sys.stderr)
     return status
+
+
+def _drop_output() -> None:
+    """What is still in standard output's buffer goes nowhere: Python would complain of it after the last word."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

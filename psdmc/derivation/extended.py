@@ -94,9 +94,11 @@ def has_small_entries(robot: Scaled) -> bool:
 def is_of_many_scales(robot: Scaled) -> bool:
     """Whether the lengths from some joint outward are all small, and not all zero: a finger of millimetres on an arm of
     metres."""
-    steps = [_length(frame.translation) for frame in robot.frames]
-    links = [_length(place.translation) for place in robot.link_frames]
-    return any(0.0 < max(*steps[k + 1 :], *links[k:], 0.0) < MANY_SCALES for k in range(len(steps)))
+    reach = [_length(place.translation) for place in robot.link_frames]
+    for k, frame in reversed(list(enumerate(robot.frames))):
+        if frame.parent >= 0:
+            reach[frame.parent] = max(reach[frame.parent], reach[k], _length(frame.translation))
+    return any(0.0 < far < MANY_SCALES for far in reach)
 
 
 def _length(translation: Sequence[Any] | Long) -> float:

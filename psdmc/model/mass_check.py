@@ -86,20 +86,18 @@ def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:
 def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
     """(n,) at most what the parameters add up to in each joint's own inertia, whatever their signs. `travel` (n,), how far
     sliding joints go."""
+    chain = model.chain
     x = np.abs(model.standard_parameters()).reshape(model.n, PARAMETERS_PER_LINK)
-    joints = model.chain.joints
-    masses, firsts, seconds, drives = x[:, 0], x[:, 1:4].sum(axis=1), x[:, 4:10].sum(axis=1), x[:, 10]
-    steps = np.array([math.hypot(*joint.placement.translation) for joint in joints])
-    slides = [joint.type.turn(1.0) is None for joint in joints]
-    steps += np.where(slides, travel, 0.0)
-    links = np.array([math.hypot(*joint.link_frame.translation) for joint in joints])
-    result = drives.copy()
-    for i in range(model.n):
-        if slides[i]:
-            result[i] += masses[i:].sum()
-            continue
-        far = np.cumsum(np.concatenate([[0.0], steps[i + 1 :]])) + links[i:]
-        result[i] += (seconds[i:] + 2.0 * far * firsts[i:] + far**2 * masses[i:]).sum()
+    masses, firsts, seconds, result = x[:, 0], x[:, 1:4].sum(axis=1), x[:, 4:10].sum(axis=1), x[:, 10].copy()
+    slides = [joint.type.turn(1.0) is None for joint in chain.joints]
+    steps = [math.hypot(*joint.placement.translation) for joint in chain.joints]
+    steps = [step + far * along for step, far, along in zip(steps, travel, slides, strict=True)]
+    for body, joint in enumerate(chain.joints):
+        far = math.hypot(*joint.link_frame.translation)
+        for i in reversed(chain.path_to(body)):
+            turned = seconds[body] + 2.0 * far * firsts[body] + far**2 * masses[body]
+            result[i] += masses[body] if slides[i] else turned
+            far += steps[i]
     return result
 
 
