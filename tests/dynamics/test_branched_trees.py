@@ -10,12 +10,14 @@ import pytest
 from random_trees import KINDS, TREES, RandomTree
 
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.energy import kinetic_energy, potential_energy
+from psdmc.dynamics.energy import first_moment, kinetic_energy, potential_energy
 from psdmc.dynamics.kinematics import carried_by, forward_kinematics, frame_placement, jacobian, path_to
+from psdmc.dynamics.momentum import total_momentum
 from psdmc.dynamics.motion import Choices
+from psdmc.dynamics.named_frames import frame_drifts
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Placement
+from psdmc.robot.chain import PARAMETERS_PER_LINK, NamedFrame, Placement
 
 EXACT = 1e-12
 """Of each joint's largest value."""
@@ -185,6 +187,38 @@ def test_energies_are_pinocchios(parents, kinds, parallel) -> None:
         assert potential_energy(tree.frames, tree.bodies, row.tolist(), tree.up) == pytest.approx(
             potential, rel=1e-11, abs=1e-11
         )
+
+
+@trees
+def test_momentum_and_first_moment_are_pinocchios(parents, kinds, parallel) -> None:
+    tree = RandomTree(10, parents, kinds, parallel)
+    q, qd = tree.states(1, 2)[:, 0]
+    momentum = pin.computeCentroidalMomentum(tree.model, tree.data, tree.theirs(q), tree.theirs(qd))
+    mass, centre = tree.parameters[:, 0].sum(), np.array(tree.data.com[0])
+    linear, angular = total_momentum(tree.frames, tree.bodies, q, qd)
+    np.testing.assert_allclose(linear, momentum.linear, atol=1e-12)
+    about_origin = momentum.angular + np.cross(centre, momentum.linear)
+    np.testing.assert_allclose(angular, about_origin, atol=1e-12)
+    np.testing.assert_allclose(first_moment(tree.frames, tree.bodies, q), mass * centre, atol=1e-12)
+
+
+@trees
+def test_drifts_of_frames_on_every_body_are_pinocchios(parents, kinds, parallel) -> None:
+    tree = RandomTree(11, parents, kinds, parallel)
+    q, qd = tree.states(1, 2)[:, 0]
+    place = Placement(RandomTree(8, (-1,), "R").places[0].rotation, np.array([0.1, -0.2, 0.3]))
+    fixed = pin.SE3(place.rotation.copy(), place.translation.copy())
+    model = tree.model.copy()
+    for i, joint in enumerate(tree.joints):
+        model.addFrame(pin.Frame(f"at{i}", joint, 0, fixed, pin.FrameType.OP_FRAME))
+    data, still = model.createData(), np.zeros(tree.n)
+    pin.forwardKinematics(model, data, tree.theirs(q), tree.theirs(qd), still)
+    named = [NamedFrame(f"at{i}", i, place) for i in range(tree.n)]
+    for i, found in enumerate(frame_drifts(tree.frames, named, q, qd)):
+        expected = pin.getFrameClassicalAcceleration(
+            model, data, model.getFrameId(f"at{i}"), pin.LOCAL_WORLD_ALIGNED
+        )
+        np.testing.assert_allclose(found, expected.vector, atol=1e-11)
 
 
 def test_what_each_joint_carries() -> None:
