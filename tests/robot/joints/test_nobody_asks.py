@@ -50,7 +50,8 @@ def _names_a_type(node: ast.AST) -> bool:
     if isinstance(node, ast.Constant):
         return node.value in WORDS if isinstance(node.value, str) else False
     if isinstance(node, ast.Attribute):
-        is_numpys = isinstance(node.value, ast.Attribute) and node.value.attr == "dtype"
+        of = node.value
+        is_numpys = "dtype" in (getattr(of, "attr", ""), getattr(of, "id", ""))
         return node.attr in ATTRIBUTES and not is_numpys
     return isinstance(node, ast.Name) and node.id in OBJECTS
 
