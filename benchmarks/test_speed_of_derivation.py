@@ -9,7 +9,7 @@ from psdmc.bench.cases import bundled_chain
 from psdmc.bench.fresh import derive_fresh
 from psdmc.bench.scaling import SEED, eight_joints
 from psdmc.derivation.derive import derive_model
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 MIB = 2**20
 
@@ -21,7 +21,7 @@ CASES = {
 """Published sizes, and what the project asks of time and memory; time is reported, memory is held."""
 
 
-def chain_of(name: str) -> Chain:
+def chain_of(name: str) -> Mechanism:
     if name == "LBR7 and a joint":
         return generic_chain(eight_joints(bundled_chain("LBR7")), SEED)
     return bundled_chain(name)

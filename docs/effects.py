@@ -34,7 +34,7 @@ from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.pipeline import LAST, LAST_FOR_ONE_STATE, LONGEST, ROUND, Pass, optimize
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.trace import Tracer
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 TEN = slice(0, 10)
 INVERSE = RECIPES["inverse_dynamics"]
@@ -79,13 +79,13 @@ def choices(robot: str) -> Iterator[Row]:
     )
 
 
-def in_file_frames(chain: Chain) -> Program:
+def in_file_frames(chain: Mechanism) -> Program:
     """Newton-Euler over the chain as it stands, all ten parameters of every link."""
     bodies = bodies_of(chain, chain.parameters)
     return _traced(frames_of(chain), bodies, base_acceleration(chain))
 
 
-def in_frames(chain: Chain, frames: Sequence[Frame], base, reframed) -> Program:  # type: ignore[no-untyped-def]
+def in_frames(chain: Mechanism, frames: Sequence[Frame], base, reframed) -> Program:  # type: ignore[no-untyped-def]
     """The same over the re-framed chain, its links' parameters moved to the new frames."""
     bodies = [
         body_from_parameters((joint_frame_map(place) @ x[TEN]).tolist())

@@ -73,14 +73,14 @@ def derive(
         frames=frames,
         tool=tool,
     )
-    return derive_model(loaded.chain, expand=expand, progress=progress, provenance=provenance(loaded))
+    return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
 
 
 def provenance(loaded: LoadedRobot) -> dict[str, Any]:
     """Where a model comes from, as plain JSON values: enough to read the source again."""
     from psdmc.derivation.snap_effect import snap_effect
 
-    effect = snap_effect(loaded.chain, loaded.unsnapped().chain) if loaded.snap_report else None
+    effect = snap_effect(loaded.mechanism, loaded.unsnapped().chain) if loaded.snap_report else None
     return {
         "source_text": loaded.source_text,
         "source_sha256": hashlib.sha256(loaded.source_text.encode()).hexdigest(),

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from random_chains import random_chain
 
-from psdmc.robot.chain import Chain, Placement
+from psdmc.robot.mechanism import Mechanism, Placement
 
 
-def tilted_chain(seed: int, kinds: str, tilt: float) -> Chain:
+def tilted_chain(seed: int, kinds: str, tilt: float) -> Mechanism:
     """Turned and placed anywhere about and across the axes; link frames are the joint frames."""
     chain = random_chain(seed, kinds)
     rng = np.random.default_rng([30, seed])

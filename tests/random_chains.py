@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Placement
 from psdmc.robot.joints import PRISMATIC, REVOLUTE
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement
 
 RIGHT_ANGLES = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 
 
 def random_chain(
     seed: int, kinds: str, *, tidy: bool = False, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
-) -> Chain:
+) -> Mechanism:
     """A chain with one joint per letter of `kinds` (R or P); `tidy` takes DH-like placements with right angles,
     parallel axes and zero lengths, else axes are oblique."""
     rng = np.random.default_rng(seed)
@@ -33,7 +33,9 @@ def random_chain(
     bodies = np.array([[*_body(rng), 0.0] for _ in range(n)])
     span = np.delete(np.eye(PARAMETERS_PER_LINK * n), np.s_[10::11], axis=1)
     tip = Placement(_rotation(rng), rng.uniform(-0.2, 0.2, 3))
-    return Chain(f"random{seed}", "urdf", "base", "tip", tuple(joints), bodies, span, np.array(gravity), tip)
+    return Mechanism(
+        f"random{seed}", "urdf", "base", "tip", tuple(joints), bodies, span, np.array(gravity), tip
+    )
 
 
 def _rotation(rng: np.random.Generator) -> np.ndarray:
@@ -65,7 +67,7 @@ def _body(rng: np.random.Generator) -> np.ndarray:
 class Oracle:
     """Pinocchio on the same chain. States are (count, n) or (n,)."""
 
-    def __init__(self, chain: Chain, drive_inertia: np.ndarray | None = None) -> None:
+    def __init__(self, chain: Mechanism, drive_inertia: np.ndarray | None = None) -> None:
         self.chain = chain
         model, parent = pin.Model(), 0
         for i, joint in enumerate(chain.joints):

@@ -10,8 +10,8 @@ from random_chains import _body, _rotation, _tidy
 from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.dynamics.frames import BASE, Frame, frame_at
 from psdmc.dynamics.parameters import moved
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Placement
 from psdmc.robot.joints import PRISMATIC, REVOLUTE
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement
 
 TYPES = {"R": REVOLUTE, "P": PRISMATIC, "H": HELICAL}
 
@@ -63,8 +63,8 @@ class RandomTree:
     def bodies(self) -> list[Body]:
         return [body_from_parameters(row.tolist()) for row in self.parameters]
 
-    def mechanism(self) -> Chain:
-        """The same robot as a Chain, parameters about link frames of their own; the tip on the first leaf."""
+    def mechanism(self) -> Mechanism:
+        """The same robot as a Mechanism, parameters about link frames of their own; the tip on the first leaf."""
         rng = np.random.default_rng(self.n)
         links = [Placement(_rotation(rng), rng.uniform(-0.2, 0.2, 3)) for _ in self.parents]
         joints = tuple(
@@ -72,7 +72,7 @@ class RandomTree:
             for i, (joint, place, link) in enumerate(zip(self.types, self.places, links, strict=True))
         )
         about_links = [moved(row, link.inverse()) for row, link in zip(self.parameters, links, strict=True)]
-        return Chain(
+        return Mechanism(
             "tree", "urdf", "base", "tip", joints, np.column_stack([about_links, self.drives]),
             np.eye(PARAMETERS_PER_LINK * self.n), self.gravity, Placement(_rotation(rng), rng.uniform(-0.2, 0.2, 3)),
             parents=self.parents, tip_body=next(i for i in range(self.n) if i not in self.parents),

@@ -8,7 +8,7 @@ from psdmc.bench.contestant import Runner
 from psdmc.bench.states import States
 from psdmc.functions import RECIPES
 from psdmc.recipes.recipe import Needs
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 CHECKED = 1024
 """States compared; enough to meet every term of a robot's dynamics."""

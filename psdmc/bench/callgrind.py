@@ -14,7 +14,7 @@ from psdmc.bench.build import built, counted_flags, cxx
 from psdmc.bench.contestant import Contestant, source
 from psdmc.bench.states import States
 from psdmc.errors import ToolchainError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 from psdmc.toolchain.compiler_command import run
 
 STATES = 512
@@ -30,7 +30,7 @@ def valgrind() -> str:
     return "valgrind"
 
 
-def instructions(contestants: Sequence[Contestant], chain: Chain) -> dict[tuple[str, str], float]:
+def instructions(contestants: Sequence[Contestant], chain: Mechanism) -> dict[tuple[str, str], float]:
     """Instructions per state, the loop's own few included, by (library, symbol).
 
     contestants  built with counted_flags(); one run of valgrind for each of their libraries

@@ -9,7 +9,7 @@ import numpy as np
 from psdmc.dynamics.parameters import joint_frame_map, standard_parameters
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism
 from psdmc.robot.small import times
 
 DRIVE = PARAMETERS_PER_LINK - 1
@@ -41,8 +41,8 @@ class Case:
             )
 
     @property
-    def chain(self) -> Chain:
-        return self.model.chain
+    def chain(self) -> Mechanism:
+        return self.model.mechanism
 
     @property
     def n(self) -> int:
@@ -54,7 +54,7 @@ class Case:
         return bool(np.any(self.chain.parameters[:, DRIVE] != 0.0))
 
 
-def generic_chain(chain: Chain, seed: int) -> Chain:
+def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
     """The chain's geometry standing on the floor with generic physical inertias and no drive inertia.
 
     Nobody's special zeros then make one contestant look better; the same seed gives the same robot.
@@ -79,7 +79,7 @@ def physical_body(rng: np.random.Generator) -> Array:
     return standard_parameters(masses.sum(), times(masses, places), np.trace(second) * np.eye(3) - second)
 
 
-def robot_as_numbers(chain: Chain) -> str:
+def robot_as_numbers(chain: Mechanism) -> str:
     """The chain as plain text for rivals: exact placements, bodies about the joint frames, no parser in between.
 
     n and gravity; then per joint Pinocchio's word for its type, parent (0 the base, else counted from 1), rotation (9,

@@ -11,9 +11,9 @@ import numpy as np
 from psdmc.bench.case import FLOOR_MOUNT, Case, generic_chain
 from psdmc.bench.fresh import derive_fresh
 from psdmc.errors import InputError
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Placement
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.load import load_robot
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Mechanism, Placement
 from psdmc.robot.small import length
 
 SEED = 4
@@ -30,9 +30,9 @@ POPULAR = {
 """Path inside example-robot-data's robots, and the tip that leaves fingers out."""
 
 
-def standard_chains(seed: int = SEED) -> dict[str, Callable[[], Chain]]:
+def standard_chains(seed: int = SEED) -> dict[str, Callable[[], Mechanism]]:
     """What makes each standard robot's chain, by name: two generic arms beside the known ones."""
-    makers: dict[str, Callable[[], Chain]] = {}
+    makers: dict[str, Callable[[], Mechanism]] = {}
     for name in ("Denso", "KR6", "LBR7", "UR5", "Panda"):
         makers[name] = lambda name=name: generic_chain(_known(name), seed)  # type: ignore[misc]
     for n in (6, 7):
@@ -59,14 +59,14 @@ def standard_cases(
         yield Case(name, found.model, note, found.seconds, found.peak_bytes)
 
 
-def oblique_chain(n: int, seed: int) -> Chain:
+def oblique_chain(n: int, seed: int) -> Mechanism:
     """n revolute joints about axes that neither meet nor stand parallel or square: nothing to exploit."""
     rng = np.random.default_rng(seed)
     joints = tuple(
         Joint(f"joint{i + 1}", f"link{i + 1}", REVOLUTE, _anywhere(rng), Placement.identity())
         for i in range(n)
     )
-    return Chain(
+    return Mechanism(
         name=f"generic_{n}r",
         convention="modified",
         base_name="base",
@@ -79,12 +79,12 @@ def oblique_chain(n: int, seed: int) -> Chain:
     )
 
 
-def first_joints(chain: Chain, n: int) -> Chain:
+def first_joints(chain: Mechanism, n: int) -> Mechanism:
     """The chain cut after its first n joints, for measuring how cost grows with n."""
     rows = PARAMETERS_PER_LINK * n
     span = chain.parameter_span[:rows]
     kept = np.any(span != 0.0, axis=0)
-    return Chain(
+    return Mechanism(
         name=f"{chain.name}_{n}",
         convention=chain.convention,
         base_name=chain.base_name,
@@ -97,12 +97,12 @@ def first_joints(chain: Chain, n: int) -> Chain:
     )
 
 
-def bundled_chain(name: str) -> Chain:
+def bundled_chain(name: str) -> Mechanism:
     """A robot of examples/robots."""
     return load_robot(EXAMPLES / BUNDLED[name]).chain
 
 
-def _known(name: str) -> Chain:
+def _known(name: str) -> Mechanism:
     if name in BUNDLED:
         return bundled_chain(name)
     path, tip = POPULAR[name]

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from psdmc.bench.states import States, at_cache_line, moved
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 Layout = Literal["state", "rows", "lanes"]
 """One state a call; many states as rows; many states lane by lane."""

@@ -38,7 +38,7 @@ def demo(model: DynamicsModel, progress: Progress) -> str:
     """The table as text."""
     progress("compiling, and comparing with Pinocchio")
     errors = errors_against_pinocchio(model, compiler.compile(model, "factored", FUNCTIONS))
-    result = run([Case(model.chain.name, model)], SETTINGS, progress)
+    result = run([Case(model.mechanism.name, model)], SETTINGS, progress)
     return "\n".join(_lines(model, errors, result))
 
 
@@ -62,7 +62,7 @@ def _lines(model: DynamicsModel, errors: dict[str, float], result: BenchResult) 
     case, machine = result.cases[0], result.machine
     p = "not expanded" if model.p is None else str(model.p)
     yield ""
-    yield f"{model.chain.name}: {model.n} joints, p = {p} functions, l = {model.l} base parameters"
+    yield f"{model.mechanism.name}: {model.n} joints, p = {p} functions, l = {model.l} base parameters"
     yield f"{machine.processor}, {machine.compiler}, {machine.flags}"
     yield ""
     yield (

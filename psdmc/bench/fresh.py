@@ -11,7 +11,7 @@ from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.processes import in_a_new_process
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 if sys.platform != "win32":
     import resource
@@ -28,12 +28,12 @@ class Derivation:
     peak_bytes: int | None
 
 
-def derive_fresh(chain: Chain) -> Derivation:
+def derive_fresh(chain: Mechanism) -> Derivation:
     """Derive in a new process; without E and P where they do not fit into memory."""
     return in_a_new_process(measured_derivation, chain)
 
 
-def measured_derivation(chain: Chain) -> Derivation:
+def measured_derivation(chain: Mechanism) -> Derivation:
     """Time a warm derivation here and now, and this process's peak of memory."""
     derive_model(chain, expand=False)  # imports and first calls are not what is measured
     start = time.perf_counter()

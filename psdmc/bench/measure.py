@@ -9,7 +9,7 @@ import numpy as np
 
 from psdmc.bench.contestant import Runner
 from psdmc.bench.machine import IDLE_SHARE, others_share
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 PATIENCE = 3
 """Rounds tried for each that must count; after that busy ones count too, and the result says so."""

@@ -10,8 +10,8 @@ import numpy as np
 from psdmc.bench.case import Case, generic_chain
 from psdmc.bench.cases import bundled_chain, first_joints
 from psdmc.bench.fresh import derive_fresh
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Joint, Placement, serial_parents
 from psdmc.robot.joints import REVOLUTE
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement, serial_parents
 
 JOINTS = (2, 3, 4, 5, 6, 7, 8)
 SEED = 8
@@ -30,7 +30,7 @@ def scaling_cases(
         yield Case(f"LBR {n} joints", found.model, note, found.seconds, found.peak_bytes)
 
 
-def eight_joints(lbr: Chain) -> Chain:
+def eight_joints(lbr: Mechanism) -> Mechanism:
     """An eighth joint before the last: standard DH a 0, alpha -pi/2, d 0.2 (its own turn comes first)."""
     turn = Placement(
         np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.array([0.0, 0.0, 0.2])

@@ -9,7 +9,7 @@ import numpy as np
 
 from psdmc.functions import RECIPES
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.robot.chain import Array, Chain
+from psdmc.robot.mechanism import Array, Mechanism
 
 COUNT = 65_536
 """States per trial: with a thousand the branch predictor learns glibc's sincos by heart."""
@@ -40,14 +40,14 @@ class States:
     q, qd, qdd  (count, n)
     """
 
-    chain: Chain
+    chain: Mechanism
     q: Array
     qd: Array
     qdd: Array
     _layouts: dict[tuple[str, int], Array] = field(default_factory=dict, repr=False)
 
     @staticmethod
-    def random(chain: Chain, count: int, seed: int) -> States:
+    def random(chain: Mechanism, count: int, seed: int) -> States:
         """Uniform within an ordinary arm's limits."""
         rng = np.random.default_rng(seed)
         ranges = np.array([joint.ordinary for joint in chain.types])

@@ -97,9 +97,9 @@ def calibrate_campaign(
 ) -> Calibration:
     """The four steps; what they found, or the nearest that is physical, as their uncertainties and the prior measure."""
     progress("checking logs")
-    logs = checked_runs(model.chain, runs, options.campaign)
+    logs = checked_runs(model.mechanism, runs, options.campaign)
     found = calibrate_four_steps(
-        model.chain, regressor, model.l, runs, options.campaign, progress, torque_constants, model.theta_b
+        model.mechanism, regressor, model.l, runs, options.campaign, progress, torque_constants, model.theta_b
     )
 
     def record(steps: FourSteps, theta_b: Array) -> Calibration:
@@ -143,7 +143,9 @@ def calibrate_logs(
     motors = motors_of_logs(model.joint_names, logs, torque_constants)
     progress("linear fit")
     linear = options.linear
-    found = calibrate_linear(model.chain, regressor, model.l, logs, linear, motors, model.theta_b, progress)
+    found = calibrate_linear(
+        model.mechanism, regressor, model.l, logs, linear, motors, model.theta_b, progress
+    )
     solved = found.estimate
     progress("reading the result back")
     plain = judged_record(

@@ -35,7 +35,7 @@ from psdmc.calibration.motions.sweeps import (
 )
 from psdmc.calibration.motions.trajectory import Trajectory, sliding_joints, write_trajectory
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 Progress = Callable[[str], None]
 LARGEST_ACCELERATION = 1e6
@@ -84,7 +84,11 @@ class PlannedRun:
 
 
 def plan_campaign(
-    chain: Chain, model: Regressor, l: int, options: CampaignOptions, progress: Progress = lambda step: None
+    chain: Mechanism,
+    model: Regressor,
+    l: int,
+    options: CampaignOptions,
+    progress: Progress = lambda step: None,
 ) -> tuple[tuple[PlannedRun, ...], Excitation]:
     """All runs of the four steps, and the exciting motion's search. Collisions are not looked at."""
     chain = bounded(chain, options.acceleration)
@@ -117,7 +121,7 @@ def plan_campaign(
     return tuple(runs), found
 
 
-def bounded(chain: Chain, acceleration: float | None) -> Chain:
+def bounded(chain: Mechanism, acceleration: float | None) -> Mechanism:
     """The chain with limits where its file has none: a half turn either way for joints that turn freely, and the
     acceleration that was given. InputError where a limit is still missing."""
     joints = []

@@ -20,9 +20,9 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import MassCheck
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
-from psdmc.robot.chain import BASE, Chain, Joint
 from psdmc.robot.coordinates import leaders
 from psdmc.robot.derivable import require_derivable
+from psdmc.robot.mechanism import BASE, Joint, Mechanism
 
 if TYPE_CHECKING:
     from psdmc.calibration.verdict.record import Calibration
@@ -184,7 +184,7 @@ def print_accuracy(record: Calibration) -> None:
     console().print(table)
 
 
-def print_mechanism(found: Chain) -> None:
+def print_mechanism(found: Mechanism) -> None:
     """What a robot file holds: its bodies, what each hangs on and follows, and whether psdmc derives it."""
     out = console()
     count, own = len(found), len(leaders(found.coordinates))
@@ -204,7 +204,7 @@ def print_mechanism(found: Chain) -> None:
         out.print(f"--tip {escape(shlex.quote(found.joints[leaf].link_name))}: {moving} joints")
 
 
-def _bodies(found: Chain) -> Table:
+def _bodies(found: Mechanism) -> Table:
     table = Table("joint", "link", "hangs on", "type", "q", "position", "mass")
     for i, (joint, parent) in enumerate(zip(found.joints, found.parents, strict=True)):
         unit, limits = joint.type.position_unit, joint.limits
@@ -220,7 +220,7 @@ def _bodies(found: Chain) -> Table:
     return table
 
 
-def _followed(found: Chain, i: int) -> str:
+def _followed(found: Mechanism, i: int) -> str:
     coordinate = found.coordinates[i]
     if coordinate.leader is None:
         return f"{coordinate.offset:g}"

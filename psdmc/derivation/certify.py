@@ -11,7 +11,7 @@ from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor
 from psdmc.errors import DerivationError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def certificate(model: DynamicsModel) -> Array:
     rng = np.random.default_rng(SEED)
     x, theta = _parameters(model, rng)
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, size=(SAMPLES, model.n)) for limit in RANGES)
-    chain = model.chain
+    chain = model.mechanism
     states = (list(q.T), list(qd.T), list(qdd.T))
     with np.errstate(over="ignore", invalid="ignore"):
         expected = newton_euler(
@@ -58,7 +58,7 @@ def certificate(model: DynamicsModel) -> Array:
 
 
 def _failure(
-    chain: Chain, x: Array, states: States, reference: Array, errors: Array
+    chain: Mechanism, x: Array, states: States, reference: Array, errors: Array
 ) -> DerivationError | InternalError:
     """Who is to blame for errors beyond WORST_ALLOWED: the robot's numbers or psdmc."""
     largest = np.abs(reference).max(axis=0)
@@ -79,7 +79,7 @@ def _failure(
     )
 
 
-def _contributions(chain: Chain, x: Array, states: States) -> Array:
+def _contributions(chain: Mechanism, x: Array, states: States) -> Array:
     """(n,) largest sum of the magnitudes that all parameters contribute to each joint's torque."""
     values = np.abs(x.reshape(-1))
     wanted = frozenset(np.flatnonzero(values).tolist())
@@ -101,7 +101,7 @@ def relative_errors(values: Array, reference: Array) -> Array:
 def _parameters(model: DynamicsModel, rng: np.random.Generator) -> tuple[Array, Array]:
     """Standard and base parameters to certify with."""
     if model.theta_b is not None:
-        return np.nan_to_num(model.chain.parameters.reshape(-1)), np.asarray(model.theta_b)
-    span = model.chain.parameter_span
+        return np.nan_to_num(model.mechanism.parameters.reshape(-1)), np.asarray(model.theta_b)
+    span = model.mechanism.parameter_span
     x: Array = span @ rng.normal(size=span.shape[1])
     return x, model.B @ x

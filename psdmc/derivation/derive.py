@@ -20,8 +20,8 @@ from psdmc.derivation.sampled import reduction_of
 from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
 from psdmc.robot.derivable import require_derivable
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ LAST_DIGIT = 4e-16
 
 
 def derive_model(
-    chain: Chain,
+    chain: Mechanism,
     *,
     expand: bool = True,
     progress: Progress | None = None,
@@ -75,7 +75,7 @@ def derive_model(
         expansion=expansion,
         theta_b=base_parameters(B, chain),
         B=B,
-        chain=chain,
+        mechanism=chain,
         certificate=np.zeros(len(chain)),
         provenance=_plain(dict(provenance or {}) | {"tolerances": tolerances(robot, reduction)}),
     )
@@ -86,7 +86,7 @@ def derive_model(
 _expanded = expand
 
 
-def _refuse_absurd(chain: Chain) -> None:
+def _refuse_absurd(chain: Mechanism) -> None:
     if len(chain) > LARGEST_CHAIN:
         raise DerivationError(
             f"'{chain.name}': {len(chain)} joints, psdmc derives chains of up to {LARGEST_CHAIN}",
@@ -136,7 +136,7 @@ def base_map(robot: Scaled, reduction: Reduction) -> Array:
     return B
 
 
-def base_parameters(B: Array, chain: Chain) -> Array | None:
+def base_parameters(B: Array, chain: Mechanism) -> Array | None:
     """theta_b = B x; None where a parameter that counts is unknown."""
     x = chain.parameters.reshape(-1)
     unknown = np.isnan(x)

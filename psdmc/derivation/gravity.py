@@ -15,7 +15,7 @@ from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.regressor import Placed, carried, twist_in
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
-from psdmc.robot.chain import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 
 def gravity_terms(

@@ -29,9 +29,9 @@ from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.motion import JointState
 from psdmc.dynamics.regressor import DRIVE, Placed, Twist, carried, own_twist, twist_in
 from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
-from psdmc.robot.chain import PARAMETERS_PER_LINK
 from psdmc.robot.joints import JointType
 from psdmc.robot.joints.basis import Basis
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 Array = NDArray[np.float64]
 

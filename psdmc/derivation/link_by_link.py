@@ -27,8 +27,8 @@ from psdmc.dynamics.motion import PLAIN, LinkMotion, sweep_outward
 from psdmc.dynamics.parameters import BODY_PARAMETERS, moving_map
 from psdmc.dynamics.regressor import DRIVE, unit_wrench
 from psdmc.dynamics.twist import effort
-from psdmc.robot.chain import PARAMETERS_PER_LINK
 from psdmc.robot.graded import graded_pivots, halving_shares, lengths
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 from psdmc.robot.small import times
 
 SEED = 20_210_157

@@ -12,7 +12,7 @@ from psdmc.derivation.link_by_link import reduction_link_by_link
 from psdmc.derivation.reduce import Reduction, reduced
 from psdmc.derivation.units import Scaled
 from psdmc.dynamics.regressor import regressor
-from psdmc.robot.chain import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 Array = NDArray[np.float64]
 

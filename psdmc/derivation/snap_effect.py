@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 
@@ -18,14 +18,14 @@ RANGES = (np.pi, 3.0, 5.0)
 """q (rad or m), qd and qdd are drawn from plus or minus these."""
 
 
-def snap_effect(snapped: Chain, unsnapped: Chain) -> Array | None:
+def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
     """(n,) largest torque change per joint over random states, N m (N); None where parameters are unknown."""
     if np.isnan(snapped.parameters).any() or np.isnan(unsnapped.parameters).any():
         return None
     return np.asarray(np.max(np.abs(_torques(snapped) - _torques(unsnapped)), axis=1))
 
 
-def _torques(chain: Chain) -> Array:
+def _torques(chain: Mechanism) -> Array:
     """(n, SAMPLES)"""
     rng = np.random.default_rng(SEED)
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (len(chain), SAMPLES)) for limit in RANGES)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from psdmc.dynamics.frames import BASE, Frame, frames_of
 from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement
 from psdmc.robot.joints import JointType
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _LENGTH_ORDER = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
 """Exponent of metre in the unit of each of a body's standard parameters."""
 
 
-def length_unit(chain: Chain) -> float:
+def length_unit(chain: Mechanism) -> float:
     """Metres: the power of two nearest to the longest step from joint to joint; one where all are zero."""
     steps = [
         math.hypot(*joint.placement.translation)
@@ -88,7 +88,7 @@ class Scaled:
     up: Vector
 
 
-def scaled(chain: Chain) -> Scaled:
+def scaled(chain: Mechanism) -> Scaled:
     """The chain in a unit of length near its size."""
     unit = length_unit(chain)
     units = parameter_units(chain.types, unit)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector, sincos, transform, transpose
-from psdmc.robot.chain import BASE as BASE
-from psdmc.robot.chain import Chain, Placement
 from psdmc.robot.joints import JointType
+from psdmc.robot.mechanism import BASE as BASE
+from psdmc.robot.mechanism import Mechanism, Placement
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -101,7 +101,7 @@ def as_vector(values: Sequence[float]) -> Vector:
     return (x, y, z)
 
 
-def frames_of(chain: Chain) -> tuple[Frame, ...]:
+def frames_of(chain: Mechanism) -> tuple[Frame, ...]:
     """The robot's own joint frames, none moved. What runs on them takes joint values; see coordinates.py."""
     return tuple(
         frame_at(joint.type, parent, joint.placement)
@@ -120,7 +120,7 @@ def leaves(frames: Sequence[Frame]) -> tuple[bool, ...]:
     return tuple(i not in parents for i in range(len(frames)))
 
 
-def base_acceleration(chain: Chain) -> Vector:
+def base_acceleration(chain: Mechanism) -> Vector:
     """Gravity as an upward acceleration of the base, m/s^2 in the base frame."""
     gx, gy, gz = chain.gravity.tolist()
     return (-gx, -gy, -gz)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from psdmc.dynamics.frames import BASE, IDENTITY, Frame, as_matrix, as_vector, joint_angle, joint_offset
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transform
 from psdmc.dynamics.twist import axis_twist, turned
-from psdmc.robot.chain import Placement
+from psdmc.robot.mechanism import Placement
 
 AT_BASE: tuple[Matrix, Vector] = (IDENTITY, ZERO)
 """Rotation and origin of the base frame in itself."""

@@ -8,7 +8,7 @@ from psdmc.dynamics.frames import Frame, as_matrix, as_vector
 from psdmc.dynamics.kinematics import AT_BASE, column, forward_kinematics, path_to
 from psdmc.dynamics.motion import sweep_outward
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, scale, transform
-from psdmc.robot.chain import NamedFrame
+from psdmc.robot.mechanism import NamedFrame
 
 Root = tuple[Matrix, Vector]
 """Axes that the first joint frame turns from, as columns in the base frame, and their origin there."""

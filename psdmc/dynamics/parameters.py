@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.dynamics.body import Body, body_from_parameters
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement
 from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def moving_map(rotation: NDArray[Any], translation: NDArray[Any]) -> NDArray[Any
     return np.column_stack([_moved(unit, rotation, translation) for unit in units])
 
 
-def bodies_of(chain: Chain, x: Array) -> tuple[Body, ...]:
+def bodies_of(chain: Mechanism, x: Array) -> tuple[Body, ...]:
     """Bodies about the joint frames from standard parameters about the link frames.
 
     x   (n, 11) or (11 n,)   SI, none NaN

@@ -24,7 +24,7 @@ from psdmc.dynamics.scalar import (
     transpose,
 )
 from psdmc.dynamics.twist import axis_twist
-from psdmc.robot.chain import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 Twist = tuple[Vector, Vector]
 """Linear velocity of a frame's origin and angular velocity, along the frame's axes."""

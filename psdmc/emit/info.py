@@ -96,7 +96,7 @@ def package_info(
 ) -> PackageInfo:
     """Metadata of a MODEL; `name` replaces the robot's own; `payload`: with what functions for loads need, InputError
     where the model's assumptions do not admit every load."""
-    chain = model.chain
+    chain = model.mechanism
     joints = tuple(
         JointInfo(
             joint.name,
@@ -128,7 +128,7 @@ def package_info(
 
 
 def _load_maps(model: DynamicsModel) -> tuple[NDArray[np.float64], ...]:
-    chain = model.chain
+    chain = model.mechanism
     is_tip_alone = [frame.name for frame in chain.frames] == [chain.tip_name]
     frames = (chain.tip_frame,) if is_tip_alone else (chain.tip_frame, *chain.frames)
     return tuple(load_map(chain, model.B, frame) for frame in frames)

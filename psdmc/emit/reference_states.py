@@ -92,7 +92,7 @@ def reference_states(
 
 def _drawn(model: DynamicsModel) -> dict[str, Array]:
     """(CANDIDATES, size) of everything that functions read but torques, drawn in the functions' order."""
-    sizes, rng = Sizes.of_chain(model.n, model.l, len(model.chain.frames)), np.random.default_rng(SEED)
+    sizes, rng = Sizes.of_chain(model.n, model.l, len(model.mechanism.frames)), np.random.default_rng(SEED)
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
     return {q.name: q.largest * rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q))) for q in read.values()}
 
@@ -113,7 +113,7 @@ def _values(
 
 
 def _other_parameters(model: DynamicsModel) -> Array:
-    other: Array = times(model.B, random_parameters(model.chain))
+    other: Array = times(model.B, random_parameters(model.mechanism))
     return other if model.theta_b is None else model.theta_b + LOAD * other
 
 

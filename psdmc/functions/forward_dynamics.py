@@ -11,7 +11,7 @@ from psdmc.program.signature import QD, QDD, TAU, Positive, Q, Quantity, Signatu
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Polynomials, Recipe
 from psdmc.recipes.torques import torques
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference

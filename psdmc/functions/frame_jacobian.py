@@ -11,7 +11,7 @@ from psdmc.dynamics.named_frames import frame_jacobians
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference

@@ -10,7 +10,7 @@ from psdmc.dynamics.scalar import dot
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, matrix
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference

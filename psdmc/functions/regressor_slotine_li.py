@@ -11,7 +11,7 @@ from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.base_regressor import rows_on_arrays, traced_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference

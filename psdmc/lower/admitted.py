@@ -27,7 +27,9 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
         need = RECIPES[name].needs
         others = ",".join(other for other in names if other not in lacking)
         leave = f"; or leave it out: --functions {others}" if others else ""
-        raise InputError(f"{model.chain.name}: no {name}: {reason}", f"{REMEDY[need] if need else ''}{leave}")
+        raise InputError(
+            f"{model.mechanism.name}: no {name}: {reason}", f"{REMEDY[need] if need else ''}{leave}"
+        )
 
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:

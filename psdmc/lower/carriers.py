@@ -21,8 +21,8 @@ from psdmc.dynamics.regressor import DRIVE, regressor
 from psdmc.dynamics.scalar import Scalar
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.tableau import Long, Tableau
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Placement
 from psdmc.robot.graded import graded_pivots, halving_shares, lengths
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Placement
 from psdmc.robot.small import times
 
 PSEUDO_NAMES = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz", "Im")

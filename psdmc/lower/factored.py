@@ -22,7 +22,7 @@ from psdmc.program.signature import Signature, Sizes
 from psdmc.program.trace import Number, Symbol, Tracer
 from psdmc.program.trace import Outputs as Recorded
 from psdmc.recipes.recipe import Ingredients, Outputs, Recipe
-from psdmc.robot.chain import Array, Chain
+from psdmc.robot.mechanism import Array, Mechanism
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,7 @@ class RobotConstants:
     theta_b         (l,)       None: an input of the PROGRAM
     """
 
-    chain: Chain
+    chain: Mechanism
     representative: Array
     theta_b: Array | None
     sizes: Sizes

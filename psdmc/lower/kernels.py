@@ -39,7 +39,7 @@ def lower(
     functions  names; None takes the default ones; without theta_b only those variants that need none are made
     Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
-    require_derivable(model.chain)
+    require_derivable(model.mechanism)
     lowered = _Lowered(model, lowering)
     kernels: dict[str, Kernel] = {}
     for recipe in map(RECIPES.__getitem__, wanted(functions)):
@@ -74,7 +74,7 @@ def wanted(functions: Sequence[str] | None) -> tuple[str, ...]:
 def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> InputError:
     joint = model.joint_names[singular.joint]
     return InputError(
-        f"{model.chain.name}: {name}: joint {joint!r} moves no inertia, the mass matrix is singular for every q",
+        f"{model.mechanism.name}: {name}: joint {joint!r} moves no inertia, the mass matrix is singular for every q",
         f"give its link an inertia, add --drive-inertia, or leave {name} out of --functions",
     )
 
@@ -145,6 +145,6 @@ class _Lowered:
         if theta not in self._searches:
             baked = None if theta else self.model.theta_b
             self._searches[theta] = Search(
-                self.model.chain, self.model.representative, baked, spaces=self._spaces
+                self.model.mechanism, self.model.representative, baked, spaces=self._spaces
             )
         return self._searches[theta]

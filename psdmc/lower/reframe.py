@@ -18,7 +18,7 @@ import numpy as np
 
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector
 from psdmc.dynamics.scalar import Matrix, Vector
-from psdmc.robot.chain import BASE, Array, Chain, NamedFrame, Placement
+from psdmc.robot.mechanism import BASE, Array, Mechanism, NamedFrame, Placement
 from psdmc.robot.small import length, times
 
 Foot = Literal["previous", "next"]
@@ -77,7 +77,7 @@ def _is_same(a: Placement, b: Placement) -> bool:
     return np.array_equal(a.rotation, b.rotation) and np.array_equal(a.translation, b.translation)
 
 
-def reframe(chain: Chain, feet: Sequence[Foot]) -> Reframed:
+def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
     """The robot in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""
     placed, reach = _placed_at_zero(chain), _reach(chain)
     axes = [_clean(place.rotation[:, 2]) for place in placed]
@@ -132,7 +132,7 @@ def _rounded(place: Placement, reach: float) -> Placement:
     return Placement(rotation, _clean_lengths(place.translation, reach) + 0.0)
 
 
-def _placed_at_zero(chain: Chain) -> list[Placement]:
+def _placed_at_zero(chain: Mechanism) -> list[Placement]:
     """Joint frames in the base frame at q = 0."""
     placed: list[Placement] = []
     for joint, parent in zip(chain.joints, chain.parents, strict=True):
@@ -141,7 +141,7 @@ def _placed_at_zero(chain: Chain) -> list[Placement]:
     return placed
 
 
-def _first_children(chain: Chain) -> list[int | None]:
+def _first_children(chain: Mechanism) -> list[int | None]:
     """Each body's first child; None for a leaf."""
     found: list[int | None] = [None] * len(chain)
     for i, parent in reversed(list(enumerate(chain.parents))):
@@ -150,12 +150,12 @@ def _first_children(chain: Chain) -> list[int | None]:
     return found
 
 
-def _has_direction_only(chain: Chain, i: int) -> bool:
+def _has_direction_only(chain: Mechanism, i: int) -> bool:
     """Whether an axis may be shifted sideways: that of a joint that slides, and does not turn."""
     return not any(any(angular) for _, angular in chain.joints[i].type.twists)
 
 
-def _reach(chain: Chain) -> float:
+def _reach(chain: Mechanism) -> float:
     return sum(length(joint.placement.translation) for joint in chain.joints) or 1.0
 
 
@@ -179,7 +179,7 @@ def _parallel(a: Array, b: Array) -> bool:
 
 
 def _origins(
-    chain: Chain, placed: Sequence[Placement], axes: Sequence[Array], feet: Sequence[Foot]
+    chain: Mechanism, placed: Sequence[Placement], axes: Sequence[Array], feet: Sequence[Foot]
 ) -> list[Array]:
     """Origins at q = 0 in the base frame. Parallel neighbours share a level; sliding axes go through a neighbour."""
     n, children = len(chain), _first_children(chain)
@@ -216,7 +216,7 @@ def _foot(point: Array, axis: Array, other_point: Array, other_axis: Array) -> A
 
 
 def _orientations(
-    chain: Chain, placed: Sequence[Placement], axes: Sequence[Array], origins: Sequence[Array]
+    chain: Mechanism, placed: Sequence[Placement], axes: Sequence[Array], origins: Sequence[Array]
 ) -> tuple[list[Array], list[Array]]:
     """Each frame's axes before and after its joint's turn, at q = 0, as columns in the base frame."""
     children, first = _first_children(chain), _first_x(chain, placed[0], axes[0])
@@ -276,7 +276,7 @@ def _normal(axis: Array, following: Array, step: Array) -> Array | None:
     return _clean(normal / length(normal))
 
 
-def _first_x(chain: Chain, first: Placement, axis: Array) -> Array:
+def _first_x(chain: Mechanism, first: Placement, axis: Array) -> Array:
     """The base is free to turn about the first axis: with gravity across it, x goes along gravity's part across."""
     across = _perpendicular(chain.gravity, axis)
     if np.linalg.norm(across) < EXACT * (1.0 + float(np.linalg.norm(chain.gravity))):

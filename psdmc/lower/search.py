@@ -22,7 +22,7 @@ from psdmc.program.cost import Cost, cost
 from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Recipe
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism
 
 BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
@@ -85,7 +85,7 @@ class Search:
 
     def __init__(
         self,
-        chain: Chain,
+        chain: Mechanism,
         representative: Array,
         theta_b: Array | None,
         budget: int = BUDGET,
@@ -197,7 +197,7 @@ class _Descent:
         return improved
 
 
-def all_feet(chain: Chain) -> Iterator[tuple[Foot, ...]]:
+def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
     """Where frames may sit: all on the normal to the axis before, then one at a time on the next, then all of them. A leaf
     has no next."""
     n, leaves = len(chain), chain.leaves

@@ -1,4 +1,4 @@
-"""A Chain as plain JSON values and back, every number exactly.
+"""A Mechanism as plain JSON values and back, every number exactly.
 
 JSON has no NaN and no infinity: an unknown parameter and an absent limit are null.
 """
@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from psdmc.model.json_values import entries, number, numbers, part, text, whole
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Joint, Limits, NamedFrame, Placement
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.joints import joint_type
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Limits, Mechanism, NamedFrame, Placement
 
 MOST_JOINTS = 256
 """Joints of a model file: its span alone takes 0.5 kB times the square of that, 64 MB."""
@@ -27,7 +27,7 @@ _NO_LIMIT = {"lower": -math.inf, "upper": math.inf, "speed": math.inf, "accelera
 _NO_LIMIT["effort"] = math.inf
 
 
-def chain_to_json(chain: Chain) -> dict[str, Any]:
+def chain_to_json(chain: Mechanism) -> dict[str, Any]:
     """Plain values; InputError where the robot is no serial chain, which is all that a model file holds."""
     require_derivable(chain)
     rows, columns = np.nonzero(chain.parameter_span)
@@ -60,7 +60,7 @@ def _frames(data: object) -> Sequence[object]:
     )
 
 
-def _is_tip_alone(chain: Chain) -> bool:
+def _is_tip_alone(chain: Mechanism) -> bool:
     """Whether the frames are those of every model file before there were any."""
     return [frame.name for frame in chain.frames] == [chain.tip_name]
 
@@ -75,7 +75,7 @@ def _frame_from_json(data: object, joints: int) -> NamedFrame:
     return NamedFrame(name, joint, _placement_from_json(part(data, "placement", "a frame"), "a frame"))
 
 
-def chain_from_json(data: object) -> Chain:
+def chain_from_json(data: object) -> Mechanism:
     """The chain; ValueError says which value is not a chain's."""
     listed = entries(part(data, "joints", "the chain"), "the chain's joints", MOST_JOINTS)
     if not listed:
@@ -83,7 +83,7 @@ def chain_from_json(data: object) -> Chain:
     convention = text(part(data, "convention", "the chain"), "the chain's convention")
     if convention not in ("urdf", "standard", "modified"):
         raise ValueError(f"the chain's convention is {convention!r}")
-    return Chain(
+    return Mechanism(
         name=text(part(data, "name", "the chain"), "the chain's name"),
         convention=convention,  # type: ignore[arg-type]
         base_name=text(part(data, "base_name", "the chain"), "the chain's base"),

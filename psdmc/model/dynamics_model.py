@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.model import equations, evaluate, payload, recursive, store
 from psdmc.model.expansion import Expansion
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, Placement, frozen_array
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -30,7 +30,7 @@ class DynamicsModel:
     expansion    E and P; None where derived with --no-expand
     theta_b      (l,) float      base parameters, SI, units per entry; None while unknown
     B            (l, 11n) float  theta_b = B @ x for standard parameters x within the chain's parameter_span
-    chain        the robot: joints, link frames, gravity, limits, standard parameters
+    mechanism    the robot: joints, link frames, gravity, limits, standard parameters
     certificate  (n,)            largest torque error against Newton-Euler on fresh samples, per joint,
                                  relative to that joint's largest torque there
     provenance   plain JSON values: source text, its hash and format, options, snapping and its effect, tolerances
@@ -39,12 +39,12 @@ class DynamicsModel:
     expansion: Expansion | None
     theta_b: Array | None
     B: Array
-    chain: Chain
+    mechanism: Mechanism
     certificate: Array
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        n, l = len(self.chain), np.asarray(self.B).shape[0]
+        n, l = len(self.mechanism), np.asarray(self.B).shape[0]
         object.__setattr__(self, "B", frozen_array(self.B, (l, PARAMETERS_PER_LINK * n), "B"))
         object.__setattr__(self, "certificate", frozen_array(self.certificate, (n,), "certificate"))
         if self.theta_b is not None:
@@ -56,13 +56,18 @@ class DynamicsModel:
             )
 
     @property
+    def chain(self) -> Mechanism:
+        """The mechanism, by its name in psdmc 0.1."""
+        return self.mechanism
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
-        return self.chain.joint_names
+        return self.mechanism.joint_names
 
     @property
     def n(self) -> int:
         """Number of joints."""
-        return len(self.chain)
+        return len(self.mechanism)
 
     @property
     def l(self) -> int:  # noqa: E743  the paper's letter
@@ -108,10 +113,10 @@ class DynamicsModel:
         Each base parameter sits on its pivot, the first column of B that belongs to it alone; the span's
         other coordinates are zero. B @ representative = 1.
         """
-        leads = np.argmax(self.chain.parameter_span != 0.0, axis=0)
+        leads = np.argmax(self.mechanism.parameter_span != 0.0, axis=0)
         column_of = {int(row): column for column, row in enumerate(leads)}
         return frozen_array(
-            self.chain.parameter_span[:, [column_of[pivot] for pivot in self.pivots]],
+            self.mechanism.parameter_span[:, [column_of[pivot] for pivot in self.pivots]],
             (PARAMETERS_PER_LINK * self.n, self.l),
             "representative",
         )
@@ -126,7 +131,8 @@ class DynamicsModel:
         """theta_b; InputError while it is unknown."""
         if self.theta_b is None:
             raise InputError(
-                f"the base parameters of '{self.chain.name}' are unknown", "calibrate, or give all inertias"
+                f"the base parameters of '{self.mechanism.name}' are unknown",
+                "calibrate, or give all inertias",
             )
         return self.theta_b
 
@@ -142,30 +148,30 @@ class DynamicsModel:
 
     def torques_for(self, theta_b: Array, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Inverse dynamics with base parameters (l,) that are not the model's own."""
-        shape, arrays = evaluate.states(self.chain, q=q, qd=qd, qdd=qdd)
+        shape, arrays = evaluate.states(self.mechanism, q=q, qd=qd, qdd=qdd)
         if self.expansion is None:
-            found = recursive.torques(self.chain, self.representative @ theta_b, arrays)
+            found = recursive.torques(self.mechanism, self.representative @ theta_b, arrays)
         else:
-            found = evaluate.torques(self.expansion, self.chain, theta_b, arrays)
+            found = evaluate.torques(self.expansion, self.mechanism, theta_b, arrays)
         return found.reshape(*shape, self.n)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Y (..., n, l) with tau = Y theta_b."""
-        shape, arrays = evaluate.states(self.chain, q=q, qd=qd, qdd=qdd)
+        shape, arrays = evaluate.states(self.mechanism, q=q, qd=qd, qdd=qdd)
         if self.expansion is None:
-            found = recursive.regressor(self.chain, self.representative, arrays)
+            found = recursive.regressor(self.mechanism, self.representative, arrays)
         else:
-            found = evaluate.regressor(self.expansion, self.chain, arrays)
+            found = evaluate.regressor(self.expansion, self.mechanism, arrays)
         return found.reshape(*shape, self.n, self.l)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q), (..., n, n)."""
         theta = self.known_theta_b()
-        shape, (angles,) = evaluate.states(self.chain, q=q)
+        shape, (angles,) = evaluate.states(self.mechanism, q=q)
         if self.expansion is None:
-            found = recursive.mass_matrix(self.chain, self.standard_parameters(), angles)
+            found = recursive.mass_matrix(self.mechanism, self.standard_parameters(), angles)
         else:
-            found = evaluate.mass_matrix(self.expansion, self.chain, theta, angles)
+            found = evaluate.mass_matrix(self.expansion, self.mechanism, theta, angles)
         return found.reshape(*shape, self.n, self.n)
 
     def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
@@ -179,7 +185,7 @@ class DynamicsModel:
     @property
     def base_parameters(self) -> tuple[equations.BaseParameter, ...]:
         """Equation, unit and value of each entry of theta_b."""
-        return equations.base_parameters(self.chain, self.B, self.pivots, self.theta_b)
+        return equations.base_parameters(self.mechanism, self.B, self.pivots, self.theta_b)
 
     @property
     def content_hash(self) -> str:
@@ -208,12 +214,13 @@ class DynamicsModel:
         InputError where the numbers are no rigid body's, beyond the ranges of robot files, or the model's assumptions
         do not admit the load.
         """
-        load = payload.load_parameters(self.chain, mass, com, inertia, frame)
-        body = payload.carrying_frame(self.chain, frame).joint
-        chain = payload.loaded(self.chain, load, float(mass), body)
+        load = payload.load_parameters(self.mechanism, mass, com, inertia, frame)
+        body = payload.carrying_frame(self.mechanism, frame).joint
+        chain = payload.loaded(self.mechanism, load, float(mass), body)
         if self.theta_b is None:
             raise InputError(
-                f"the base parameters of '{self.chain.name}' are unknown", "calibrate before adding a load"
+                f"the base parameters of '{self.mechanism.name}' are unknown",
+                "calibrate before adding a load",
             )
         index = payload.body_parameters(body)
-        return replace(self, theta_b=self.theta_b + self.B[:, index] @ load, chain=chain)
+        return replace(self, theta_b=self.theta_b + self.B[:, index] @ load, mechanism=chain)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.robot.chain import PARAMETER_NAMES, PARAMETERS_PER_LINK, Chain, Joint
+from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Joint, Mechanism
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ class _Known:
 
 
 def base_parameters(
-    chain: Chain, B: Array, pivots: Sequence[int], theta_b: Array | None
+    chain: Mechanism, B: Array, pivots: Sequence[int], theta_b: Array | None
 ) -> tuple[BaseParameter, ...]:
     """Equation, unit and value of each entry of theta_b.
 
@@ -74,7 +74,7 @@ def standard_name(index: int) -> str:
     return f"{PARAMETER_NAMES[parameter]}{joint + 1}"
 
 
-def dh_lengths(chain: Chain) -> dict[str, float]:
+def dh_lengths(chain: Mechanism) -> dict[str, float]:
     """a and d of a DH table by name, zeros left out; empty for a URDF."""
     lengths: dict[str, float] = {}
     for number, joint in enumerate(chain.joints, start=1):
@@ -94,14 +94,14 @@ def _row_lengths(joint: Joint, convention: str) -> list[tuple[str, float]]:
     return []
 
 
-def _order(index: int, chain: Chain) -> int:
+def _order(index: int, chain: Mechanism) -> int:
     joint, parameter = divmod(index, PARAMETERS_PER_LINK)
     if parameter < len(_LENGTH_ORDER):
         return _LENGTH_ORDER[parameter]
     return chain.joints[joint].type.drive_order
 
 
-def _unit(index: int, chain: Chain) -> str:
+def _unit(index: int, chain: Mechanism) -> str:
     return _UNITS[_order(index, chain)]
 
 
@@ -123,7 +123,7 @@ def _known_numbers(lengths: dict[str, float]) -> Iterator[_Known]:
             yield _Known(1.0 / (value * length), -2, "", f"/({name} {other})")
 
 
-def _equation(row: Array, pivot: int, chain: Chain, known: list[_Known]) -> str:
+def _equation(row: Array, pivot: int, chain: Mechanism, known: list[_Known]) -> str:
     others = [int(index) for index in np.flatnonzero(row) if index != pivot]
     text = standard_name(pivot)
     for index in others:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError
 from psdmc.model.expansion import Expansion
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -21,7 +21,7 @@ CHUNK_BYTES = 64 * 2**20
 """Function values held at once."""
 
 
-def states(chain: Chain, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
+def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
     """The broadcast leading shape, and each vector as (states, n) float64; InputError where a shape does not
     fit."""
     n = len(chain)
@@ -40,7 +40,7 @@ def states(chain: Chain, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Ar
     return shape[:-1], [np.broadcast_to(a, shape).reshape(-1, n) for a in arrays.values()]
 
 
-def function_values(expansion: Expansion, chain: Chain, q: Array, qd: Array, qdd: Array) -> Array:
+def function_values(expansion: Expansion, chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Array:
     """(p, states) values of y from (states, n) arrays: products of the rows of E, gravity functions times
     |g|."""
     rows = np.concatenate([q.T, np.sin(q).T, np.cos(q).T, qd.T, qdd.T])
@@ -55,13 +55,13 @@ def function_values(expansion: Expansion, chain: Chain, q: Array, qd: Array, qdd
     return values
 
 
-def torques(expansion: Expansion, chain: Chain, theta: Array, arrays: list[Array]) -> Array:
+def torques(expansion: Expansion, chain: Mechanism, theta: Array, arrays: list[Array]) -> Array:
     """tau (states, n), N m or N, of base parameters (l,) along q, qd, qdd (states, n)."""
     weights = _weights(expansion, theta)
     return _by_chunks(expansion, chain, arrays, lambda y: (weights @ y).T)
 
 
-def regressor(expansion: Expansion, chain: Chain, arrays: list[Array]) -> Array:
+def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Array:
     """Y (states, n, l) with tau = Y theta_b, along q, qd, qdd (states, n)."""
     transposed = [matrix.T.tocsr() for matrix in expansion.P]
 
@@ -71,7 +71,7 @@ def regressor(expansion: Expansion, chain: Chain, arrays: list[Array]) -> Array:
     return _by_chunks(expansion, chain, arrays, rows)
 
 
-def mass_matrix(expansion: Expansion, chain: Chain, theta: Array, q: Array) -> Array:
+def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) -> Array:
     """M (states, n, n) at q (states, n): column j is what the functions with qdd_j give for qdd_j = 1."""
     n, weights = expansion.n, _weights(expansion, theta)
     columns = [np.flatnonzero(expansion.E[4 * n + j]) for j in range(n)]
@@ -92,7 +92,7 @@ def _weights(expansion: Expansion, theta: Array) -> sparse.csr_array:
 
 
 def _by_chunks(
-    expansion: Expansion, chain: Chain, arrays: list[Array], result: Callable[[Array], Array]
+    expansion: Expansion, chain: Mechanism, arrays: list[Array], result: Callable[[Array], Array]
 ) -> Array:
     """result(function values) for few enough states at a time, put together along the states."""
     count = len(arrays[0])

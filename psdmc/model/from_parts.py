@@ -17,8 +17,8 @@ from psdmc.model import json_values as json
 from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Entries, Expansion
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
 from psdmc.robot.load_options import LoadOptions
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -50,7 +50,7 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
         expansion=_expansion(arrays, n, l) if is_expanded else None,
         theta_b=arrays["theta_b"] if is_known else None,
         B=arrays["B"],
-        chain=chain,
+        mechanism=chain,
         certificate=json.numbers(certificate, "the certificate", n),
         provenance=_provenance(json.part(manifest, "provenance", "the manifest"), n),
     )
@@ -65,7 +65,7 @@ def _check_kinds(arrays: Arrays) -> None:
             )
 
 
-def _check_base_parameters(arrays: Arrays, chain: Chain, l: int, is_known: bool) -> None:
+def _check_base_parameters(arrays: Arrays, chain: Mechanism, l: int, is_known: bool) -> None:
     B, span = arrays["B"], chain.parameter_span
     if B.shape[1] != PARAMETERS_PER_LINK * len(chain) or l > B.shape[1]:
         raise ValueError(f"B has shape {B.shape} for {len(chain)} joints")

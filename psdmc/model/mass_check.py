@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Joint
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint
 
 Array = NDArray[np.float64]
 
@@ -63,9 +63,9 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
     """M(q) in POSES seeded poses within the joint limits; None while the base parameters are unknown."""
     if model.theta_b is None:
         return None
-    low, high = (np.array(bound) for bound in zip(*map(_range, model.chain.joints), strict=True))
+    low, high = (np.array(bound) for bound in zip(*map(_range, model.mechanism.joints), strict=True))
     poses = np.random.default_rng(SEED).uniform(low, high, size=(POSES, model.n))
-    mass = recursive.mass_matrix(model.chain, model.standard_parameters(), poses)
+    mass = recursive.mass_matrix(model.mechanism, model.standard_parameters(), poses)
     failing = ~_is_definite(mass, ROUNDING * _magnitudes(model, np.abs(poses).max(axis=0)))
     values, vectors = np.linalg.eigh(mass)
     worst = int(np.argmin(np.where(failing == failing.any(), values[:, 0], np.inf)))
@@ -86,15 +86,15 @@ def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:
 def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
     """(n,) at most what the parameters add up to in each joint's own inertia, whatever their signs. `travel` (n,), how far
     sliding joints go."""
-    chain = model.chain
+    mechanism = model.mechanism
     x = np.abs(model.standard_parameters()).reshape(model.n, PARAMETERS_PER_LINK)
     masses, firsts, seconds, result = x[:, 0], x[:, 1:4].sum(axis=1), x[:, 4:10].sum(axis=1), x[:, 10].copy()
-    slides = [joint.type.turn(1.0) is None for joint in chain.joints]
-    steps = [math.hypot(*joint.placement.translation) for joint in chain.joints]
+    slides = [joint.type.turn(1.0) is None for joint in mechanism.joints]
+    steps = [math.hypot(*joint.placement.translation) for joint in mechanism.joints]
     steps = [step + far * along for step, far, along in zip(steps, travel, slides, strict=True)]
-    for body, joint in enumerate(chain.joints):
+    for body, joint in enumerate(mechanism.joints):
         far = math.hypot(*joint.link_frame.translation)
-        for i in reversed(chain.path_to(body)):
+        for i in reversed(mechanism.path_to(body)):
             turned = seconds[body] + 2.0 * far * firsts[body] + far**2 * masses[body]
             result[i] += masses[body] if slides[i] else turned
             far += steps[i]

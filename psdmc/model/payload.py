@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.dynamics.parameters import BODY_PARAMETERS, moved, moving_map, standard_parameters
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain, NamedFrame, Placement
 from psdmc.robot.inertia import physical_fault, six_of
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, NamedFrame, Placement
 from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ SPAN_TOLERANCE = 1e-9
 """Share of the load by which it may miss the parameters that the model admits: rounding only."""
 
 
-def loaded(chain: Chain, load: Array, mass: float, body: int) -> Chain:
+def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
     """The chain with the load on one of its links; InputError where the chain's assumptions do not admit it.
 
     load  (10,) standard parameters of `load_parameters`
@@ -43,7 +43,7 @@ def body_parameters(body: int) -> NDArray[np.int64]:
 
 
 def load_parameters(
-    chain: Chain,
+    chain: Mechanism,
     mass: float,
     com: ArrayLike,
     inertia: ArrayLike | None = None,
@@ -59,7 +59,7 @@ def load_parameters(
     return moved(own, chain.joints[place.joint].link_frame.inverse() @ place.placement)
 
 
-def load_map(chain: Chain, B: Array, frame: NamedFrame) -> Array:
+def load_map(chain: Mechanism, B: Array, frame: NamedFrame) -> Array:
     """(l, 10) what a load at a frame adds to theta_b = B x, by its mass, first moment and inertia about that frame's origin.
 
     InputError where the chain's assumptions do not admit every load there.
@@ -71,7 +71,7 @@ def load_map(chain: Chain, B: Array, frame: NamedFrame) -> Array:
     return np.asarray(times(B[:, body_parameters(frame.joint)], moving))
 
 
-def carrying_frame(chain: Chain, frame: Placement | str | None) -> NamedFrame:
+def carrying_frame(chain: Mechanism, frame: Placement | str | None) -> NamedFrame:
     """Where a load's numbers are given, in the joint frame of the link that carries it."""
     tip = chain.tip_frame
     if isinstance(frame, Placement):
@@ -143,7 +143,7 @@ def array_of(values: ArrayLike) -> Array | None:
 _SHAPES = {(): "a finite number", (3,): "three finite numbers", (3, 3): "3 x 3 finite numbers"}
 
 
-def _check_admitted(chain: Chain, load: Array, body: int) -> None:
+def _check_admitted(chain: Mechanism, load: Array, body: int) -> None:
     """The load must lie in the span: a link whose mx is assumed zero cannot carry one off its axis."""
     x = np.zeros(PARAMETERS_PER_LINK * len(chain))
     x[body_parameters(body)] = load

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.dynamics.parameters import BODY_PARAMETERS, inertia_of, standard_parameters
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Chain
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 
 Array = NDArray[np.float64]
 
 SEED = 14_630
 
 
-def random_parameters(chain: Chain) -> Array:
+def random_parameters(chain: Mechanism) -> Array:
     """(11 n,) standard parameters of physical bodies, as far as the chain's assumptions admit them."""
     rng = np.random.default_rng(SEED)
     x = np.zeros((len(chain), PARAMETERS_PER_LINK))

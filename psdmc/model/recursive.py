@@ -13,12 +13,12 @@ from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor as standard_regressor
 from psdmc.dynamics.scalar import Scalar
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 
 
-def torques(chain: Chain, x: Array, arrays: list[Array]) -> Array:
+def torques(chain: Mechanism, x: Array, arrays: list[Array]) -> Array:
     """tau (states, n), N m or N, of standard parameters (11n,) along q, qd, qdd (states, n)."""
     q, qd, qdd = (list(array.T) for array in arrays)
     bodies, drives = bodies_of(chain, x), drive_inertia_of(x)
@@ -26,13 +26,13 @@ def torques(chain: Chain, x: Array, arrays: list[Array]) -> Array:
     return _columns(found, len(arrays[0]))
 
 
-def mass_matrix(chain: Chain, x: Array, q: Array) -> Array:
+def mass_matrix(chain: Mechanism, x: Array, q: Array) -> Array:
     """M(q) (states, n, n) from (states, n) by composite bodies of standard parameters (11n,)."""
     rows = composite_bodies(frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), list(q.T))
     return np.stack([_columns(row, len(q)) for row in rows], axis=1)
 
 
-def regressor(chain: Chain, representative: Array, arrays: list[Array]) -> Array:
+def regressor(chain: Mechanism, representative: Array, arrays: list[Array]) -> Array:
     """Y (states, n, l) along q, qd, qdd (states, n).
 
     representative  (11n, l)  base parameters to standard ones

@@ -12,7 +12,7 @@ BELONGS = 1e-9
 
 def lack_of_standard_parameters(model: DynamicsModel) -> str | None:
     """Why mass, centre and inertia of every link cannot be taken from the model's chain; None where they can."""
-    parameters = model.chain.parameters
+    parameters = model.mechanism.parameters
     if np.isnan(parameters).any():
         return "it needs mass and inertia of every link, and some are unknown"
     if not parameters[:, 0].sum() > 0.0:

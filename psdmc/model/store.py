@@ -22,7 +22,7 @@ from psdmc.atomic import write_whole
 from psdmc.errors import InputError
 from psdmc.model.chain_json import MOST_JOINTS, chain_to_json
 from psdmc.model.expansion import Entries, Expansion
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 from psdmc.version import psdmc_version
 
 SCHEMA = 1
@@ -48,7 +48,7 @@ class Model(Protocol):
     def B(self) -> NDArray[np.float64]: ...
 
     @property
-    def chain(self) -> Chain: ...
+    def mechanism(self) -> Mechanism: ...
 
     @property
     def certificate(self) -> NDArray[np.float64]: ...
@@ -60,7 +60,7 @@ class Model(Protocol):
 def save(model: Model, path: str | Path) -> None:
     """Write a model file, whole or not at all; InputError where the place does not admit it, ToolchainError
     where the disk does not."""
-    n = len(model.chain)
+    n = len(model.mechanism)
     if n > MOST_JOINTS:
         raise InputError(
             f"{path}: {n} joints, model files hold up to {MOST_JOINTS}",
@@ -92,7 +92,7 @@ def content_hash(model: Model) -> str:
 
 
 def _arrays(model: Model) -> dict[str, NDArray[Any]]:
-    expansion = model.expansion or _nothing(len(model.chain), len(model.B))
+    expansion = model.expansion or _nothing(len(model.mechanism), len(model.B))
     joint, row, column, value = expansion.entries
     return {
         "E": expansion.E,
@@ -118,7 +118,7 @@ def _manifest(model: Model) -> dict[str, Any]:
         "expanded": model.expansion is not None,
         "theta_b_known": model.theta_b is not None,
         "certificate": model.certificate.tolist(),
-        "chain": chain_to_json(model.chain),
+        "chain": chain_to_json(model.mechanism),
         "provenance": dict(model.provenance),
     }
 

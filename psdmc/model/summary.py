@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
-from psdmc.robot.chain import Joint
+from psdmc.robot.mechanism import Joint
 
 
 class Sizes(NamedTuple):
@@ -52,7 +52,7 @@ class Summary:
 
 def summary(model: DynamicsModel) -> Summary:
     """Everything that `psdmc show` prints by default."""
-    chain, kept = model.chain, model.provenance
+    chain, kept = model.mechanism, model.provenance
     gx, gy, gz = chain.gravity.tolist()
     return Summary(
         name=chain.name,

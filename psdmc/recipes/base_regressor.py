@@ -10,7 +10,7 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Ingredients
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 from psdmc.robot.small import times
 
 

@@ -15,7 +15,7 @@ from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.scalar import Scalar, Vector
-from psdmc.robot.chain import Array, Chain
+from psdmc.robot.mechanism import Array, Mechanism
 from psdmc.robot.small import times
 
 if TYPE_CHECKING:
@@ -29,14 +29,14 @@ class RobotOnArrays:
     lift   (11 n, l) theta_b to such parameters
     """
 
-    chain: Chain
+    chain: Mechanism
     x: Array
     lift: Array
 
     @staticmethod
     def of(model: DynamicsModel, theta_b: Array) -> RobotOnArrays:
         """A model with these base parameters."""
-        return RobotOnArrays(model.chain, times(model.representative, theta_b), model.representative)
+        return RobotOnArrays(model.mechanism, times(model.representative, theta_b), model.representative)
 
     @property
     def n(self) -> int:

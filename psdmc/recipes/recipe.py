@@ -12,7 +12,7 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.program.signature import Signature
-from psdmc.robot.chain import Array, NamedFrame, Placement
+from psdmc.robot.mechanism import Array, NamedFrame, Placement
 
 if TYPE_CHECKING:
     from psdmc.recipes.on_arrays import RobotOnArrays

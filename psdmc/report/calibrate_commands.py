@@ -112,8 +112,8 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
     """C for a calibrated model's friction and motors; InputError where it was not calibrated."""
     found = model.provenance.get("calibration")
     if found is None:
-        raise InputError(f"{model.chain.name}: not calibrated", "run `psdmc calibrate` first")
-    view = calibrated_actuators(model.chain.name, model.joint_names, found)
+        raise InputError(f"{model.mechanism.name}: not calibrated", "run `psdmc calibrate` first")
+    view = calibrated_actuators(model.mechanism.name, model.joint_names, found)
     files = actuator_files(view)
     write_together(Path(folder), files)
     return [Path(folder) / path for path in files]

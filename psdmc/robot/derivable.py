@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from psdmc.errors import InputError
-from psdmc.robot.chain import BASE, Chain
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import BASE, Mechanism
 
 CUT = "choose a chain in it with --base and --tip"
 FREE = "make it a fixed joint, or leave out what it follows"
 
 
-def require_derivable(chain: Chain) -> None:
+def require_derivable(chain: Mechanism) -> None:
     """InputError where the robot is no serial chain, each joint with a coordinate of its own; the hint is the remedy."""
     fault = _fork(chain) or _inner_tip(chain)
     if fault is not None:
@@ -21,7 +21,7 @@ def require_derivable(chain: Chain) -> None:
         raise InputError(f"{shown(chain.name)}: {follower}, and psdmc derives independent joints only", FREE)
 
 
-def _fork(chain: Chain) -> str | None:
+def _fork(chain: Mechanism) -> str | None:
     """The first link, or base, that carries several joints."""
     for body in range(BASE, len(chain)):
         carried = [shown(chain.joints[i].name) for i, parent in enumerate(chain.parents) if parent == body]
@@ -31,13 +31,13 @@ def _fork(chain: Chain) -> str | None:
     return None
 
 
-def _inner_tip(chain: Chain) -> str | None:
+def _inner_tip(chain: Mechanism) -> str | None:
     if chain.tip_body in chain.leaves:
         return None
     return f"the tip is on link {shown(chain.joints[chain.tip_body].link_name)}, which carries other joints"
 
 
-def _follower(chain: Chain) -> str | None:
+def _follower(chain: Mechanism) -> str | None:
     """The first joint without a coordinate of its own."""
     for i, coordinate in enumerate(chain.coordinates):
         name = f"joint {shown(chain.joints[i].name)}"

@@ -12,10 +12,10 @@ from typing import Any, Literal
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.chain import Limits
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import JOINT_TYPES, REVOLUTE, JointType
 from psdmc.robot.limits import Range, shown
+from psdmc.robot.mechanism import Limits
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.numerals import WHITE_SPACE, decimal
 from psdmc.robot.zeros import ZERO_NAMES

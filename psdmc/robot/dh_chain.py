@@ -13,11 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.robot.chain import Array, Joint, NamedFrame, Placement
 from psdmc.robot.dh import DhJoint, DhLink, DhRobot, read_dh
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, standard_parameters
 from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 from psdmc.robot.rotation import about
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, snap_rotation

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pinocchio
 
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelPZ}
 """Pinocchio's joints by a row's type; written down here, because this reader shares nothing with the other."""

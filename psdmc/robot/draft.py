@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from psdmc.robot.chain import Array, Joint, NamedFrame, Placement
+from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 
 
 @dataclass(frozen=True, slots=True)

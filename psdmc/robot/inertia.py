@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 INERTIA_NAMES = ("xx", "xy", "yy", "xz", "yz", "zz")
 """Order of the six inertia components within the standard parameters."""

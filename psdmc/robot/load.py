@@ -11,11 +11,11 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, NamedFrame
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, NamedFrame
 from psdmc.robot.tool import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
@@ -29,18 +29,23 @@ DRIVE = PARAMETERS_PER_LINK - 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRobot:
-    """A chain and what it was made from.
+    """A mechanism and what it was made from.
 
     source_name   how the file is called in messages
     snap_report   every rotation that was replaced by a near exact one, with the angle between (rad)
     """
 
-    chain: Chain
+    mechanism: Mechanism
     source_text: str
     source_format: SourceFormat
     source_name: str
     snap_report: tuple[Snap, ...]
     options: LoadOptions
+
+    @property
+    def chain(self) -> Mechanism:
+        """The mechanism, by its name in psdmc 0.1."""
+        return self.mechanism
 
     def unsnapped(self) -> LoadedRobot:
         """The same robot with the file's own rotations, to see what snapping changed."""
@@ -137,7 +142,7 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
     return dh_draft(text, source, gravity, options.snap, options.frames)
 
 
-def _settled(draft: Draft, options: LoadOptions, source: str) -> Chain:
+def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
     """The chain with drive inertias and zeros decided."""
     link_names = [joint.link_name for joint in draft.joints]
     joint_names = [joint.name for joint in draft.joints]
@@ -151,7 +156,7 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Chain:
         link_values(np.append(x[:DRIVE], drive or 0.0), zero)
         for x, drive, zero in zip(draft.parameters, given, zeros, strict=True)
     ]
-    return Chain(
+    return Mechanism(
         name=draft.name,
         convention=draft.convention,
         base_name=draft.base_name,

@@ -8,9 +8,9 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array
 from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference import has_assumptions
 from psdmc.robot.urdf_chain import STANDARD_GRAVITY
@@ -49,12 +49,12 @@ def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Arra
     """
     mujoco = _mujoco()
     model = _model(mujoco, loaded)
-    names = [JOINT_PREFIX + name for name in loaded.chain.joint_names]
+    names = [JOINT_PREFIX + name for name in loaded.mechanism.joint_names]
     joints = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in names]
     if -1 in joints or model.nv != len(joints):
         raise NotCompared("MuJoCo finds other joints")
     places, speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-    model.dof_armature[speeds] = loaded.chain.parameters[:, DRIVE]
+    model.dof_armature[speeds] = loaded.mechanism.parameters[:, DRIVE]
     data = mujoco.MjData(model)
     torques = np.zeros_like(q)
     for k in range(len(q)):
@@ -84,7 +84,7 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     dropped = _massless(root)
     if dropped:
         raise NotCompared(f"MuJoCo drops inertia without mass, as link {shown(dropped)} has it")
-    text = dynamics_of(root, loaded.chain.joint_names, {})
+    text = dynamics_of(root, loaded.mechanism.joint_names, {})
     SubElement(SubElement(text, "mujoco"), "compiler", COMPILER)
     try:
         model = mujoco.MjModel.from_xml_string(tostring(text, encoding="unicode"))

@@ -19,9 +19,9 @@ import numpy as np
 import pinocchio
 
 from psdmc.errors import InputError
-from psdmc.robot.chain import PARAMETERS_PER_LINK, Array, Chain, Placement, frozen_array
 from psdmc.robot.dh_textbook import dh_model
 from psdmc.robot.load import LoadedRobot
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 from psdmc.robot.tool import TOOL
 
@@ -39,7 +39,7 @@ def reference_model(
     Bodies with parameters assumed zero get the chain's values, which the source does not know. ValueError
     where parameters are needed and unknown.
     """
-    chain = loaded.chain
+    chain = loaded.mechanism
     model = as_written(loaded)
     if parameters is None:
         values, replaced = chain.parameters, _assumed(chain)
@@ -60,7 +60,7 @@ def as_written(loaded: LoadedRobot) -> pinocchio.Model:
     is_urdf = loaded.source_format == "urdf"
     model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
     if loaded.options.tool is not None:
-        _add_tool(model, loaded.chain.tip_name, loaded.options.tool)
+        _add_tool(model, loaded.mechanism.tip_name, loaded.options.tool)
     return model
 
 
@@ -167,13 +167,13 @@ class Reference:
 def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None) -> Reference:
     """reference_model with its functions at hand."""
     model = reference_model(loaded, snapped=snapped, parameters=parameters)
-    names = tuple(frame.name for frame in loaded.chain.frames)
-    return Reference(model, loaded.chain.tip_name, names)
+    names = tuple(frame.name for frame in loaded.mechanism.frames)
+    return Reference(model, loaded.mechanism.tip_name, names)
 
 
 def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     """The file as Pinocchio reads it, all but the chain's joints locked at neutral, seen from the base."""
-    chain = loaded.chain
+    chain = loaded.mechanism
     whole = pinocchio_model(loaded.source_text, loaded.source_name)
     wanted = [JOINT_PREFIX + name for name in chain.joint_names]
     others = [k for k in range(1, whole.njoints) if whole.names[k] not in wanted]
@@ -207,7 +207,7 @@ def body_of(parameters: Array) -> pinocchio.Inertia:
     return pinocchio.Inertia.FromDynamicParameters(np.array([mass, *parameters[1:DRIVE]]))
 
 
-def _set_bodies(model: pinocchio.Model, chain: Chain, parameters: Array, which: list[int]) -> None:
+def _set_bodies(model: pinocchio.Model, chain: Mechanism, parameters: Array, which: list[int]) -> None:
     """Give the joints `which` bodies by their standard parameters (n, 11) about the link frames."""
     for k in which:
         link = model.frames[model.getFrameId(chain.joints[k].link_name, pinocchio.FrameType.BODY)]
@@ -220,10 +220,10 @@ def pinocchio_version() -> str:
 
 def has_assumptions(loaded: LoadedRobot) -> bool:
     """Whether some bodies cannot be had from the file alone: assumed zeros and unknowns."""
-    return bool(_assumed(loaded.chain))
+    return bool(_assumed(loaded.mechanism))
 
 
-def _assumed(chain: Chain) -> list[int]:
+def _assumed(chain: Mechanism) -> list[int]:
     """Joints whose bodies have zeros that the span, not the source, knows of; and those with unknowns."""
     span = chain.parameter_span.reshape(len(chain), PARAMETERS_PER_LINK, -1)[:, :DRIVE]
     return [
@@ -233,7 +233,7 @@ def _assumed(chain: Chain) -> list[int]:
     ]
 
 
-def _placed_as(chain: Chain, model: pinocchio.Model) -> pinocchio.Model:
+def _placed_as(chain: Mechanism, model: pinocchio.Model) -> pinocchio.Model:
     """The model's bodies on joints that sit as the chain's do, about their z."""
     placed = pinocchio.Model()
     placed.name = model.name

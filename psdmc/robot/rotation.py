@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 from psdmc.robot.small import times
 from psdmc.robot.snap import snap_rotation
 

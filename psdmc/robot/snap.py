@@ -14,7 +14,7 @@ from itertools import permutations
 
 import numpy as np
 
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 ROUNDING = 1e-14
 """rad: a smaller angle is floating-point noise of composing rotations, always cleaned, never reported."""

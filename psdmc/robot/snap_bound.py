@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 import pinocchio
 
-from psdmc.robot.chain import Array
 from psdmc.robot.draft import BASE, Snap
+from psdmc.robot.mechanism import Array
 from psdmc.robot.reference import Reference
 
 MARGIN = 2.0

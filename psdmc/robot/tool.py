@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.robot.chain import NamedFrame, Placement
+from psdmc.robot.mechanism import NamedFrame, Placement
 from psdmc.robot.urdf import Origin
 from psdmc.robot.urdf_bodies import placement_of
 

@@ -10,9 +10,9 @@ from xml.etree.ElementTree import Element
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.chain import Limits
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import URDF_TYPES
+from psdmc.robot.mechanism import Limits
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.urdf_tree import tree_faults
 from psdmc.robot.urdf_words import (

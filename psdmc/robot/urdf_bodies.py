@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.robot.chain import Array, Placement
 from psdmc.robot.inertia import inertia_matrix, six_of, standard_parameters, without_noise
 from psdmc.robot.joints import REVOLUTE
+from psdmc.robot.mechanism import Array, Placement
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.small import times

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.robot.chain import Array, Joint, NamedFrame, Placement
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.joints import URDF_TYPES
+from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, snap_translation
 from psdmc.robot.tree import Route, find_route, listed

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from psdmc.errors import InputError
-from psdmc.robot.chain import Joint, NamedFrame
 from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Joint, NamedFrame
 from psdmc.robot.tree import Route, listed
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot
 from psdmc.robot.urdf_bodies import placement_of

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.robot.chain import BASE, Chain, Joint, Placement
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.limits import MAX_JOINTS, shown
 from psdmc.robot.load import load_robot, robot_text
 from psdmc.robot.load_options import DEFAULT_SNAP
+from psdmc.robot.mechanism import BASE, Joint, Mechanism, Placement
 from psdmc.robot.snap import snap_axis
 from psdmc.robot.urdf import MOVABLE, UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import merged_onto, placement_of
@@ -21,7 +21,7 @@ from psdmc.robot.urdf_chain import STANDARD_GRAVITY, link_rotation, merged_place
 from psdmc.robot.zeros import block_diagonal, link_span
 
 
-def whole_robot(path: str | Path) -> Chain:
+def whole_robot(path: str | Path) -> Mechanism:
     """All that a robot file holds: a URDF's whole tree, or the chain of a DH table. InputError names what is wrong."""
     file = Path(path)
     if file.suffix.lower() == ".toml":
@@ -29,7 +29,7 @@ def whole_robot(path: str | Path) -> Chain:
     return urdf_mechanism(robot_text(file), file.name)
 
 
-def urdf_mechanism(text: str, source: str, snap: float = DEFAULT_SNAP) -> Chain:
+def urdf_mechanism(text: str, source: str, snap: float = DEFAULT_SNAP) -> Mechanism:
     """The URDF's tree from its root, joints in the order of Pinocchio's buildModelFromUrdf, fixed links merged.
 
     A mimic joint's coordinate is its leader's; one that follows a follower, the first leader's. The tip is the first
@@ -43,7 +43,7 @@ def urdf_mechanism(text: str, source: str, snap: float = DEFAULT_SNAP) -> Chain:
     bodies = merged_onto(robot, movable)
     n = len(movable)
     tip = next(i for i in range(n) if i not in parents)
-    return Chain(
+    return Mechanism(
         name=robot.name,
         convention="urdf",
         base_name=robot.root,

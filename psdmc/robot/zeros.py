@@ -19,8 +19,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.robot.chain import PARAMETER_NAMES, PARAMETERS_PER_LINK, Array
 from psdmc.robot.inertia import INERTIA_NAMES, about_com, standard_parameters
+from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Array
 
 COM_NAMES = ("rx", "ry", "rz", *(f"I{name}@com" for name in INERTIA_NAMES))
 ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)

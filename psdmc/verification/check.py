@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
-from psdmc.robot.chain import PARAMETERS_PER_LINK
 from psdmc.robot.load import LoadedRobot, load_robot_text
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
 from psdmc.robot.reference import Reference, pinocchio_version, reference
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
@@ -89,7 +89,7 @@ def source_of(model: DynamicsModel) -> LoadedRobot:
     """The robot that the model was derived from, read again from the source embedded in it."""
     kept = model.provenance
     if not {"source_text", "source_format", "options"} <= set(kept):
-        raise InputError(f"the model of '{model.chain.name}' holds no source", "give the robot's file")
+        raise InputError(f"the model of '{model.mechanism.name}' holds no source", "give the robot's file")
     name = str(kept.get("source_name", "robot"))
     return load_robot_text(kept["source_text"], kept["source_format"], source_name=name, **kept["options"])
 
@@ -102,9 +102,9 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     theta_b). InputError where the source is another robot.
     """
     loaded = source_of(model) if source is None else source
-    if loaded.chain.joint_names != model.chain.joint_names:
+    if loaded.mechanism.joint_names != model.mechanism.joint_names:
         raise InputError(
-            f"{loaded.source_name} has joints {', '.join(loaded.chain.joint_names)}, the model has "
+            f"{loaded.source_name} has joints {', '.join(loaded.mechanism.joint_names)}, the model has "
             + ", ".join(model.joint_names),
             "give the file, base and tip that the model was derived from",
         )
@@ -132,10 +132,10 @@ def _parameters(model: DynamicsModel, loaded: LoadedRobot) -> tuple[Array, Array
     """theta_b, and the standard parameters that Pinocchio must be given; None where its own are meant."""
     if model.theta_b is not None:
         theta = np.asarray(model.theta_b)
-        for known in (loaded.chain.parameters, model.chain.parameters):
+        for known in (loaded.mechanism.parameters, model.mechanism.parameters):
             if _gives(theta, model.B, known):
-                return theta, None if known is loaded.chain.parameters else known
-    x = random_parameters(model.chain)
+                return theta, None if known is loaded.mechanism.parameters else known
+    x = random_parameters(model.mechanism)
     return model.B @ x, x.reshape(model.n, PARAMETERS_PER_LINK)
 
 
@@ -201,7 +201,7 @@ def _forward(robot: Reference, q: Array, qd: Array, qdd: Array, tau: Array) -> C
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
     """Where the chain puts links, tip and gravity, beyond what snapping says that it turned."""
     q, _, _ = _states(model.n)
-    chain = model.chain
+    chain = model.mechanism
     links = [joint.link_name for joint in chain.joints]
     expected = written.poses(q, links)
     errors = placement_errors(chain_poses(chain, q), expected)
@@ -236,7 +236,7 @@ def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) ->
         expected = mujoco_torques(loaded, *states)
     except NotCompared as reason:
         return CheckRow("inverse dynamics", MUJOCO, np.nan, None, f"not compared: {reason}")
-    tau = model.torques_for(model.B @ loaded.chain.parameters.reshape(-1), *states)
+    tau = model.torques_for(model.B @ loaded.mechanism.parameters.reshape(-1), *states)
     bound = np.full(model.n, MUJOCO_ROUNDING * float(np.abs(expected).max(initial=0.0)))
     if not angles.any():
         return CheckRow("inverse dynamics", MUJOCO, *_worst(tau, expected, bound, MUJOCO_LIMIT))

@@ -12,7 +12,7 @@ from psdmc.model.standard_parameters import lack_of_standard_parameters
 from psdmc.program.signature import TAU, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 from psdmc.robot.reference import Reference
 
 STATES = 100
@@ -41,7 +41,7 @@ def function_errors(
 
 def _states(model: DynamicsModel, robot: Reference) -> dict[str, Array]:
     """(STATES, ...) of everything that functions read."""
-    rng, sizes = np.random.default_rng(SEED), Sizes.of_chain(model.n, model.l, len(model.chain.frames))
+    rng, sizes = np.random.default_rng(SEED), Sizes.of_chain(model.n, model.l, len(model.mechanism.frames))
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
     given = {
         q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.robot.chain import BASE, Chain, Placement
+from psdmc.robot.mechanism import BASE, Mechanism, Placement
 
 Array = NDArray[np.float64]
 
 
-def chain_poses(chain: Chain, q: Array) -> Array:
+def chain_poses(chain: Mechanism, q: Array) -> Array:
     """(k, n + 1, 4, 4) of the links' frames and the tip's in the base frame, at q (k, n)."""
     return np.array([_poses_at(chain, row) for row in q])
 
@@ -47,7 +47,7 @@ def _in_the_one_before(poses: Array) -> Array:
     return np.linalg.inv(np.concatenate([base, poses[:, :-1]], axis=1)) @ poses
 
 
-def _poses_at(chain: Chain, q: Array) -> list[Array]:
+def _poses_at(chain: Mechanism, q: Array) -> list[Array]:
     frames: list[Placement] = []
     for joint, parent, value in zip(chain.joints, chain.parents, q, strict=True):
         before = Placement.identity() if parent == BASE else frames[parent]

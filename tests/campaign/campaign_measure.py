@@ -14,8 +14,8 @@ from psdmc.derivation.certify import certificate
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.chain import Chain
 from psdmc.robot.load import DEFAULT_SNAP, load_robot_text
+from psdmc.robot.mechanism import Mechanism
 
 Array = np.ndarray
 
@@ -104,7 +104,7 @@ def _of_mujoco(robot: RandomRobot, reference: Reference, found: Found) -> None:
     }
 
 
-def _of_chain(chain: Chain, name: str, reference: Reference, found: Found, turn: int | None) -> None:
+def _of_chain(chain: Mechanism, name: str, reference: Reference, found: Found, turn: int | None) -> None:
     expands = len(chain) <= EXPANDED_JOINTS
     model = derive_model(chain, expand=expands)
     plain = replace(model, E=None, P=None) if expands else model

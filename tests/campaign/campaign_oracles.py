@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pinocchio
 
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 Array = np.ndarray
 
@@ -25,7 +25,7 @@ class Pinocchio:
         return Pinocchio(pinocchio.buildModelFromXML(text))
 
     @staticmethod
-    def of_chain(chain: Chain) -> Pinocchio:
+    def of_chain(chain: Mechanism) -> Pinocchio:
         """psdmc's own chain, rounded angles made exact: what snapping left, but nothing of the derivation."""
         model, parent = pinocchio.Model(), 0
         for joint, row in zip(chain.joints, chain.parameters, strict=True):

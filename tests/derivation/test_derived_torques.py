@@ -15,7 +15,7 @@ from psdmc.derivation.certify import certificate
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InternalError
 from psdmc.model.expansion import Expansion
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 from psdmc.robot.reference import reference
 
 ACCURACY = 1e-12
@@ -109,7 +109,7 @@ def test_drive_inertia_is_pinocchios_armature() -> None:
     assert model.l > derive_model(chain).l
 
 
-def with_drives(chain: Chain, drives: np.ndarray) -> Chain:
+def with_drives(chain: Mechanism, drives: np.ndarray) -> Mechanism:
     parameters = chain.parameters.copy()
     parameters[:, 10] = drives
     return replace(chain, parameters=parameters, parameter_span=np.eye(11 * len(chain)))

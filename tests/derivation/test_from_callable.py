@@ -15,10 +15,10 @@ from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of
 from psdmc.errors import DerivationError, InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 
-def newton_euler_of(chain: Chain) -> Callable[..., np.ndarray]:
+def newton_euler_of(chain: Mechanism) -> Callable[..., np.ndarray]:
     """Vectorised torques by body parameters, link by link."""
     n = len(chain)
 

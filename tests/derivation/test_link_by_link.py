@@ -15,7 +15,7 @@ from psdmc.derivation.link_by_link import reduction_link_by_link
 from psdmc.derivation.sampled import sampled_reduction
 from psdmc.derivation.units import scaled
 from psdmc.errors import DerivationError
-from psdmc.robot.chain import Chain, Placement
+from psdmc.robot.mechanism import Mechanism, Placement
 
 
 @pytest.mark.parametrize("tidy", [False, True])
@@ -75,7 +75,7 @@ def test_velocity_terms_of_minutes_are_refused(monkeypatch: pytest.MonkeyPatch) 
     assert "--no-expand" in caught.value.hint
 
 
-def _resized(chain: Chain, factor: float) -> Chain:
+def _resized(chain: Mechanism, factor: float) -> Mechanism:
     joints = tuple(
         replace(
             joint,

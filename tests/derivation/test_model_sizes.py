@@ -9,8 +9,8 @@ from bundled import bundled_model, bundled_robot
 from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import sizes_of
-from psdmc.robot.chain import PARAMETER_NAMES, Chain, Joint, Placement
 from psdmc.robot.joints import REVOLUTE
+from psdmc.robot.mechanism import PARAMETER_NAMES, Joint, Mechanism, Placement
 
 PUBLISHED = {
     "two_link": (10, 4, (3, 4, 2, 1)),
@@ -40,12 +40,12 @@ def test_denso_without_its_joint_offsets_has_another_p() -> None:
     assert (model.p, model.l) == (1296, 32)
 
 
-def _without_offsets(chain: Chain) -> Chain:
+def _without_offsets(chain: Mechanism) -> Mechanism:
     before, joints = Placement.identity(), []
     for joint in chain.joints:
         joints.append(Joint(joint.name, joint.link_name, joint.type, before, joint.link_frame, joint.limits))
         before = joint.link_frame
-    return Chain(
+    return Mechanism(
         chain.name,
         chain.convention,
         chain.base_name,
@@ -66,7 +66,7 @@ def test_eight_joints() -> None:
     assert model.certificate.max() < 1e-12
 
 
-def eight_joints() -> Chain:
+def eight_joints() -> Mechanism:
     """Inertias unknown, no drive inertia."""
     chain = bundled_robot("lbr7").chain
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -80,7 +80,9 @@ def eight_joints() -> Chain:
     span = np.delete(np.eye(88), np.s_[10::11], axis=1)
     unknown = np.full((8, 11), np.nan)
     unknown[:, 10] = 0.0
-    return Chain("eight", "standard", "base", "tip", joints, unknown, span, chain.gravity, last.link_frame)
+    return Mechanism(
+        "eight", "standard", "base", "tip", joints, unknown, span, chain.gravity, last.link_frame
+    )
 
 
 A1, A2, A3, D4 = 0.075, -0.27, -0.09, 0.295

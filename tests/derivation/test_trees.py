@@ -24,7 +24,7 @@ from psdmc.model import chain_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import file_bytes
 from psdmc.program.interpret import interpret
-from psdmc.robot.chain import Placement
+from psdmc.robot.mechanism import Placement
 
 SMALL = [("a fork", "RRR"), ("a fork", "PRP"), ("two on the base", "RPR"), ("two on the base", "RRR")]
 LARGER = [("a trunk with two arms", "RRRPRR"), ("interleaved", "RPRRPRPR")]

@@ -17,7 +17,7 @@ from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.named_frames import frame_drifts
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
-from psdmc.robot.chain import PARAMETERS_PER_LINK, NamedFrame, Placement
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, NamedFrame, Placement
 
 EXACT = 1e-12
 """Of each joint's largest value."""

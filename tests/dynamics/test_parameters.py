@@ -8,7 +8,7 @@ import pytest
 from random_chains import random_chain
 
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of, inertia_matrix, joint_frame_map, moved
-from psdmc.robot.chain import Placement
+from psdmc.robot.mechanism import Placement
 
 
 @pytest.mark.parametrize("seed", range(5))

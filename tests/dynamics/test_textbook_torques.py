@@ -11,8 +11,8 @@ from psdmc.dynamics.energy import kinetic_energy, potential_energy
 from psdmc.dynamics.frames import BASE, Frame, frame_at
 from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.newton_euler import inverse_dynamics
-from psdmc.robot.chain import Placement
 from psdmc.robot.joints import PRISMATIC, REVOLUTE
+from psdmc.robot.mechanism import Placement
 
 G = 9.81
 ALONG_X = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

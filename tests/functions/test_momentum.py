@@ -45,4 +45,4 @@ def test_unknown_inertias_leave_none() -> None:
     unknown = np.array(model.chain.parameters)
     unknown[1, 0] = np.nan
     with pytest.raises(InputError, match="some are unknown"):
-        require(replace(model, chain=replace(model.chain, parameters=unknown)), ["momentum"])
+        require(replace(model, mechanism=replace(model.chain, parameters=unknown)), ["momentum"])

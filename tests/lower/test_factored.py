@@ -20,12 +20,12 @@ from psdmc.lower.search import ALL_CHOICES, BATCH, SINGLE, Search, all_feet
 from psdmc.lower.tableau import Tableau
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
-from psdmc.robot.chain import Chain, Placement
+from psdmc.robot.mechanism import Mechanism, Placement
 
 INVERSE = RECIPES["inverse_dynamics"]
 
 
-def known(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+def known(chain: Mechanism) -> tuple[np.ndarray, np.ndarray]:
     """A model whose base parameters are simply all standard parameters: representative and theta_b."""
     return chain.parameter_span, chain.parameter_span.T @ chain.parameters.ravel()
 
@@ -192,7 +192,7 @@ def test_a_mass_matrix_without_inertia_is_named_singular():
     assert caught.value.joint == 1
 
 
-def tilted(chain: Chain, angle: float) -> Chain:
+def tilted(chain: Mechanism, angle: float) -> Mechanism:
     """The chain with every joint turned a little more, about a random axis: no two axes stay parallel."""
     rng = np.random.default_rng(1)
     joints = []

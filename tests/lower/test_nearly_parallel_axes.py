@@ -16,7 +16,7 @@ from psdmc.lower.carriers import carrier_space
 from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe
 from psdmc.program.interpret import interpret
-from psdmc.robot.chain import Placement
+from psdmc.robot.mechanism import Placement
 
 ACCURACY = 1e-11
 BUDGET = 12

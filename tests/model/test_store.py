@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bundled import bundled_model
+from bundled import bundled_model, bundled_robot
 from random_chains import random_chain
 
 import psdmc
@@ -213,3 +213,9 @@ def test_an_unwritable_place_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         model.save(tmp_path / "taken.npz")
     assert [path.name for path in tmp_path.iterdir()] == ["taken.npz"]
+
+
+def test_the_mechanism_is_found_by_its_old_name() -> None:
+    loaded, model = bundled_robot("two_link"), bundled_model("two_link")
+    assert loaded.chain is loaded.mechanism
+    assert model.chain is model.mechanism

@@ -11,8 +11,8 @@ import pytest
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
-from psdmc.robot.chain import Array, Chain
 from psdmc.robot.load import LoadedRobot, load_robot_text
+from psdmc.robot.mechanism import Array, Mechanism
 from psdmc.robot.reference import reference
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "robots"
@@ -74,7 +74,7 @@ def robot_data(name: str) -> Path:
     return Path(str(wheel.locate_file(found[0])))
 
 
-def torques(chain: Chain, q: Array, qd: Array, qdd: Array) -> Array:
+def torques(chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Array:
     """psdmc's Newton-Euler on the chain as it stands; states (k, n)."""
     x = chain.parameters
     bodies, drives, base = bodies_of(chain, x), drive_inertia_of(x), base_acceleration(chain)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from small_robots import EXAMPLES, joint, largest_difference, link, load_dh, load_urdf, robot_data
 
-from psdmc.robot.chain import Limits
 from psdmc.robot.load import load_robot, load_robot_text
+from psdmc.robot.mechanism import Limits
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,8 @@ from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
 from psdmc.program.signature import Sizes
 from psdmc.program.trace import Tracer
-from psdmc.robot.chain import Placement
 from psdmc.robot.joints import PRISMATIC, REVOLUTE
+from psdmc.robot.mechanism import Placement
 
 TYPES = (REVOLUTE, REVOLUTE, PRISMATIC, REVOLUTE)
 N = len(TYPES)

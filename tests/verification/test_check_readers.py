@@ -12,8 +12,8 @@ from bundled import ROBOTS
 from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
 from psdmc.robot import dh_chain, urdf_chain
-from psdmc.robot.chain import Placement
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
+from psdmc.robot.mechanism import Placement
 from psdmc.robot.snap import snap_axis
 from psdmc.robot.urdf_bodies import placement_of
 from psdmc.verification.check import MUJOCO, CheckRow, check_model, readers

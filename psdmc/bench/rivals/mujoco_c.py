@@ -15,7 +15,7 @@ from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import inertia_matrix, joint_frame_map
 from psdmc.errors import ToolchainError
-from psdmc.robot.chain import BASE, Array, Chain
+from psdmc.robot.mechanism import BASE, Array, Mechanism
 
 RIVAL = "MuJoCo"
 FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")
@@ -61,7 +61,7 @@ def _mujoco() -> Path:
     return Path(found.origin).parent
 
 
-def mjcf(chain: Chain) -> str:
+def mjcf(chain: Mechanism) -> str:
     """The chain as MuJoCo's XML: one body a joint, its frame psdmc's joint frame, its joint about z."""
     root = ElementTree.Element("mujoco", model="robot")
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="false")

@@ -15,7 +15,7 @@ from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 from psdmc.toolchain.compiler_command import GCC_FLAGS
 
 Way = Literal["library", "header-only"]

@@ -24,7 +24,7 @@ from psdmc.calibration.identify.steps import (
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 Progress = Callable[[str], None]
 
@@ -55,7 +55,7 @@ class FourSteps:
         return (*found, *self.gravity.warnings, *self.friction.warnings, *self.inertial.warnings)
 
 
-def checked_runs(chain: Chain, runs: Runs, options: CalibrationOptions) -> tuple[Log, ...]:
+def checked_runs(chain: Mechanism, runs: Runs, options: CalibrationOptions) -> tuple[Log, ...]:
     """All logs of a campaign; InputError where there are too few runs or a log cannot be used, before anything is fitted."""
     _require_runs(runs)
     logs = [(log, options.motor) for run in runs.motor for log in (run.unloaded, run.loaded)]
@@ -66,7 +66,7 @@ def checked_runs(chain: Chain, runs: Runs, options: CalibrationOptions) -> tuple
 
 
 def calibrate_four_steps(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     l: int,
     runs: Runs,
@@ -118,7 +118,7 @@ def _require_runs(runs: Runs) -> None:
         )
 
 
-def _motors(chain: Chain, motor: MotorResult | None, runs: Runs, given: Mapping[str, float]) -> Motors:
+def _motors(chain: Mechanism, motor: MotorResult | None, runs: Runs, given: Mapping[str, float]) -> Motors:
     """Identified constants, given ones where none was identified, or ones where every log holds torques.
 
     InputError where currents stay unexplained.

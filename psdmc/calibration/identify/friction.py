@@ -23,7 +23,7 @@ from psdmc.calibration.identify.steps import (
 )
 from psdmc.calibration.logs.log import Array
 from psdmc.processes import in_processes
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +84,7 @@ def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFrict
 
 
 def prepared_runs(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     motors: Motors,
     theta_b: Array,

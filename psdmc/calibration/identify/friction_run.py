@@ -16,7 +16,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import LowPass
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ def lugre_from(p: Array) -> Lugre:
 
 
 def prepared(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     motors: Motors,
     theta_gravity: Array,
@@ -86,7 +86,7 @@ def prepared(
     )
 
 
-def _require_alone(run: FrictionRun, chain: Chain, k: int, states: States) -> None:
+def _require_alone(run: FrictionRun, chain: Mechanism, k: int, states: States) -> None:
     rms = np.sqrt(np.mean(states.qd**2, axis=0))
     if rms[k] == 0:
         raise InputError(

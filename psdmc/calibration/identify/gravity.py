@@ -18,7 +18,7 @@ from psdmc.calibration.logs.filter import States, away_from, filtered, held_out
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 SAME_PLACE = 5e-3
 """rad or m: how near the way back must pass to the way there."""
@@ -71,7 +71,7 @@ class GravityResult:
     warnings: tuple[str, ...]
 
 
-def gravity_split(chain: Chain, model: Regressor, l: int, seed: int = 0) -> GravitySplit:
+def gravity_split(chain: Mechanism, model: Regressor, l: int, seed: int = 0) -> GravitySplit:
     """The observable subset: gravity columns in order, each a pivot where it is new."""
     rng = np.random.default_rng(seed)
     q = rng.uniform(-np.pi, np.pi, (max(4 * l, 40), len(chain)))
@@ -95,7 +95,7 @@ def gravity_split(chain: Chain, model: Regressor, l: int, seed: int = 0) -> Grav
 
 
 def calibrate_gravity(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     split: GravitySplit,
     motors: Motors,
@@ -121,7 +121,7 @@ def calibrate_gravity(
 
 
 def judge_gravity(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     motors: Motors,
     runs: Sequence[GravityRun],
@@ -137,7 +137,7 @@ def judge_gravity(
 
 
 def _even_parts(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     motors: Motors,
     runs: Sequence[GravityRun],
@@ -151,7 +151,7 @@ def _even_parts(
 
 
 def _even_part(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     motors: Motors,
     run: GravityRun,

@@ -25,7 +25,7 @@ from psdmc.calibration.identify.steps import InertialRun, StepOptions, StepQuali
 from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 FRICTION_STEP = 0.1
 """Finite difference in standard deviations of a friction parameter, for its effect on the torque."""
@@ -76,7 +76,7 @@ class _Rows:
 
 
 def calibrate_inertial(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     motors: Motors,
     gravity: GravityResult,
@@ -119,7 +119,7 @@ def _believable(solved: Estimate) -> Array:
 
 
 def judge_inertial(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     motors: Motors,
     theta_b: Array,
@@ -147,7 +147,7 @@ def _stacked(parts: Sequence[_Rows]) -> _Rows:
 
 
 def _rows(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     motors: Motors,
     friction: FrictionResult,

@@ -26,7 +26,7 @@ from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.row_store import HELD_BYTES
 from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ class LinearProblem:
     names     l + n f  of the unknowns, for messages
     """
 
-    chain: Chain
+    chain: Mechanism
     rows: KeptRows
     torque: Array
     held_out: NDArray[np.bool_]
@@ -117,7 +117,7 @@ class LinearProblem:
 
 
 def calibrate_linear(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     l: int,
     logs: Sequence[AnyLog],
@@ -145,7 +145,7 @@ def calibrate_linear(
 
 
 def _prior(
-    chain: Chain, model: Regressor, problem: LinearProblem, options: LinearOptions, theta_b: Array | None
+    chain: Mechanism, model: Regressor, problem: LinearProblem, options: LinearOptions, theta_b: Array | None
 ) -> Prior:
     """The file's theta_b and no friction; friction may be as large as its joint's torque at an ordinary speed."""
     sizes = torque_sizes(problem.torque[~problem.held_out])
@@ -169,7 +169,7 @@ def friction_terms(qd: Array, sign_speed: float, exponents: Sequence[float], off
 
 
 def linear_problem(
-    chain: Chain,
+    chain: Mechanism,
     model: Regressor,
     l: int,
     logs: Sequence[AnyLog],

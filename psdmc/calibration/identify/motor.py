@@ -17,7 +17,7 @@ from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 STEADY = 0.9
 """Share of the sweep's typical speed below which a sample belongs to a turn."""
@@ -41,7 +41,7 @@ class MotorResult:
         return np.isfinite(self.torque_constant)
 
 
-def calibrate_motors(chain: Chain, runs: Sequence[MotorRun], options: StepOptions) -> MotorResult:
+def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions) -> MotorResult:
     """Torque constants from pairs of sweeps; InputError where a run is no sweep of its joint.
 
     The current is fitted on the load's torque, which is known exactly, so that noise does not bias the slope.
@@ -71,7 +71,7 @@ def calibrate_motors(chain: Chain, runs: Sequence[MotorRun], options: StepOption
 
 
 def judge_motors(
-    chain: Chain, runs: Sequence[MotorRun], options: StepOptions, constants: Mapping[str, float]
+    chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions, constants: Mapping[str, float]
 ) -> StepQuality:
     """The known load's torque against what these constants (N m/A, by joint name) say of the current that it adds."""
     joints: dict[str, JointQuality] = {}
@@ -91,7 +91,7 @@ def judge_motors(
 
 
 def _sweeps(
-    chain: Chain, k: int, runs: Sequence[MotorRun], options: StepOptions
+    chain: Mechanism, k: int, runs: Sequence[MotorRun], options: StepOptions
 ) -> tuple[Array, Array, Array] | None:
     """Angle, load torque and added current of all of a joint's runs; None where it has none."""
     own = [run for run in runs if run.joint == chain.joints[k].name]
@@ -115,7 +115,7 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
     return slope, widened * float(np.sqrt(variance / power))
 
 
-def _added(chain: Chain, k: int, run: MotorRun, options: StepOptions) -> tuple[Array, Array, Array]:
+def _added(chain: Mechanism, k: int, run: MotorRun, options: StepOptions) -> tuple[Array, Array, Array]:
     """Angle, load torque (N m) and current that the load adds (A), both ways averaged so that friction cancels."""
     unloaded, loaded = (_both_ways(chain, k, log, options.filter) for log in (run.unloaded, run.loaded))
     low = max(unloaded[0][0], loaded[0][0])
@@ -133,7 +133,7 @@ def _added(chain: Chain, k: int, run: MotorRun, options: StepOptions) -> tuple[A
     return angle, payload_torque(chain, q, run.load.mass, run.load.com)[:, k], current
 
 
-def _both_ways(chain: Chain, k: int, log: Log, options: FilterOptions) -> tuple[Array, Array, Array]:
+def _both_ways(chain: Mechanism, k: int, log: Log, options: FilterOptions) -> tuple[Array, Array, Array]:
     """Angle, current averaged over both directions there, and the pose of the other joints."""
     log = checked(log, chain, options.cutoff)
     if log.quantity != "current":

@@ -20,7 +20,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.dynamics.parameters import inertia_matrix, second_moments
 from psdmc.errors import InputError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.chain import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 SETTLING = 1e-6
 """Pull towards the prior's standard parameters (SI, squared) beside a squared standard deviation: settles what theta_b
@@ -109,7 +109,7 @@ def _nearest(
     options: PhysicalOptions,
 ) -> Physical:
     """One attempt; NotPhysical where the solver has no answer, or its answer is none."""
-    l, span = model.l, model.chain.parameter_span
+    l, span = model.l, model.mechanism.parameter_span
     inner = cp.Variable(span.shape[1])
     size = 1.0 / np.linalg.norm(whitening, axis=0)[l:]
     extra = cp.Variable(len(size)) if len(size) else None  # in standard deviations from its estimate
@@ -118,7 +118,7 @@ def _nearest(
     away = theta - values[:l] if extra is None else cp.hstack([theta - values[:l], cp.multiply(size, extra)])
     loss = cp.sum_squares(np.linalg.qr(whitening, mode="r") @ away)
     constraints, divergence = [], 0.0
-    for link in range(len(model.chain)):
+    for link in range(len(model.mechanism)):
         own, unlike = _link_terms(cp, model, x, link, options)
         constraints += own
         divergence += unlike
@@ -154,14 +154,14 @@ def whitening_of(covariance: Array) -> Array:
 
 def _known_inner(model: DynamicsModel) -> Array:
     """The span's coordinates of the file's standard parameters; zero where it has none."""
-    span = model.chain.parameter_span
-    known = np.nan_to_num(model.chain.parameters.reshape(-1))
+    span = model.mechanism.parameter_span
+    known = np.nan_to_num(model.mechanism.parameters.reshape(-1))
     return np.asarray(np.linalg.lstsq(span, known, rcond=None)[0])
 
 
 def _require_physical(model: DynamicsModel, x: Array) -> None:
     """The solver's word, held against the pseudo-inertias themselves; none may be negative beyond rounding."""
-    for joint, link in zip(model.chain.joints, x.reshape(-1, PARAMETERS_PER_LINK), strict=True):
+    for joint, link in zip(model.mechanism.joints, x.reshape(-1, PARAMETERS_PER_LINK), strict=True):
         matrix = np.zeros((4, 4))
         matrix[:3, :3] = second_moments(inertia_matrix(link))
         matrix[:3, 3] = matrix[3, :3] = link[1:4]
@@ -186,7 +186,7 @@ def _link_terms(
     """Constraints, pseudo-inertia above its bound, and divergence from the file's body; a link that the chain assumes
     massless has neither."""
     start = PARAMETERS_PER_LINK * link
-    span: Array = model.chain.parameter_span
+    span: Array = model.mechanism.parameter_span
     constraints: list[Any] = []
     if np.any(span[start + 10]):
         constraints.append(x[start + 10] >= options.smallest_drive)
@@ -197,7 +197,7 @@ def _link_terms(
     body = cp.bmat(_pseudo_inertia([x[start + k] for k in range(10)]))
     constraints += [body[k, :] == 0 for k in flat if not _vanishes(span, start, k)]
     block = body[held, :][:, held] if len(held) < 4 else body
-    near, weight = _reference_body(model.chain.parameters[link], held, options)
+    near, weight = _reference_body(model.mechanism.parameters[link], held, options)
     divergence = cp.trace(np.linalg.inv(near) @ block) - cp.log_det(block)
     return [*constraints, block >> options.smallest * np.eye(len(held))], weight * divergence
 

@@ -11,7 +11,7 @@ from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.kinematics import frame_placement, jacobian
 from psdmc.dynamics.regressor import regressor
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 
 class Regressor(Protocol):
@@ -24,7 +24,7 @@ class ChainRegressor:
     """The regressor of a model by Newton-Euler on arrays of states: no compiler needed."""
 
     def __init__(self, model: DynamicsModel) -> None:
-        chain = model.chain
+        chain = model.mechanism
         self._frames = frames_of(chain)
         self._link_frames = [joint.link_frame for joint in chain.joints]
         self._base = base_acceleration(chain)
@@ -50,7 +50,7 @@ def expansion(model: DynamicsModel) -> Array:
 
     Where B is in echelon form, its unit columns do it sparsely.
     """
-    span = model.chain.parameter_span
+    span = model.mechanism.parameter_span
     reduced = model.B @ span
     columns: list[int] = []
     for i in range(model.l):
@@ -68,7 +68,7 @@ def gravity_regressor(model: Regressor, q: Array) -> Array:
     return model.regressor(q, still, still)
 
 
-def payload_torque(chain: Chain, q: Array, mass: float, com: tuple[float, float, float]) -> Array:
+def payload_torque(chain: Mechanism, q: Array, mass: float, com: tuple[float, float, float]) -> Array:
     """(N, n) N m that hold a mass (kg) at `com` (m, tip frame) against gravity: -J^T f with f of (17)."""
     frames = frames_of(chain)
     states = [q[:, k] for k in range(len(chain))]

@@ -6,7 +6,7 @@ import numpy as np
 
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 STATES = 200
 SEED = 51_407
@@ -26,7 +26,7 @@ def torque_sizes(torque: Array) -> Array:
     return np.asarray(np.maximum(size, QUIET_JOINT * float(size.max(initial=0.0)) or 1.0))
 
 
-def base_scale(chain: Chain, model: Regressor, sizes: Array, theta_b: Array | None) -> Array:
+def base_scale(chain: Mechanism, model: Regressor, sizes: Array, theta_b: Array | None) -> Array:
     """(l,) believable size of each base parameter: what would explain a joint's whole torque in an ordinary motion.
 
     sizes    (n,) N m, of the joints' torques

@@ -16,7 +16,7 @@ from psdmc.calibration.logs.log_time import time_faults
 from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
 from psdmc.calibration.logs.wording import first_faults, listed
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 LogKind = TypeVar("LogKind", Log, StoredLog, AnyLog)
 
@@ -28,7 +28,7 @@ class Fault(NamedTuple):
     remedy: str
 
 
-def checked(log: LogKind, chain: Chain, cutoff: float, options: CheckOptions | None = None) -> LogKind:
+def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions | None = None) -> LogKind:
     """The log with its joints in the chain's order and what was noticed in its notes.
 
     cutoff   Hz, of the filter that the log is meant for
@@ -59,7 +59,7 @@ def _with_notes(log: LogKind, notes: tuple[str, ...]) -> LogKind:
 
 
 def _no_numbers(
-    log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[Fault]:
     return [_no_number(found, log) for found in survey.no_numbers]
 
@@ -73,7 +73,9 @@ def _no_number(found: NoNumber, log: AnyLog) -> Fault:
     )
 
 
-def _units(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _units(
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
+) -> list[Fault]:
     """Columns in rad for joints that slide, or in m for joints that turn."""
     if log.sliding is None:
         return []
@@ -91,7 +93,7 @@ def _units(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: Ch
 
 
 def _positions(
-    log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[Fault]:
     faults = []
     for k, joint in enumerate(chain.joints):
@@ -113,7 +115,9 @@ def _positions(
     return faults
 
 
-def _speeds(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _speeds(
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
+) -> list[Fault]:
     faults = []
     for k, joint in enumerate(chain.joints):
         speed = float(survey.speed[k])
@@ -129,7 +133,9 @@ def _speeds(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: C
     return faults
 
 
-def _rates(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _rates(
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
+) -> list[Fault]:
     """The logged velocity against the position's slope: a ratio far from one is a wrong unit."""
     faults = []
     for k, ratio in survey.velocity_ratios.items():
@@ -148,7 +154,7 @@ def _rates(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: Ch
 
 
 def _nothing_there(
-    log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[Fault]:
     faults = []
     if np.all(survey.motion < options.smallest_motion):
@@ -163,13 +169,15 @@ def _nothing_there(
     return faults
 
 
-def _jitter(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _jitter(log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions) -> list[str]:
     steps = np.diff(log.time)
     jitter = float(np.abs(steps - log.period).max() / log.period)
     return [f"sample times jitter by {jitter:.0%}: resampled"] if jitter > options.largest_jitter else []
 
 
-def _saturation(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _saturation(
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
+) -> list[str]:
     notes = []
     for k, name in enumerate(log.joint_names):
         largest, share = float(survey.largest_effort[k]), float(survey.saturated[k])
@@ -178,7 +186,7 @@ def _saturation(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, option
     return notes
 
 
-def _still(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[str]:
+def _still(log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions) -> list[str]:
     still = [
         name
         for name, motion in zip(log.joint_names, survey.motion, strict=True)
@@ -188,17 +196,19 @@ def _still(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: Ch
 
 
 def _dead_effort(
-    log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[str]:
     dead = [name for k, name in enumerate(log.joint_names) if not survey.largest_effort[k] > 0]
     return [f"joint(s) {listed(dead)}: {log.quantity} is zero throughout"] if dead else []
 
 
-Check = Callable[[AnyLog, Survey, Chain, float, CheckOptions], list[Fault]]
-Remark = Callable[[AnyLog, Survey, Chain, float, CheckOptions], list[str]]
+Check = Callable[[AnyLog, Survey, Mechanism, float, CheckOptions], list[Fault]]
+Remark = Callable[[AnyLog, Survey, Mechanism, float, CheckOptions], list[str]]
 
 
-def _times(log: AnyLog, survey: Survey, chain: Chain, cutoff: float, options: CheckOptions) -> list[Fault]:
+def _times(
+    log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
+) -> list[Fault]:
     return [Fault(*fault) for fault in time_faults(log, survey, cutoff, options)]
 
 

@@ -18,7 +18,7 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain, Joint
+from psdmc.robot.mechanism import Joint, Mechanism
 
 STEP = 0.5
 """First step of CMA-ES, in standard deviations of a random start's weights."""
@@ -139,7 +139,7 @@ class Excitation:
 
 
 def excite(
-    chain: Chain, model: Regressor, options: ExciteOptions | None = None, progress: Progress | None = None
+    chain: Mechanism, model: Regressor, options: ExciteOptions | None = None, progress: Progress | None = None
 ) -> Excitation:
     """Search for an exciting motion by CMA-ES, started from the best random one.
 
@@ -222,7 +222,7 @@ def _search(
 class _Space:
     """Candidates, as vectors: per joint sine and cosine weights and where the motion sits within the range."""
 
-    def __init__(self, chain: Chain, options: ExciteOptions) -> None:
+    def __init__(self, chain: Mechanism, options: ExciteOptions) -> None:
         require_limits(chain.joints)
         limits = [joint.limits for joint in chain.joints]
         bounds = np.array([(x.lower, x.upper, x.speed, x.acceleration) for x in limits])

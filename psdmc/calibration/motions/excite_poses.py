@@ -7,13 +7,13 @@ import numpy as np
 from psdmc.calibration.identify.predictor import payload_torque
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.sweeps import swept_range
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 SWEEP_POINTS = 15
 
 
 def motor_poses(
-    chain: Chain,
+    chain: Mechanism,
     mass: float,
     com: tuple[float, float, float],
     *,

@@ -7,13 +7,13 @@ import numpy as np
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.trajectory import Trajectory, limit_faults
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 DURATIONS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 """s, tried in this order until the limits hold."""
 
 
-def from_rest_to_rest(motion: Trajectory, chain: Chain) -> Trajectory:
+def from_rest_to_rest(motion: Trajectory, chain: Mechanism) -> Trajectory:
     """The motion with a quintic before and after it, position, speed and acceleration continuous.
 
     InputError where no lead-in of up to 6 s keeps the limits.
@@ -27,7 +27,7 @@ def from_rest_to_rest(motion: Trajectory, chain: Chain) -> Trajectory:
     return Trajectory(motion.joint_names, time, q, qd, qdd, motion.sliding)
 
 
-def _lead(motion: Trajectory, chain: Chain, q: Array, qd: Array, qdd: Array) -> Trajectory:
+def _lead(motion: Trajectory, chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Trajectory:
     """From rest to a state; run backwards it leads from the mirrored state to rest."""
     low = np.array([joint.limits.lower for joint in chain.joints])
     high = np.array([joint.limits.upper for joint in chain.joints])

@@ -10,7 +10,7 @@ import numpy as np
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.trajectory import Trajectory, sliding_joints
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain, Joint
+from psdmc.robot.mechanism import Joint, Mechanism
 
 LONGEST_RUN = 3600.0
 """s: 3.6 million rows at 1 kHz."""
@@ -86,7 +86,7 @@ def _require_short(joint: Joint, what: str, seconds: float) -> None:
         )
 
 
-def single_joint_sweep(chain: Chain, joint: int, pose: Array, options: SweepOptions) -> Trajectory:
+def single_joint_sweep(chain: Mechanism, joint: int, pose: Array, options: SweepOptions) -> Trajectory:
     """One joint through its range and back at constant speed, the others at `pose` (n,): (16)'s motion."""
     low, high = swept_range(chain.joints[joint], options.range)
     speed = sweep_speed(chain.joints[joint], options.speed)
@@ -108,7 +108,7 @@ def single_joint_sweep(chain: Chain, joint: int, pose: Array, options: SweepOpti
     return Trajectory(chain.joint_names, time, q, qd, qdd, sliding_joints(chain))
 
 
-def gravity_sweep(chain: Chain, seed: int, options: SweepOptions) -> Trajectory:
+def gravity_sweep(chain: Mechanism, seed: int, options: SweepOptions) -> Trajectory:
     """All joints to and fro at constant speeds of their own, then the same path backwards: (18)'s motion.
 
     Speeds and starts are drawn from the seed, so that the joints meet in ever new poses.
@@ -135,7 +135,7 @@ def gravity_sweep(chain: Chain, seed: int, options: SweepOptions) -> Trajectory:
     )
 
 
-def sine_series(chain: Chain, joint: int, pose: Array, options: SineOptions) -> Trajectory:
+def sine_series(chain: Mechanism, joint: int, pose: Array, options: SineOptions) -> Trajectory:
     """One joint through sines of growing amplitude about its place in `pose`: 3.3's motion.
 
     Each sine swells and fades with its envelope's first two derivatives zero at both ends.

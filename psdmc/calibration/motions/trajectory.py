@@ -12,7 +12,7 @@ from psdmc.calibration.logs.log import LARGEST_NUMBER, Array
 from psdmc.calibration.logs.table_files import column_names, read_columns, write_columns
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 _TURNING = ("position_rad", "velocity_rad_s", "acceleration_rad_s2")
 _SLIDING = ("position_m", "velocity_m_s", "acceleration_m_s2")
@@ -103,12 +103,12 @@ def _named(columns: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return names, tuple(name for prefix, _, name in split if prefix == _SLIDING[0])
 
 
-def sliding_joints(chain: Chain) -> tuple[str, ...]:
+def sliding_joints(chain: Mechanism) -> tuple[str, ...]:
     """Names of the chain's joints whose position is in m."""
     return tuple(joint.name for joint in chain.joints if joint.type.length_order)
 
 
-def limit_faults(trajectory: Trajectory, chain: Chain) -> list[str]:
+def limit_faults(trajectory: Trajectory, chain: Mechanism) -> list[str]:
     """One sentence for each joint and limit that the trajectory exceeds; empty where it keeps all of them."""
     faults: list[str] = []
     for k, joint in enumerate(chain.joints):

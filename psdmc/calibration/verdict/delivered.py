@@ -68,7 +68,7 @@ def delivered(model: DynamicsModel) -> Delivered:
     kept = model.provenance.get("calibration")
     if model.theta_b is None or not isinstance(kept, Mapping) or "prediction" not in kept:
         raise InputError(
-            f"the model of '{model.chain.name}' holds no calibration that torques can be predicted from",
+            f"the model of '{model.mechanism.name}' holds no calibration that torques can be predicted from",
             "run `psdmc calibrate` first",
         )
     return Delivered(
@@ -101,7 +101,7 @@ def delivered_quality(
 
 
 def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) -> StepQuality:
-    chain, step = found.model.chain, found.prediction.steps["all"]
+    chain, step = found.model.mechanism, found.prediction.steps["all"]
     parts = [_log_parts(found, log, step, check) for log in logs]
     time, measured, predicted = (np.concatenate([part[k] for part in parts]) for k in range(3))
     out = np.concatenate([held_out(len(part[0]), step.split) for part in parts])
@@ -113,7 +113,9 @@ def _log_parts(
 ) -> tuple[Array, Array, Array]:
     """Time, measured and predicted torque of one log's independent samples."""
     parts = []
-    for stretch in stretches(checked(log, found.model.chain, step.filter.cutoff, check), step.filter, check):
+    for stretch in stretches(
+        checked(log, found.model.mechanism, step.filter.cutoff, check), step.filter, check
+    ):
         states, at = stretch.states, stretch.at
         predicted = smoothed_rows(states, at, partial(_torque, found, states))
         parts.append((states.time[at], found.motors.torque(states.effort)[at], predicted))
@@ -124,7 +126,7 @@ def _log_parts(
 def _torque(found: Delivered, states: States, rows: slice) -> Array:
     """(rows, n) motor torque before the filter: rigid bodies and friction."""
     q, qd, qdd = states.q[rows], states.qd[rows], states.qdd[rows]
-    rigid = recursive.torques(found.model.chain, found.model.standard_parameters(), [q, qd, qdd])
+    rigid = recursive.torques(found.model.mechanism, found.model.standard_parameters(), [q, qd, qdd])
     law = found.prediction
     terms = friction_terms(qd, law.sign_speed, law.exponents, law.offset)
     names = friction_names(law.exponents, law.offset)
@@ -134,7 +136,7 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
 
 
 def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
-    chain, motors, theta, steps = found.model.chain, found.motors, found.theta_b, found.prediction.steps
+    chain, motors, theta, steps = found.model.mechanism, found.motors, found.theta_b, found.prediction.steps
     regressor = ChainRegressor(found.model)
     friction = _lugre(found)
     joints = friction.joints

@@ -81,7 +81,7 @@ def _odd_gains(found: Findings) -> Iterator[str]:
 
 def _unlike_limits(found: Findings) -> Iterator[str]:
     """Torques that are no share of what the file says the motors can give, or several times that."""
-    limits = np.array([joint.limits.effort for joint in found.evidence.model.chain.joints])
+    limits = np.array([joint.limits.effort for joint in found.evidence.model.mechanism.joints])
     known = np.isfinite(limits) & (limits > 0)
     if not known.any():
         return

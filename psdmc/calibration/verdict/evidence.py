@@ -102,14 +102,14 @@ def _samples(
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
     """Of one motion: q, qd, qdd, sign and torque of its samples, and the RMS noise that passes the filter, were noise as
     dense there as above the cut-off."""
-    log = checked(motion.log, model.chain, options.cutoff)
+    log = checked(motion.log, model.mechanism, options.cutoff)
     parts, above, count = [], np.zeros(model.n), 0
     for stretch in stretches(log, options):
         states, at = stretch.states, stretch.at
         sign = states.low_pass(np.tanh(states.qd / SIGN_SPEED))
         torque = motors.torque(states.effort)[at]
         if motion.tool is not None:
-            torque = torque - payload_torque(model.chain, states.q[at], motion.tool.mass, motion.tool.com)
+            torque = torque - payload_torque(model.mechanism, states.q[at], motion.tool.mass, motion.tool.com)
         own = slice(at[0], at[-1] + 1)
         above += np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
         count += at[-1] + 1 - at[0]

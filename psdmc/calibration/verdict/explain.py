@@ -42,7 +42,7 @@ class _ByFile:
 
     def __init__(self, evidence: Evidence, by_file: Array, k: int) -> None:
         columns = [by_file, evidence.sign[:, k], evidence.qd[:, k]]
-        if not evidence.model.chain.parameters[k, DRIVE_INERTIA] > 0:
+        if not evidence.model.mechanism.parameters[k, DRIVE_INERTIA] > 0:
             columns.append(evidence.qdd[:, k])
         design = np.stack(columns, axis=1)
         design = design - design.mean(axis=0)

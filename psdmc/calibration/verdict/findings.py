@@ -78,7 +78,7 @@ class Findings:
         return np.asarray((self.speed >= self.limits.hardly) & (self.variation > 0))[:, None]
 
     def unit(self, k: int) -> str:
-        return self.evidence.model.chain.joints[k].type.effort_unit
+        return self.evidence.model.mechanism.joints[k].type.effort_unit
 
     def gained(self, joints: Sequence[int]) -> str:
         words = [f"{self.gains[k].value:.3g} +- {self.gains[k].std:.1g}" for k in joints]

@@ -8,7 +8,7 @@ import numpy as np
 
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import Evidence
-from psdmc.robot.chain import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 VISIBLE_SHARE = 0.05
 """The file's torque, friction and drive inertia apart, over the measured torque's variation (RMS), from which its gain
@@ -85,7 +85,7 @@ def _line(evidence: Evidence, by_file: Array, k: int) -> _Line:
 def nuisance(evidence: Evidence, k: int) -> Array:
     """(N, 3 or 4) joint k's Coulomb and viscous friction, offset, and acceleration where the file has no drive inertia."""
     columns = [evidence.sign[:, k], evidence.qd[:, k], np.ones(len(evidence))]
-    drive = evidence.model.chain.parameters[k, DRIVE_INERTIA]
+    drive = evidence.model.mechanism.parameters[k, DRIVE_INERTIA]
     if not drive > 0:
         columns.append(evidence.qdd[:, k])
     return np.stack(columns, axis=1)

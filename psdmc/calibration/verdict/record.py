@@ -182,7 +182,7 @@ def four_step_record(
     }
     return with_model(
         Calibration(
-            robot=model.chain.name,
+            robot=model.mechanism.name,
             method="four steps",
             joint_names=model.joint_names,
             model=model,
@@ -230,7 +230,7 @@ def linear_record(
     step = StepOptions(options.filter, options.split, options.fit)
     return with_model(
         Calibration(
-            robot=model.chain.name,
+            robot=model.mechanism.name,
             method="linear fit",
             joint_names=model.joint_names,
             model=model,

@@ -58,16 +58,16 @@ def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool) -> Iterator[
     whatever the parameters' values, and constants sit furthest in - or in the coefficients at once."""
     n = model.n
     if part is Polynomials.REGRESSOR:
-        yield from _in_all_orders(with_gravity(regressor_terms(model), model.chain), tip_first(n))
+        yield from _in_all_orders(with_gravity(regressor_terms(model), model.mechanism), tip_first(n))
         return
-    symbolic = _part(part, with_gravity(torque_terms(model), model.chain), n)
+    symbolic = _part(part, with_gravity(torque_terms(model), model.mechanism), n)
     if theta:
         yield from _in_all_orders(symbolic, base_first(n))
         return
     values = dict(enumerate(known_parameters(model).tolist(), start=5 * n))
     present = _without_zero_rows(symbolic, values)
     yield from (with_constants(diagram, values) for diagram in _in_all_orders(present, base_first(n)))
-    baked = _part(part, with_gravity(baked_torque_terms(model), model.chain), n)
+    baked = _part(part, with_gravity(baked_torque_terms(model), model.mechanism), n)
     yield from _in_all_orders(baked, base_first(n))
 
 

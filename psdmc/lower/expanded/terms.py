@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Entries, Expansion
-from psdmc.robot.chain import Chain
+from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -86,7 +86,7 @@ def regressor_terms(model: DynamicsModel) -> Terms:
 def _expanded(model: DynamicsModel) -> Expansion:
     if model.expansion is None:
         raise InputError(
-            f"{model.chain.name}: the expanded lowering needs E and P, and this model has none",
+            f"{model.mechanism.name}: the expanded lowering needs E and P, and this model has none",
             "derive it without --no-expand, or choose --lowering factored",
         )
     return model.expansion
@@ -96,7 +96,7 @@ def known_parameters(model: DynamicsModel) -> Array:
     """theta_b, (l,); InputError where it is unknown."""
     if model.theta_b is None:
         raise InputError(
-            f"{model.chain.name}: base parameters are unknown and cannot become constants",
+            f"{model.mechanism.name}: base parameters are unknown and cannot become constants",
             "calibrate the model first, or emit the functions that take theta_b",
         )
     return model.theta_b
@@ -140,7 +140,7 @@ def gravity_terms(torque: Terms, n: int) -> Terms:
     return torque.where(np.asarray(~torque.exponents[3 * n : 5 * n].any(axis=0)))
 
 
-def with_gravity(terms: Terms, chain: Chain) -> Terms:
+def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
     """Gravity's terms times |g| (m/s^2), which E leaves to y."""
     n = len(chain)
     at_rest = ~terms.exponents[3 * n : 5 * n].any(axis=0)

@@ -16,7 +16,7 @@ def row_symbols(tracer: Tracer, model: DynamicsModel, theta: bool) -> list[Scala
     q = tracer.symbols("q", n)
     sincos = [
         value.sincos() if joint.basis.has_sincos else (0.0, 0.0)
-        for value, joint in zip(q, model.chain.types, strict=True)
+        for value, joint in zip(q, model.mechanism.types, strict=True)
     ]
     rates = [*tracer.symbols("qd", n), *tracer.symbols("qdd", n)]
     parameters = tracer.symbols("theta_b", model.l) if theta else []

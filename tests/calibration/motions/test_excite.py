@@ -13,8 +13,8 @@ from psdmc.calibration.motions.excite import ExciteOptions, excite
 from psdmc.calibration.motions.trajectory import limit_faults
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
-from psdmc.robot.chain import Limits
 from psdmc.robot.load import load_robot
+from psdmc.robot.mechanism import Limits
 
 OPTIONS = ExciteOptions(duration=5.0, samples=50, evaluations=2000, population=20, random=200, seconds=60.0)
 

@@ -73,7 +73,7 @@ class NamedFrame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chain:
+class Mechanism:
     """A robot: kinematics, gravity and what is known of its inertia. n joints, each with the body that it carries.
 
     joints           n, parents before their children; a serial chain's from base to tip
