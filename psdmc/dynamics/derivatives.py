@@ -25,9 +25,21 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
-from psdmc.dynamics.frames import Frame, Turn, inward, joint_angle, outward, to_previous
+from psdmc.dynamics.frames import Frame, Turn, inward, joint_angle, to_previous
 from psdmc.dynamics.motion import PLAIN, Choices, Forward, Rates, Spin, spin_of, sweep_outward
-from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, dot, multiply, scale, transform, transpose
+from psdmc.dynamics.scalar import (
+    ZERO,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    dot,
+    multiply,
+    scale,
+    transform,
+    transpose,
+)
 
 Rows = tuple[tuple[Scalar, ...], ...]
 
@@ -181,8 +193,12 @@ def _geometry(
         joins = choices.compound and i > 0 and frame.is_parallel
         offset = forward.states[i].offset
         turn = forward.compound_turns[i - 1] if i > 0 else None
-        before = base if i == 0 else add(
-            forward.motions[i - 1].acceleration, transform(forward.motions[i - 1].spin.field, offset)
+        before = (
+            base
+            if i == 0
+            else add(
+                forward.motions[i - 1].acceleration, transform(forward.motions[i - 1].spin.field, offset)
+            )
         )
         if joins:
             rate = qd[i - 1] if frames[i - 1].kind == "revolute" else 0.0

@@ -70,3 +70,32 @@ def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
         for i, entry in enumerate(row):
             solution[k] = solution[k] - entry * solution[i]
     return solution
+
+
+def inverse(factors: Factors) -> list[list[Scalar]]:
+    """M^-1 of M = L^T D L, both triangles: L^-1 D^-1 L^-T, of which one triangle is computed."""
+    n = len(factors.pivots)
+    columns = _inverse_of_lower(factors.lower)
+    scaled = [[entry * factors.inverses[k] for k, entry in enumerate(row)] for row in columns]
+    rows: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
+    for i in range(n):
+        for j in range(i + 1):
+            total: Scalar = 0.0
+            for k in range(j + 1):
+                total = total + scaled[j][k] * columns[i][k]
+            rows[i][j] = rows[j][i] = total
+    return rows
+
+
+def _inverse_of_lower(lower: Rows) -> list[list[Scalar]]:
+    """Row i: the first i + 1 entries of the inverse's row i; ones on the diagonal."""
+    found: list[list[Scalar]] = []
+    for i, row in enumerate(lower):
+        own: list[Scalar] = []
+        for j in range(i):
+            total = row[j]
+            for k in range(j + 1, i):
+                total = total + row[k] * found[k][j]
+            own.append(-total)
+        found.append([*own, 1.0])
+    return found

@@ -11,6 +11,7 @@ import numpy as np
 
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
@@ -79,6 +80,13 @@ class RobotOnArrays:
             self.frames, self.bodies, self.drives, *given, base, qd_r=rates, external=external
         )
         return columns(torques, len(q))
+
+    def torque_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+        """(k, n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
+        given = (list(q.T), list(qd.T), list(qdd.T))
+        found = inverse_dynamics_derivatives(self.frames, self.bodies, self.drives, *given, self.base)
+        by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found)
+        return by_q, by_qd, by_qdd
 
     def mass_matrix(self, q: Array) -> Array:
         """(k, n, n)"""

@@ -111,6 +111,28 @@ class Reference:
         """(..., n, n)"""
         return self.each(pinocchio.computeCoriolisMatrix, q, qd)
 
+    def inverse_dynamics_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+        """(..., n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
+
+        def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
+            by_q, by_qd, by_qdd = pinocchio.computeRNEADerivatives(model, data, *state)
+            return np.stack([by_q, by_qd, np.triu(by_qdd) + np.triu(by_qdd, 1).T])
+
+        by_q, by_qd, by_qdd = np.moveaxis(self._each(derivatives, q, qd, qdd), -3, 0)
+        return by_q, by_qd, by_qdd
+
+    def forward_dynamics_derivatives(
+        self, q: Array, qd: Array, tau: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Accelerations (..., n), and (..., n, n) each: their derivatives by q, qd and tau; row i: of qdd[i]."""
+
+        def derivatives(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
+            by_q, by_qd, by_tau = pinocchio.computeABADerivatives(model, data, *state)
+            return np.stack([by_q, by_qd, np.triu(by_tau) + np.triu(by_tau, 1).T])
+
+        by_q, by_qd, by_tau = np.moveaxis(self._each(derivatives, q, qd, tau), -3, 0)
+        return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
+
     def jacobian(self, q: Array) -> Array:
         """(..., 6, n) of the tip frame: linear then angular, along the base frame's axes."""
         frame = self.model.getFrameId(self.tip_name)

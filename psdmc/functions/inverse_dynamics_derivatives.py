@@ -1,0 +1,52 @@
+"""Derivatives of inverse dynamics by joint positions, rates and accelerations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
+from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.chain import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    found = inverse_dynamics_derivatives(
+        g.frames, g.bodies, g.drives, g.inputs["q"], g.inputs["qd"], g.inputs["qdd"], g.base, g.choices
+    )
+    return {"dtau_dq": found.by_q, "dtau_dqd": found.by_qd, "dtau_dqdd": found.by_qdd}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    by_q, by_qd, by_qdd = robot.torque_derivatives(given["q"], given["qd"], given["qdd"])
+    return {"dtau_dq": by_q, "dtau_dqd": by_qd, "dtau_dqdd": by_qdd}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    by_q, by_qd, by_qdd = robot.inverse_dynamics_derivatives(given["q"], given["qd"], given["qdd"])
+    return {"dtau_dq": by_q, "dtau_dqd": by_qd, "dtau_dqdd": by_qdd}
+
+
+RECIPE = Recipe(
+    Signature(
+        "inverse_dynamics_derivatives",
+        12,
+        "d tau / d q, d tau / d qd and d tau / d qdd = M(q); row i: derivatives of tau[i]",
+        (Q, QD, QDD),
+        tuple(Quantity(name, ("nv", "nv")) for name in ("dtau_dq", "dtau_dqd", "dtau_dqdd")),
+        theta=True,
+    ),
+    "derivatives of inverse dynamics",
+    trace,
+    reference,
+    "computeRNEADerivatives",
+    pinocchio,
+    shares="inverse_dynamics",
+    default=True,
+    benched=True,
+)
