@@ -1,8 +1,10 @@
-"""What each choice of the factored lowering, and each pass, saves: the tables of docs/factored.md and docs/passes.md.
+"""What each choice of the factored lowering, and each pass, saves: the tables of docs/factored.md, docs/passes.md
+and docs/derivatives.md.
 
 python docs/effects.py choices [ROBOT ...]    mul + add of inverse dynamics, choice by choice
 python docs/effects.py passes [ROBOT ...]     operations per function with all passes, and with one left out
 python docs/effects.py orders [ROBOT ...]     longest dependency chain and values alive, with and without the last passes
+python docs/effects.py derivatives [ROBOT ...]  mul + add of derivatives by recursion and by differentiating programs
 
 ROBOT is one of `psdmc.bench.cases` (KR6, LBR7, Denso, UR5, Panda, "generic 6R" ...): its geometry standing on the floor,
 with generic physical inertias.
@@ -25,10 +27,12 @@ from psdmc.dynamics.parameters import bodies_of, joint_frame_map
 from psdmc.functions import RECIPES
 from psdmc.lower.expanded import lowering as expanded
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
+from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe
 from psdmc.lower.search import SINGLE, Search, all_feet
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
+from psdmc.program.differentiate import Block, jacobians
 from psdmc.program.passes.fuse_sums import FUSED_LATENCY, LATENCY, fuse_sums
 from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.pipeline import LAST, LAST_FOR_ONE_STATE, LONGEST, ROUND, Pass, optimize
@@ -191,7 +195,27 @@ def longest_chain(program: Program) -> int:
     return max(ready[i] for _, i in program.outputs)
 
 
-TABLES: dict[str, Callable[[str], Iterator[Row]]] = {"choices": choices, "passes": passes, "orders": orders}
+def derivatives(robot: str) -> Iterator[Row]:
+    """d tau / d q, d tau / d qd and M, without tau; of forward dynamics with qdd."""
+    model = model_of(robot)
+    names = ("inverse_dynamics", "inverse_dynamics_derivatives", "forward_dynamics_derivatives")
+    kernels = lower(model, "factored", names, theta_variants=False)
+    n, inverse = model.n, kernels["inverse_dynamics"].single
+    blocks = [Block(f"by_{name}", "tau", name, n, n) for name in ("q", "qd", "qdd")]
+    for mode in ("forward", "reverse"):
+        whole = jacobians(inverse, blocks, mode)  # type: ignore[arg-type]
+        only = Program(whole.body, tuple(out for out in whole.outputs if out[0].vector != "tau"))
+        yield f"inverse dynamics, {mode} mode over its PROGRAM", [operations(only)]
+    yield "inverse dynamics, by recursion", [cost(kernels[names[1]].single).total]
+    yield "forward dynamics", [cost(kernels[names[2]].single).total]
+
+
+TABLES: dict[str, Callable[[str], Iterator[Row]]] = {
+    "choices": choices,
+    "passes": passes,
+    "orders": orders,
+    "derivatives": derivatives,
+}
 
 
 def main() -> None:

@@ -90,6 +90,4 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     needs=Needs.POSITIVE_MASS,
-    default=True,
-    benched=True,
 )

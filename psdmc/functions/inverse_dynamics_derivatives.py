@@ -47,6 +47,4 @@ RECIPE = Recipe(
     "computeRNEADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    default=True,
-    benched=True,
 )

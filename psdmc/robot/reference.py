@@ -118,7 +118,7 @@ class Reference:
             by_q, by_qd, by_qdd = pinocchio.computeRNEADerivatives(model, data, *state)
             return np.stack([by_q, by_qd, np.triu(by_qdd) + np.triu(by_qdd, 1).T])
 
-        by_q, by_qd, by_qdd = np.moveaxis(self._each(derivatives, q, qd, qdd), -3, 0)
+        by_q, by_qd, by_qdd = np.moveaxis(self.each(derivatives, q, qd, qdd), -3, 0)
         return by_q, by_qd, by_qdd
 
     def forward_dynamics_derivatives(
@@ -130,7 +130,7 @@ class Reference:
             by_q, by_qd, by_tau = pinocchio.computeABADerivatives(model, data, *state)
             return np.stack([by_q, by_qd, np.triu(by_tau) + np.triu(by_tau, 1).T])
 
-        by_q, by_qd, by_tau = np.moveaxis(self._each(derivatives, q, qd, tau), -3, 0)
+        by_q, by_qd, by_tau = np.moveaxis(self.each(derivatives, q, qd, tau), -3, 0)
         return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
 
     def jacobian(self, q: Array) -> Array:

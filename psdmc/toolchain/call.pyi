@@ -7,13 +7,26 @@ from psdmc.toolchain.compiled_functions import CompiledFunctions
 
 Array = NDArray[Any]
 
+class InverseDynamicsDerivatives(NamedTuple):
+    dtau_dq: Array
+    dtau_dqd: Array
+    dtau_dqdd: Array
+
+class ForwardDynamicsDerivatives(NamedTuple):
+    qdd: Array
+    dqdd_dq: Array
+    dqdd_dqd: Array
+    dqdd_dtau: Array
+
 class ForwardKinematics(NamedTuple):
     position: Array
     rotation: Array
 
 class CompiledRobot(CompiledFunctions):
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None) -> Array: ...
+    def inverse_dynamics_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None) -> InverseDynamicsDerivatives: ...
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, theta_b: ArrayLike | None = None) -> Array: ...
+    def forward_dynamics_derivatives(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, theta_b: ArrayLike | None = None) -> ForwardDynamicsDerivatives: ...
     def mass_matrix(self, q: ArrayLike, theta_b: ArrayLike | None = None) -> Array: ...
     def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None) -> Array: ...
     def coriolis_matrix(self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None) -> Array: ...

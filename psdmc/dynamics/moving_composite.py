@@ -1,0 +1,137 @@
+"""Composites that move: all bodies from a joint on, and how they move relative to the link before it.
+
+Seen from that link, points at r move at r' and r'', which depend on the joints from this one on and on nothing before it.
+What the whole composite needs of them are moments: 2 int r r'^T, 2 int r', int r'', int r x r''. Composites are built tip
+to base like bodies: turned, shifted, joined, and given the motion of one joint more.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
+from psdmc.dynamics.frames import Frame, Turn, to_previous
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, scale, transpose
+from psdmc.robot.joints import JointType
+
+
+class Momenta(NamedTuple):
+    """2 int r r'^T dm (row: component of r) and 2 int r' dm."""
+
+    second: Matrix
+    first: Vector
+
+
+class Composite(NamedTuple):
+    """Bodies about a point, their motion relative to a link.
+
+    wrench   (int r'' dm, int r x r'' dm)
+    """
+
+    body: Body
+    momenta: Momenta
+    wrench: tuple[Vector, Vector]
+
+
+def at_rest(body: Body) -> Composite:
+    """A body that does not move in the link."""
+    return Composite(body, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))
+
+
+def both(a: Composite, b: Composite) -> Composite:
+    """Two composites about one point and relative to one link as one."""
+    second = tuple(add(x, y) for x, y in zip(a.momenta.second, b.momenta.second, strict=True))
+    return Composite(
+        joined(a.body, b.body),
+        Momenta(second, add(a.momenta.first, b.momenta.first)),  # type: ignore[arg-type]
+        (add(a.wrench[0], b.wrench[0]), add(a.wrench[1], b.wrench[1])),
+    )
+
+
+def moved_to(composite: Composite, offset: Vector) -> Composite:
+    """About a point of the link from which the present one lies at `offset`."""
+    (second, first), (force, moment) = composite.momenta, composite.wrench
+    rows = tuple(add(row, scale(first, length)) for row, length in zip(second, offset, strict=True))
+    return Composite(
+        shifted(composite.body, offset),
+        Momenta(rows, first),  # type: ignore[arg-type]
+        (force, add(moment, cross(offset, force))),
+    )
+
+
+def along_parent(frame: Frame, composite: Composite) -> Composite:
+    """From the orientation before a joint's turn to the axes of the link before it."""
+    if frame.is_parallel:
+        return composite
+    second, first = composite.momenta
+    second = multiply(multiply(frame.rotation, second), transpose(frame.rotation))
+    force, moment = (to_previous(frame, v) for v in composite.wrench)
+    body = in_previous(frame, composite.body)
+    return Composite(body, Momenta(second, to_previous(frame, first)), (force, moment))
+
+
+def before_turn(composite: Composite, turn: Turn | None) -> Composite:
+    """Seen from before a turn about z."""
+    if turn is None:
+        return composite
+    force, moment = (turn.inward(v) for v in composite.wrench)
+    return Composite(turned(composite.body, turn), _turned(composite.momenta, turn), (force, moment))
+
+
+def _turned(momenta: Momenta, turn: Turn) -> Momenta:
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = momenta.second
+    square, product = turn.sine * turn.sine, turn.sine * turn.cosine
+    difference, total = xx - yy, xy + yx
+    moved = square * difference + product * total
+    crossed = product * difference - square * total
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    zx, zy, _ = turn.inward((zx, zy, 0.0))
+    second = ((xx - moved, xy + crossed, xz), (yx + crossed, yy + moved, yz), (zx, zy, zz))
+    return Momenta(second, turn.inward(momenta.first))
+
+
+def driven(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
+    """Relative to the link before the joint, a composite whose motion is given relative to the link behind it."""
+    rate, way = joint.turn(qd), joint.slide(qd)
+    found = composite if rate is None else _spinning(composite, rate, joint.turn(qdd))
+    return found if way is None else _sliding(found, way, joint.slide(qdd))
+
+
+def _spinning(composite: Composite, rate: Scalar, acceleration: Scalar) -> Composite:
+    """r' gets rate z x r; r'' gets (acceleration z x + rate^2 z x z x) r + 2 rate z x r'."""
+    body, (second, first), (force, moment) = composite
+    (hx, hy, _), (xx, yy, _, xy, xz, yz) = body.moment, body.second
+    (x, y, z), (px, py, _) = second, first
+    twice, square = rate + rate, rate * rate
+    force = (
+        force[0] - (rate * py + acceleration * hy + square * hx),
+        force[1] + (rate * px + acceleration * hx - square * hy),
+        force[2],
+    )
+    moment = (
+        moment[0] - (rate * z[0] + acceleration * xz - square * yz),
+        moment[1] - (rate * z[1] + acceleration * yz + square * xz),
+        moment[2] + (rate * (x[0] + y[1]) + acceleration * (xx + yy)),
+    )
+    rows = (_plus_turned(x, twice, xx, xy), _plus_turned(y, twice, xy, yy), _plus_turned(z, twice, xz, yz))
+    return Composite(body, Momenta(rows, _plus_turned(first, twice, hx, hy)), (force, moment))
+
+
+def _plus_turned(v: Vector, rate: Scalar, x: Scalar, y: Scalar) -> Vector:
+    """v + rate z x (x, y, .)"""
+    return (v[0] - rate * y, v[1] + rate * x, v[2])
+
+
+def _sliding(composite: Composite, rate: Scalar, acceleration: Scalar) -> Composite:
+    """r' gets rate z, r'' gets acceleration z."""
+    body, ((x, y, z), first), (force, moment) = composite
+    twice, (hx, hy, hz) = rate + rate, body.moment
+    rows = (_plus_along(x, twice * hx), _plus_along(y, twice * hy), _plus_along(z, twice * hz))
+    force = _plus_along(force, body.mass * acceleration)
+    moment = (moment[0] + hy * acceleration, moment[1] - hx * acceleration, moment[2])
+    return Composite(body, Momenta(rows, _plus_along(first, twice * body.mass)), (force, moment))
+
+
+def _plus_along(v: Vector, value: Scalar) -> Vector:
+    """v + value z"""
+    return (v[0], v[1], v[2] + value)
