@@ -15,7 +15,7 @@ from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
 from psdmc.recipes.torques import torques
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference

@@ -9,7 +9,7 @@ from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.robot.chain import Array
+from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
