@@ -91,7 +91,8 @@ def test_show_says_the_verdict_first_then_logs_accuracy_and_friction(
         for word in ("verdict:", "log: two.csv, 4,000 rows", "R^2 held out", "coulomb", "gravity 0")
     ]
     assert places == sorted(places)
-    assert "file of 20" in said
+    (log,) = [line for line in said.splitlines() if line.startswith("log:")]
+    assert log.endswith(" s"), "a log whose time starts at zero has no date"
     held_out = record.steps[0].joints["J1" if "J1" in record.joint_names else record.joint_names[0]].held_out
     assert f"{held_out.r2:.4f}" in said
     row = next(row for row in record.friction if row.name == "viscous")

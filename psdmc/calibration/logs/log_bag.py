@@ -71,7 +71,7 @@ def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) 
         stored=n,
         places=tuple(range(n)),
         notes=(f"{name}: 'effort' is read as motor torque, friction included",),
-        date=date_of(float(stamps[0]), path),
+        date=date_of(float(stamps[0])),
     )
     return log if store.on_disk else log.held()
 

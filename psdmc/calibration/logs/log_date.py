@@ -1,23 +1,16 @@
-"""When a log was recorded, as far as its file tells."""
+"""When a log was recorded, as far as its rows tell."""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from pathlib import Path
 
 EARLIEST, LATEST = 9.0e8, 4.0e9
 """s since 1970 that are believed as a date: 1998 to 2096."""
 
 
-def date_of(first_time: float, path: Path) -> str:
-    """A date (UTC): of the first row where time counts from 1970, else of the file."""
-    if EARLIEST < first_time < LATEST:
-        return _date(first_time)
-    try:
-        return f"file of {_date(path.stat().st_mtime)}"
-    except (OSError, ValueError, OverflowError):
+def date_of(first_time: float) -> str:
+    """The date (UTC) of a first row whose time (s) counts from 1970, else nothing: the date of a file is another after
+    it is copied, and the same log must give the same calibrated file."""
+    if not EARLIEST < first_time < LATEST:
         return ""
-
-
-def _date(seconds: float) -> str:
-    return datetime.fromtimestamp(seconds, UTC).date().isoformat()
+    return datetime.fromtimestamp(first_time, UTC).date().isoformat()

@@ -52,7 +52,7 @@ def read_log(path: str | Path) -> Log:
         return bag if isinstance(bag, Log) else bag.held()
     require_format(path)
     found = log_from_columns(path.name, read_columns(path))
-    return replace(found, date=date_of(float(found.time[0]) if len(found) else 0.0, path))
+    return replace(found, date=date_of(float(found.time[0]) if len(found) else 0.0))
 
 
 def require_format(path: Path) -> None:

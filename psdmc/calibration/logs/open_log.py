@@ -53,7 +53,7 @@ def _stored(path: Path, size: int, progress: Progress, held: int) -> AnyLog:
     if not times:
         raise InputError(f"{path}: no rows under its header", "record or export it again")
     time = np.concatenate(times)
-    return log_of_store(layout, time, store, date_of(float(time[0]), path))
+    return log_of_store(layout, time, store, date_of(float(time[0])))
 
 
 def _counted(
