@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
+from psdmc.recipes.recipe import Needs
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
@@ -113,7 +114,8 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     snapped = bool(loaded.snap_report)
     robot = reference(loaded, parameters=parameters) if snapped else written
     angles = angles_by_segment(loaded.snap_report, model.n, loaded.options.snap)
-    rows = (*_compared(model, theta, robot), *_functions(model, theta, robot))
+    condition = _condition(model, robot)
+    rows = (*_compared(model, theta, robot, condition), *_functions(model, theta, robot, condition))
     rows += _placements(model, written, angles)
     if snapped:
         rows += (_snapping(model, theta, written, angles),)
@@ -153,7 +155,12 @@ def _states(n: int) -> tuple[Array, Array, Array]:
     return q, qd, qdd
 
 
-def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[CheckRow, ...]:
+def _condition(model: DynamicsModel, robot: Reference) -> float:
+    """The largest condition number of the mass matrix at the states that are compared."""
+    return float(np.linalg.cond(robot.mass_matrix(_states(model.n)[0])).max())
+
+
+def _compared(model: DynamicsModel, theta: Array, robot: Reference, condition: float) -> tuple[CheckRow, ...]:
     q, qd, qdd = _states(model.n)
     rest = np.zeros_like(q)
     tau = model.torques_for(theta, q, qd, qdd)
@@ -175,27 +182,33 @@ def _compared(model: DynamicsModel, theta: Array, robot: Reference) -> tuple[Che
     )
     least = NO_TORQUE * float(np.abs(pairs[0][-1]).max(initial=0.0))
     checked = [CheckRow(name, against, _error(a, b, least), TORQUE_LIMIT) for name, against, a, b in pairs]
-    return (*checked, _forward(robot, q, qd, qdd, tau))
+    return (*checked, _forward(robot, q, qd, qdd, tau, condition))
 
 
-def _functions(model: DynamicsModel, theta: Array, robot: Reference) -> Iterator[CheckRow]:
+def _functions(model: DynamicsModel, theta: Array, robot: Reference, condition: float) -> Iterator[CheckRow]:
     """What functions compute that is no part of the expansion."""
     if not model.is_reduced:
         remark = "a base parameter has no standard parameter of its own"
         yield CheckRow("base parameters", "their equations", np.inf, TORQUE_LIMIT, remark)
         return
-    for name, against, error, lack in function_errors(model, theta, robot):
-        yield CheckRow(name, against, error, None if lack else TORQUE_LIMIT, lack and f"not compared: {lack}")
+    for recipe, error, lack in function_errors(model, theta, robot, condition < SINGULAR):
+        limit = _solved_limit(condition) if recipe.needs is Needs.POSITIVE_MASS else TORQUE_LIMIT
+        remark = lack and f"not compared: {lack}"
+        yield CheckRow(recipe.title, recipe.against, error, None if lack else limit, remark)
 
 
-def _forward(robot: Reference, q: Array, qd: Array, qdd: Array, tau: Array) -> CheckRow:
+def _solved_limit(condition: float) -> float:
+    """What divides by the mass matrix loses digits with its condition number."""
+    return max(TORQUE_LIMIT, CONDITION_LIMIT * condition)
+
+
+def _forward(robot: Reference, q: Array, qd: Array, qdd: Array, tau: Array, condition: float) -> CheckRow:
     """Whether Pinocchio's forward dynamics gives back the accelerations that the torques were computed from."""
     name = "forward dynamics of these torques"
-    condition = float(np.linalg.cond(robot.mass_matrix(q)).max())
     if not condition < SINGULAR:
         return CheckRow(name, "aba", np.nan, None, "not compared: the mass matrix is singular")
-    limit = max(TORQUE_LIMIT, CONDITION_LIMIT * condition)
-    return CheckRow(name, "aba", _error(robot.forward_dynamics(q, qd, tau), qdd), limit)
+    error = _error(robot.forward_dynamics(q, qd, tau), qdd)
+    return CheckRow(name, "aba", error, _solved_limit(condition))
 
 
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:

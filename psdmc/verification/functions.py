@@ -24,10 +24,10 @@ which gravity acts along no joint has no potential energy but rounding."""
 
 
 def function_errors(
-    model: DynamicsModel, theta: Array, robot: Reference
-) -> Iterator[tuple[str, str, float, str]]:
-    """(name, Pinocchio's function, largest error relative to each output's largest value, why there is none) for all
-    functions that are no part of the expansion."""
+    model: DynamicsModel, theta: Array, robot: Reference, solvable: bool
+) -> Iterator[tuple[Recipe, float, str]]:
+    """(recipe, largest error relative to each output's largest value, why there is none) for all functions that are no
+    part of the expansion; `solvable`: whether the mass matrix can be inverted."""
     arrays = RobotOnArrays.of(model, theta)
     given = _states(model, robot)
     least = NOTHING * max(1.0, float(np.abs(given[TAU.name]).max(initial=0.0)))
@@ -35,8 +35,9 @@ def function_errors(
         if recipe.polynomials is not None:
             continue
         lack = lack_of_standard_parameters(model) if recipe.needs is Needs.STANDARD else None
-        error = np.nan if lack else _error(recipe, arrays, robot, given, theta, least)
-        yield recipe.title, recipe.against, error, lack or ""
+        if recipe.needs is Needs.POSITIVE_MASS and not solvable:
+            lack = "the mass matrix is singular"
+        yield recipe, np.nan if lack else _error(recipe, arrays, robot, given, theta, least), lack or ""
 
 
 def _states(model: DynamicsModel, robot: Reference) -> dict[str, Array]:
