@@ -8,13 +8,14 @@ from unittest import mock
 
 import numpy as np
 from campaign_reference import Reference
-from psdmc.program.functions import BY_NAME, Function
 
 from psdmc.compiler import compile
+from psdmc.functions import RECIPES
 from psdmc.lower import kernels, search
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.interpret import interpret
+from psdmc.program.signature import Signature, Sizes
 
 Array = np.ndarray
 
@@ -59,9 +60,10 @@ def _interpreted(model: DynamicsModel, reference: Reference) -> Iterator[tuple[s
         for name, kernel in lower(model, lowering, FUNCTIONS).items():
             function = kernel.function
             given = _arguments(function, reference) | {"theta_b": model.theta_b}
-            sizes = {function.output: function.size(model.n, model.l), "pivot": model.n}
+            sizes = function.sizes(Sizes.of_chain(model.n, model.l))
+            (output,) = function.outputs
             for form in ("single", "batch"):
-                found = interpret(getattr(kernel, form), given, sizes)[function.output]
+                found = interpret(getattr(kernel, form), given, sizes)[output.name]
                 yield f"PROGRAM {lowering} {name} {form}", _error(function, found, reference, model)
 
 
@@ -70,7 +72,7 @@ def _compiled(
 ) -> Iterator[tuple[str, float]]:
     lowering, real, trig = build
     robot = compile(model, lowering, functions, real, trig)
-    for function in (BY_NAME[name] for name in functions):
+    for function in (RECIPES[name].signature for name in functions):
         arguments = _arguments(function, reference).values()
         for label, theta in (("", {}), (" theta", {"theta_b": model.theta_b}))[: 1 + function.theta]:
             found = np.asarray(getattr(robot, function.name)(*arguments, **theta), dtype=np.float64)
@@ -78,14 +80,14 @@ def _compiled(
             yield f"C {lowering} {real} {trig} {function.name}{label}", error
 
 
-def _arguments(function: Function, reference: Reference) -> dict[str, Array]:
+def _arguments(function: Signature, reference: Reference) -> dict[str, Array]:
     """By name and in order. Forward dynamics gets the torques of known accelerations."""
     states = reference.states if function.name == INVERSE else reference.few
     given = dict(zip(("q", "qd", "qdd"), states, strict=True)) | {"tau": reference.tau[: len(states[0])]}
-    return {name: given[name] for name in function.inputs}
+    return {quantity.name: given[quantity.name] for quantity in function.inputs}
 
 
-def _error(function: Function, found: Array, reference: Reference, model: DynamicsModel) -> float:
+def _error(function: Signature, found: Array, reference: Reference, model: DynamicsModel) -> float:
     count, n = len(found), model.n
     if function.name == "forward_dynamics":
         return reference.acceleration_error(found)

@@ -12,7 +12,7 @@ from campaign_robots import RandomRobot, random_robot
 
 from psdmc.derivation.certify import certificate
 from psdmc.derivation.derive import derive_model
-from psdmc.errors import DerivationError
+from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import DEFAULT_SNAP, load_robot_text
 from psdmc.robot.mechanism import Mechanism
@@ -53,8 +53,13 @@ def measured(seed: int, count: int, *, lowered: bool) -> Found:
     as_written = _reference(robot, Pinocchio.of_text(robot.text), states)
     if not robot.is_mixed:
         _of_mujoco(robot, as_written, found)
-    exact = load_robot_text(robot.text, "urdf", snap=0.0)
-    snapped = load_robot_text(robot.text, "urdf", snap=DEFAULT_SNAP)
+    try:
+        exact, snapped = (load_robot_text(robot.text, "urdf", snap=snap) for snap in (0.0, DEFAULT_SNAP))
+    except InputError as refusal:
+        if not robot.is_mixed:
+            raise
+        found.refused["file"] = str(refusal)
+        return found
     chains = {"snap 0": (exact.chain, as_written)}
     if snapped.snap_report:
         chains["snapped"] = (snapped.chain, _reference(robot, Pinocchio.of_chain(snapped.chain), states))
@@ -107,7 +112,7 @@ def _of_mujoco(robot: RandomRobot, reference: Reference, found: Found) -> None:
 def _of_chain(chain: Mechanism, name: str, reference: Reference, found: Found, turn: int | None) -> None:
     expands = len(chain) <= EXPANDED_JOINTS
     model = derive_model(chain, expand=expands)
-    plain = replace(model, E=None, P=None) if expands else model
+    plain = replace(model, expansion=None) if expands else model
     plain = replace(plain, certificate=certificate(plain))
     kinds = {"base parameters": plain} | ({"E and P": model} if expands else {})
     for kind, one in kinds.items():

@@ -34,6 +34,13 @@ def test_robots_that_the_campaign_found(seed: int) -> None:
     assert failing(seed) == {}
 
 
+def test_a_robot_beyond_the_declared_limits_is_refused_by_them() -> None:
+    """1687: no length above 9.8e-7 m."""
+    found = measured(1687, STATES, lowered=False)
+    assert "the longest of all its lengths" in found.refused["file"]
+    assert found.errors == {}
+
+
 @pytest.mark.parametrize("seed", [2035, 2057, 2207])
 def test_robots_whose_programs_the_campaign_found_wrong(
     seed: int, tmp_path, monkeypatch: pytest.MonkeyPatch

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import time
+import traceback
 from pathlib import Path
 
 import psdmc.cli.measuring  # noqa: F401  loaded before the fork
@@ -38,6 +39,8 @@ def _become(words: list[object], folder: Path) -> None:
         main([str(word) for word in words])
     except SystemExit as left:
         code = left.code if isinstance(left.code, int) else int(left.code is not None)
+    except BaseException:  # what a user would see as a traceback is in what was said
+        traceback.print_exc()
     finally:
         with contextlib.suppress(OSError, ValueError):
             sys.stdout.flush()
