@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import pickle
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -73,6 +72,7 @@ def test_mujocos_joint_moves_a_body_likewise(joint: JointType) -> None:
         '<mujoco><compiler angle="radian"/><worldbody><body><geom size="0.1"/>'
         f'<joint type="{joint.mujoco}" axis="0 0 1"/></body></worldbody></mujoco>'
     )
+    mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     data.qpos[:] = 0.7
