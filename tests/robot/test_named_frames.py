@@ -91,7 +91,7 @@ def test_saved_models_keep_their_frames_and_old_ones_have_the_tip(arm: Path, tmp
 def test_a_model_without_named_frames_has_the_hash_that_it_always_had(arm: Path) -> None:
     model = derive(arm, base="pedestal", tip="hand")
     assert "frames" not in model.provenance["options"]
-    assert model.content_hash == replace(model, chain=replace(model.chain, frames=())).content_hash
+    assert model.content_hash == replace(model, mechanism=replace(model.mechanism, frames=())).content_hash
 
 
 @pytest.mark.parametrize(
