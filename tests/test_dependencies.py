@@ -20,7 +20,7 @@ def bounds() -> dict[str, str]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
     asked = [*project["dependencies"], *extras["test"], *extras["calibrate"]]
-    found = (re.fullmatch(r"([\w-]+)>=([\d.]+)", one) for one in asked)
+    found = (re.fullmatch(r"([\w.-]+)>=([\d.]+)(;.*)?", one) for one in asked)
     return {match[1]: match[2] for match in found if match}
 
 
