@@ -45,11 +45,13 @@ Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class Derivatives(NamedTuple):
-    """n x n each: entry [i][j] = d tau_i / d q_j, d tau_i / d qd_j, d tau_i / d qdd_j = M_ij."""
+    """n x n each: entry [i][j] = d tau_i / d q_j, d tau_i / d qd_j, d tau_i / d qdd_j = M_ij; and the n torques of gravity,
+    C . (minus gravity), which come with them."""
 
     by_q: Rows
     by_qd: Rows
     by_qdd: Rows
+    gravity: tuple[Scalar, ...]
 
 
 def inverse_dynamics_derivatives(
@@ -75,11 +77,15 @@ def inverse_dynamics_derivatives(
         axes.append(axis)
         steps.append(step)
     by_q, by_qd, by_qdd = ([[0.0] * n for _ in range(n)] for _ in range(3))
+    gravity: list[Scalar] = [0.0] * n
     for i, composite in _composites(frames, bodies, q, qd, qdd, forward, choices, steps):
-        _fill_row(i, frames, axes, steps, torque_row(frames[i], axes[i], composite), by_q, by_qd, by_qdd)
+        row = torque_row(frames[i], axes[i], composite)
+        gravity[i] = dot(row.c, axes[i].up)
+        _fill_row(i, frames, axes, steps, row, by_q, by_qd, by_qdd)
         _fill_column(i, frames, steps, wrenches_of_motion(frames[i], axes[i], composite), by_q, by_qd)
         by_qdd[i][i] = by_qdd[i][i] + drive_inertia[i]
-    return Derivatives(*(tuple(tuple(row) for row in rows) for rows in (by_q, by_qd, by_qdd)))
+    rows, slopes, mass = (tuple(tuple(row) for row in block) for block in (by_q, by_qd, by_qdd))
+    return Derivatives(rows, slopes, mass, tuple(gravity))
 
 
 def _composites(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from psdmc.dynamics.frames import BASE, Frame, Turn, from_previous, inward, to_previous
+from psdmc.dynamics.frames import BASE, Frame, Turn, from_previous, inward, outward, to_previous
 from psdmc.dynamics.motion import Choices, Forward, Rates, Spin, spin_of
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform, transpose
 
@@ -21,6 +21,7 @@ class Axis(NamedTuple):
     spin          its U, so that its points at r accelerate with acceleration + U r
     acceleration  m/s^2, of the joint's origin as one of its points
     rate, twice   z' = w x z and 2 z'
+    up            m/s^2, the base's acceleration, minus gravity
     """
 
     w: Vector
@@ -29,6 +30,7 @@ class Axis(NamedTuple):
     acceleration: Vector
     rate: Vector
     twice: Vector
+    up: Vector
 
     @property
     def bend(self) -> Vector:
@@ -104,7 +106,8 @@ def axis_and_step(
     """A joint's axis, and its step to its parent."""
     frame, offset, parent = frames[i], forward.states[i].offset, frames[i].parent
     if parent == BASE:
-        axis = _axis(ZERO, ZERO, from_previous(frame, base))
+        up = from_previous(frame, base)
+        axis = _axis(ZERO, ZERO, up, up)
         return axis, Step(frame, False, offset, ZERO, None)
     turn, (acceleration, spin) = forward.compound_turns[parent], forward.motions[parent]
     before = add(acceleration, transform(spin.field, offset))
@@ -113,16 +116,17 @@ def axis_and_step(
         w, dw = _after(
             axes[parent], frames[parent].joint.turn(qd[parent]), frames[parent].joint.turn(qdd[parent])
         )
-        before, offset = inward(turn, before), inward(turn, offset)
+        before, offset, up = inward(turn, before), inward(turn, offset), axes[parent].up
         velocity = cross(w, offset)
     else:
         rates = forward.rates[parent]
         w, dw = from_previous(frame, rates.w), from_previous(frame, rates.dw_r)
         before = from_previous(frame, before)
+        up = from_previous(frame, outward(turn, axes[parent].up))
         velocity = cross(rates.w, offset)
     slide = frames[parent].joint.slide(qd[parent])
     twice = None if slide is None else slide + slide
-    return _axis(w, dw, before), Step(frame, joins, offset, scale(velocity, 2.0), turn, twice)
+    return _axis(w, dw, before, up), Step(frame, joins, offset, scale(velocity, 2.0), turn, twice)
 
 
 def _after(axis: Axis, rate: Scalar | None, acceleration: Scalar | None) -> tuple[Vector, Vector]:
@@ -133,7 +137,7 @@ def _after(axis: Axis, rate: Scalar | None, acceleration: Scalar | None) -> tupl
     return (w[0], w[1], w[2] + rate), (dw[0] + w[1] * rate, dw[1] - w[0] * rate, dw[2] + acceleration)
 
 
-def _axis(w: Vector, dw: Vector, acceleration: Vector) -> Axis:
+def _axis(w: Vector, dw: Vector, acceleration: Vector, up: Vector) -> Axis:
     wx, wy, _ = w
     twice = (wy + wy, -(wx + wx), 0.0)
-    return Axis(w, dw, spin_of(Rates(w, dw)), acceleration, (wy, -wx, 0.0), twice)
+    return Axis(w, dw, spin_of(Rates(w, dw)), acceleration, (wy, -wx, 0.0), twice, up)

@@ -14,7 +14,6 @@ from psdmc.functions import forward_dynamics
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
-from psdmc.recipes.torques import torques
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -28,8 +27,7 @@ def trace(g: Ingredients) -> Outputs:
     """
     at_rest = _torque_derivatives(g, g.still)
     factors = factorize(at_rest.by_qdd)
-    gravity = torques(g, g.still, g.still, g.base)
-    rates = g.inputs["qd"]
+    rates, gravity = g.inputs["qd"], at_rest.gravity
     bias = [0.5 * _product(row, rates) + own for row, own in zip(at_rest.by_qd, gravity, strict=True)]
     load = [tau - h for tau, h in zip(g.inputs["tau"], bias, strict=True)]
     accelerations = solve(factors, load)

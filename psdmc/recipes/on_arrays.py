@@ -85,7 +85,7 @@ class RobotOnArrays:
         """(k, n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
         given = (list(q.T), list(qd.T), list(qdd.T))
         found = inverse_dynamics_derivatives(self.frames, self.bodies, self.drives, *given, self.base)
-        by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found)
+        by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found[:3])
         return by_q, by_qd, by_qdd
 
     def mass_matrix(self, q: Array) -> Array:

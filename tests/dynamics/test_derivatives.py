@@ -20,7 +20,7 @@ CHAINS = {"a chain of one": (-1,), "a chain of two": (-1, 0), "a chain of seven"
 def found_in(tree: RandomTree, states, choices: Choices = CHOICES[0]) -> list[np.ndarray]:
     given = [list(values.T) for values in states]
     blocks = inverse_dynamics_derivatives(tree.frames, tree.bodies, tree.drives, *given, tree.up, choices)
-    return [np.stack([columns(row) for row in block], axis=1) for block in blocks]
+    return [np.stack([columns(row) for row in block], axis=1) for block in blocks[:3]]
 
 
 def pinocchios(tree: RandomTree, states) -> list[np.ndarray]:
@@ -64,7 +64,19 @@ def test_joints_on_different_branches_do_not_feel_each_other() -> None:
     blocks = inverse_dynamics_derivatives(
         tree.frames, tree.bodies, tree.drives, [0.3] * 6, [0.1] * 6, [0.2] * 6, tree.up
     )
-    for block in blocks:
+    for block in blocks[:3]:
         for i, j in ((2, 4), (4, 2), (3, 5), (5, 2)):
             assert block[i][j] == 0.0
             assert isinstance(block[i][j], float)
+
+
+@trees
+def test_gravity_comes_with_them(parents, kinds, parallel) -> None:
+    tree = RandomTree(15, parents, kinds, parallel)
+    states = tree.states(COUNT, 3)
+    expected = tree.each(pin.computeGeneralizedGravity, states[0])
+    for choices in CHOICES[::5]:
+        found = inverse_dynamics_derivatives(
+            tree.frames, tree.bodies, tree.drives, *(list(values.T) for values in states), tree.up, choices
+        )
+        assert np.abs(columns(found.gravity) - expected).max() <= EXACT * np.abs(expected).max()
