@@ -11,7 +11,13 @@ RUNTIME = Path(__file__).with_name("stress.h")
 
 
 def stress_program(package: PackageView) -> str:
-    """C text of the program that calls all of the package's functions in all layouts."""
+    """C text of the program that calls all of the package's functions in all layouts.
+
+    stress.h knows functions of one output whose inputs have n entries each; ValueError where the package has others.
+    """
+    others = [kernel.name for kernel in package.kernels if not _is_plain(kernel, package.n)]
+    if others:
+        raise ValueError(f"stress.h does not know how to call {', '.join(others)}")
     own = f"{package.robot}_theta_b"
     known = all(parameter.value is not None for parameter in package.info.parameters)
     lines = [
@@ -30,6 +36,10 @@ def stress_program(package: PackageView) -> str:
     ones = "" if known else f"static const real ones[L] = {{{', '.join(['1'] * package.l)}}};"
     lines += [ones, f"int main(void) {{ return stress_main({theta}); }}"]
     return "\n".join(lines) + "\n"
+
+
+def _is_plain(kernel: KernelView, n: int) -> bool:
+    return len(kernel.outputs) == 1 and all(vector.size == n for vector in kernel.inputs)
 
 
 def _wrappers(kernel: KernelView) -> list[str]:
@@ -52,5 +62,5 @@ def _wrappers(kernel: KernelView) -> list[str]:
 
 def _entry(kernel: KernelView) -> str:
     lanes = f"call_{kernel.name}_batch_soa" if "batch_soa" in kernel.prototypes else "0"
-    fields = [f'"{kernel.name}"', str(len(kernel.inputs)), str(kernel.output.size), str(int(kernel.theta))]
+    fields = [f'"{kernel.name}"', str(len(kernel.inputs)), str(kernel.outputs[0].size), str(int(kernel.theta))]
     return "{" + ", ".join([*fields, f"call_{kernel.name}_single", f"call_{kernel.name}_batch", lanes]) + "}"
