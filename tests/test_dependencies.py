@@ -1,4 +1,4 @@
-"""What pyproject.toml asks of dependencies, and what `make test-lowest` tests of it, are the same."""
+"""What pyproject.toml asks of dependencies, and what `make test-lowest` tests of it, are the same; and what it packs."""
 
 from __future__ import annotations
 
@@ -32,3 +32,10 @@ def test_every_lower_bound_is_tested():
     asked = {name: padded(version) for name, version in bounds().items() if name not in UNTESTED}
     tested = {name: padded(version) for name, version in lowest().items()}
     assert tested == asked
+
+
+def test_a_wheel_holds_every_folder():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    named = set(project["tool"]["setuptools"]["packages"]) - {"psdmc.templates"}
+    found = {".".join(file.parent.relative_to(ROOT).parts) for file in (ROOT / "psdmc").rglob("__init__.py")}
+    assert named == found
