@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "psdmc"
 ERRORS = ("InputError", "DerivationError", "ToolchainError", "Fault")
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
 COMMAND = re.compile(r"`psdmc ([a-z-]+)([^`]*)`")
-OTHERS = {"valgrind": {"--tool"}}
+OTHERS = {"valgrind": {"--tool"}, "ros2 bag record": {"--compression-mode"}}
 """Options of other programs, which a message may tell a user to type."""
 
 

@@ -62,5 +62,10 @@ def _wrappers(kernel: KernelView) -> list[str]:
 
 def _entry(kernel: KernelView) -> str:
     lanes = f"call_{kernel.name}_batch_soa" if "batch_soa" in kernel.prototypes else "0"
-    fields = [f'"{kernel.name}"', str(len(kernel.inputs)), str(kernel.outputs[0].size), str(int(kernel.theta))]
+    fields = [
+        f'"{kernel.name}"',
+        str(len(kernel.inputs)),
+        str(kernel.outputs[0].size),
+        str(int(kernel.theta)),
+    ]
     return "{" + ", ".join([*fields, f"call_{kernel.name}_single", f"call_{kernel.name}_batch", lanes]) + "}"

@@ -41,7 +41,7 @@ def require_packed_messages(file: Path) -> None:
     if file.suffix.lower() != ".db3":
         raise InputError(
             f"{file}: messages packed one by one in a file that is not SQLite's are not read",
-            "record the bag again with --compression-mode file, or none",
+            "record the bag again by `ros2 bag record --compression-mode file`, or without compression",
         )
     left = allowed = _allowed(file)
     with decoding(str(file), "a packed ROS 2 bag"):
