@@ -22,6 +22,10 @@ NOTHING = 1e-9
 """Values below this share of the largest torque (N m, N) and of one (m, J, kg m/s) are compared on that scale: a robot on
 which gravity acts along no joint has no potential energy but rounding."""
 
+ROUNDED = 1e-6
+"""An output below this share of its function's largest one is compared on that scale: the accelerations of a single joint
+do not depend on its rate, but for rounding of the others."""
+
 
 def function_errors(
     model: DynamicsModel, theta: Array, robot: Reference, solvable: bool
@@ -61,7 +65,9 @@ def _error(
     expected, found = recipe.pinocchio(robot, given), recipe.reference(arrays, given)
     if recipe.times_theta:
         found = {name: values @ theta for name, values in found.items()}
+    largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in expected.items()}
+    least = max(least, ROUNDED * max(largest.values()))
     return max(
-        float(np.abs(found[name] - values).max() / max(float(np.abs(values).max()), least))
+        float(np.abs(found[name] - values).max(initial=0.0)) / max(largest[name], least)
         for name, values in expected.items()
     )

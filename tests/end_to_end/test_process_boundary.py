@@ -348,8 +348,8 @@ def test_the_cache_is_shown_and_cleared(tmp_path: Path):
 
     code = f"import psdmc; psdmc.compile(psdmc.derive({SCARA!r}), functions=['gravity'])"
     subprocess.run([sys.executable, "-c", code], env=os.environ | place, check=True)
-    assert ": 2 entries, " in typed("cache", **place).stdout, "a lowering and a library"
-    assert typed("cache", "--clear", **place).stdout.splitlines()[0] == "2 entries removed"
+    assert ": 3 entries, " in typed("cache", **place).stdout, "a lowering, a library and its interface"
+    assert typed("cache", "--clear", **place).stdout.splitlines()[0] == "3 entries removed"
     assert list((tmp_path / "my cache").iterdir()) == []
 
 
