@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import TypeVar
@@ -33,9 +32,9 @@ def in_a_new_process(work: Callable[[Job], Result], job: Job) -> Result:
 
 def _elsewhere(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-        with _deaf_to_interrupts():
-            results = pool.map(work, jobs)
         try:
+            with _deaf_to_interrupts():
+                results = pool.map(work, jobs)
             yield from results
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -46,12 +45,12 @@ def _elsewhere(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int)
 
 @contextlib.contextmanager
 def _deaf_to_interrupts() -> Iterator[None]:
-    """Processes started inside ignore Ctrl-C, from their first instruction on: this one answers for all."""
-    if threading.current_thread() is not threading.main_thread():
+    """Processes started inside never hear Ctrl-C: this one answers for all. What comes meanwhile is heard behind."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: its consoles send Ctrl-C to every process
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which new processes inherit
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

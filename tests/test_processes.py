@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from psdmc import processes
 from psdmc.processes import in_a_new_process, in_processes
 
 
@@ -41,6 +42,14 @@ def test_a_single_job_can_have_a_process_of_its_own():
     job, process = in_a_new_process(process_of, 3)
     assert job == 3
     assert process != os.getpid()
+
+
+def test_ctrl_c_while_processes_start_is_heard_behind():
+    reached = []
+    with pytest.raises(KeyboardInterrupt), processes._deaf_to_interrupts():
+        os.kill(os.getpid(), signal.SIGINT)
+        reached.append("the end of the block")
+    assert reached
 
 
 HANGING = """
