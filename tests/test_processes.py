@@ -46,9 +46,14 @@ def test_a_single_job_can_have_a_process_of_its_own():
 
 def test_ctrl_c_while_processes_start_is_heard_behind():
     reached = []
-    with pytest.raises(KeyboardInterrupt), processes._deaf_to_interrupts():
-        os.kill(os.getpid(), signal.SIGINT)
-        reached.append("the end of the block")
+
+    def starts() -> None:
+        with processes._deaf_to_interrupts():
+            os.kill(os.getpid(), signal.SIGINT)
+            reached.append("the end of the block")
+
+    with pytest.raises(KeyboardInterrupt):
+        starts()
     assert reached
 
 
