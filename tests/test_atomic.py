@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import errno
 import os
-import resource
-import signal
 import stat
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from full_disk import files_of_at_most
 
 from psdmc.atomic import check_place, remove_leftovers, whole_file, write_together, write_whole
 from psdmc.errors import InputError, ToolchainError
+
+TOO_LITTLE = 10_000
 
 
 @pytest.fixture
@@ -89,29 +90,18 @@ def test_a_wrong_place_is_the_inputs_fault(place: str, tmp_path: Path):
     assert names(tmp_path) == ["file", "folder"]
 
 
-@pytest.fixture
-def small_files():
-    """No file may grow beyond 10,000 bytes: the disk is full, for any user."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    signal.signal(signal.SIGXFSZ, handler)
-
-
-def test_a_full_disk_leaves_the_old_file(tmp_path: Path, small_files):
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path):
     write_whole(tmp_path / "file", "old")
-    with pytest.raises(ToolchainError, match="File too large") as caught:
+    with pytest.raises(ToolchainError, match="File too large") as caught, files_of_at_most(TOO_LITTLE):
         write_whole(tmp_path / "file", "x" * 20_000)
     assert "room" in str(caught.value.hint)
     assert (tmp_path / "file").read_text() == "old"
     assert names(tmp_path) == ["file"]
 
 
-def test_files_that_belong_together_are_all_old_or_all_new(tmp_path: Path, small_files):
+def test_files_that_belong_together_are_all_old_or_all_new(tmp_path: Path):
     write_together(tmp_path, {"a": "old", "sub/b": "old"})
-    with pytest.raises(ToolchainError):
+    with pytest.raises(ToolchainError), files_of_at_most(TOO_LITTLE):
         write_together(tmp_path, {"a": "new", "sub/b": "x" * 20_000})
     assert [(tmp_path / name).read_text() for name in ("a", "sub/b")] == ["old", "old"]
     assert names(tmp_path) == ["a", "sub"]

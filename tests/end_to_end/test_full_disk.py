@@ -7,9 +7,7 @@ A small disk that is really full is tried where mounting is allowed.
 from __future__ import annotations
 
 import os
-import resource
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,6 +16,7 @@ from pathlib import Path
 import pytest
 from bundled import bundled_model, robot_path
 from command_line import files_in, typed
+from full_disk import files_of_at_most
 from killable import run
 from test_killed import a_log, built_package
 
@@ -27,16 +26,6 @@ from psdmc.compiler import compile as compile_model
 
 KILOBYTES_LEFT = 2
 TOO_LITTLE = KILOBYTES_LEFT << 10
-
-
-@pytest.fixture
-def full_after() -> Iterator[object]:
-    """full_after(bytes): no file grows beyond them from here on, in this process and those it starts."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    signal.signal(signal.SIGXFSZ, handler)
 
 
 def model_into(folder: Path) -> None:
@@ -59,7 +48,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_full_disk_is_one_line_and_the_old_files(name: str, tmp_path: Path, full_after):
+def test_a_full_disk_is_one_line_and_the_old_files(name: str, tmp_path: Path):
     words, prepare = COMMANDS[name]
     folder = tmp_path / "work"
     folder.mkdir()
@@ -70,8 +59,8 @@ def test_a_full_disk_is_one_line_and_the_old_files(name: str, tmp_path: Path, fu
         ).read_text()  # what is compiled is in the cache now
     before = files_in(folder)
 
-    full_after(TOO_LITTLE)
-    status = run(words, folder)
+    with files_of_at_most(TOO_LITTLE):
+        status = run(words, folder)
 
     said = (tmp_path / "work.said").read_text(encoding="utf-8")
     errors = [line for line in said.splitlines() if line.startswith("error: ")]
@@ -81,16 +70,15 @@ def test_a_full_disk_is_one_line_and_the_old_files(name: str, tmp_path: Path, fu
     assert files_in(folder) == before
 
 
-def test_a_full_disk_under_a_campaign(tmp_path: Path, full_after):
+def test_a_full_disk_under_a_campaign(tmp_path: Path):
     """It writes many files: those that are there are whole, and none is a temporary one."""
     folder = tmp_path / "work"
     folder.mkdir()
     model_into(folder)
     words = ["excite", "m.npz", "-o", "plan", "--seconds", 1, "--duration", 5, "--acceleration", 10]
     compile_model(bundled_model("two_link"), functions=["regressor"])  # in the cache before the disk is full
-    full_after(TOO_LITTLE)
-
-    status = run(words, folder)
+    with files_of_at_most(TOO_LITTLE):
+        status = run(words, folder)
 
     said = (tmp_path / "work.said").read_text(encoding="utf-8")
     assert status == 4, said
@@ -98,15 +86,14 @@ def test_a_full_disk_under_a_campaign(tmp_path: Path, full_after):
     assert files_in(folder).keys() == {"m.npz"}
 
 
-def test_a_full_cache_disk_is_one_line(tmp_path: Path, full_after, monkeypatch: pytest.MonkeyPatch):
+def test_a_full_cache_disk_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """The compiler's own files do not fit either: what it says is passed on, and no entry stays."""
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
     folder = tmp_path / "work"
     folder.mkdir()
     a_log(folder)
-    full_after(TOO_LITTLE)
-
-    status = run(["calibrate", "m.npz", "log.csv", "-o", "x.npz", "--no-physical"], folder)
+    with files_of_at_most(TOO_LITTLE):
+        status = run(["calibrate", "m.npz", "log.csv", "-o", "x.npz", "--no-physical"], folder)
 
     said = (tmp_path / "work.said").read_text(encoding="utf-8")
     assert status == 4, said
@@ -116,7 +103,7 @@ def test_a_full_cache_disk_is_one_line(tmp_path: Path, full_after, monkeypatch: 
 
 @pytest.mark.parametrize("options", [["--json", "x.json"], ["--report", "x.html"]])
 def test_a_full_disk_under_what_was_measured(
-    options: list[str], tmp_path: Path, full_after, monkeypatch: pytest.MonkeyPatch
+    options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     measured = BenchResult(this_machine(), {f"rival {k}": "1.0" for k in range(200)}, 1, 1, ())
     monkeypatch.setattr("psdmc.cli.measuring.run", lambda *_: measured)
@@ -126,8 +113,8 @@ def test_a_full_disk_under_what_was_measured(
     (folder / options[1]).write_text("old")
     before = files_in(folder)
 
-    full_after(TOO_LITTLE)
-    status = run(["bench", "m.npz", *options], folder)
+    with files_of_at_most(TOO_LITTLE):
+        status = run(["bench", "m.npz", *options], folder)
 
     said = (tmp_path / "work.said").read_text(encoding="utf-8")
     assert status == 4, said
@@ -185,8 +172,8 @@ def test_a_disk_that_is_really_full(small_disk: Path, tmp_path: Path):
     assert set(files_in(small_disk)) == {"m.npz", "filler"}
 
 
-def test_the_commands_that_show_write_no_file(tmp_path: Path, full_after):
+def test_the_commands_that_show_write_no_file(tmp_path: Path):
     model_into(tmp_path)
-    full_after(TOO_LITTLE)
-    assert typed("show", tmp_path / "m.npz").returncode == 0
+    with files_of_at_most(TOO_LITTLE):
+        assert typed("show", tmp_path / "m.npz").returncode == 0
     assert os.listdir(tmp_path) == ["m.npz"]
