@@ -31,21 +31,24 @@ def in_a_new_process(work: Callable[[Job], Result], job: Job) -> Result:
 
 
 def _elsewhere(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+    spawn, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
+    with ProcessPoolExecutor(workers, spawn, initializer=_leave_interrupts_to_programs) as pool:
         try:
             with _deaf_to_interrupts():
-                results = pool.map(work, jobs)
-            yield from results
+                futures = [pool.submit(work, job) for job in jobs]
+            for future in futures:
+                yield future.result()
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in multiprocessing.active_children():
+            # The pool then finds itself broken and gives up what waits. Nothing is cancelled besides, as pool.map would:
+            # a cancelled future raises in the pool's own thread, which leaves another one writing to workers that are gone.
+            for process in set(multiprocessing.active_children()) - others:
                 process.terminate()
             raise
 
 
 @contextlib.contextmanager
 def _deaf_to_interrupts() -> Iterator[None]:
-    """Processes started inside never hear Ctrl-C: this one answers for all. What comes meanwhile is heard behind."""
+    """Processes started inside do not hear Ctrl-C while they start. What this one is sent meanwhile it hears behind."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows: its consoles send Ctrl-C to every process
         yield
         return
@@ -54,3 +57,11 @@ def _deaf_to_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _leave_interrupts_to_programs() -> None:
+    """In a worker: Ctrl-C does nothing to it, since the process that started it answers for all; compilers that it runs
+    get the system's default back, and end."""
+    signal.signal(signal.SIGINT, lambda number, frame: None)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import islice
 
 from psdmc.bench.build import counted_flags
 from psdmc.bench.callgrind import instructions
@@ -14,6 +13,7 @@ from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable
 from psdmc.bench.rivals import Entrant
 from psdmc.errors import ToolchainError
+from psdmc.processes import in_processes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,29 +37,21 @@ def assemble(
     functions  names to keep; None: all
     count      whether to count instructions too, which compiles everything once more
     """
-    with _pool(len(cases)) as pool:
-        futures: list[list[Future[list[Contestant | Unavailable]]]] = []
-        for case in cases:
-            futures.append([pool.submit(enter, entrant, case, count) for entrant in entrants])
-            if len(futures) == 1:  # what all cases share is built once, not by several processes at a time
-                [future.result() for future in futures[0]]
-        assembled = []
-        for case, row in zip(cases, futures, strict=True):
+    assembled: list[Assembled] = []
+    # What all cases share is built for the first, once, not by several processes at a time.
+    for some in (cases[:1], cases[1:]):
+        jobs = [(entrant, case, count) for case in some for entrant in entrants]
+        entered = iter(in_processes(enter, jobs, os.cpu_count() or 1))
+        for case in some:
             progress(f"{case.name}: building")
-            entries = [entry for future in row for entry in future.result()]
+            entries = [entry for row in islice(entered, len(entrants)) for entry in row]
             assembled.append(_sorted(case, entries, functions))
     return tuple(assembled)
 
 
-def _pool(cases: int) -> Executor:
-    """Processes, because lowering is Python; threads do for one case, where compilers do most of the work."""
-    if cases == 1:
-        return ThreadPoolExecutor(os.cpu_count())
-    return ProcessPoolExecutor(os.cpu_count(), mp_context=multiprocessing.get_context("spawn"))
-
-
-def enter(entrant: Entrant, case: Case, count: bool) -> list[Contestant | Unavailable]:
-    """One entrant's contestants, with instruction counts where wanted and possible."""
+def enter(job: tuple[Entrant, Case, bool]) -> list[Contestant | Unavailable]:
+    """One entrant's contestants for one case; with instruction counts where the job says so and they are possible."""
+    entrant, case, count = job
     entries = list(entrant.contestants(case))
     if not count or not entrant.counted:
         return entries
