@@ -3,6 +3,7 @@
 python tests/campaign/campaign_run.py --robots 1000          the robots of seeds 0 to 999
 python tests/campaign/campaign_run.py --robots 1000:2000 --journal generated/campaign.jsonl
                                                              the next thousand, added to what that file holds
+python tests/campaign/campaign_run.py --lowered-only      those of them alone that are lowered and compiled
 python tests/campaign/campaign_run.py --seed 52 --urdf       one robot again, all its errors and its file
 """
 
@@ -96,6 +97,7 @@ def arguments() -> argparse.Namespace:
     add("--robots", type=seed_range, default=range(ROBOTS), help="seeds of robots: N or A:B")
     add("--states", type=int, default=STATES, help="random states of each robot")
     add("--lowered-every", type=int, default=LOWERED_EVERY, help="lower and compile one in so many; 0: none")
+    add("--lowered-only", action="store_true", help="those robots alone")
     add("--jobs", type=int, default=os.cpu_count() or 1)
     add("--journal", type=Path, help="file of outcomes: seeds that it holds are not run again")
     add("--json", type=Path, help="where to write the figures of all that the journal holds")
@@ -124,12 +126,14 @@ def main() -> int:
 def _run(chosen: argparse.Namespace, journal: Path) -> None:
     known = read(journal)
     seeds = [seed for seed in chosen.robots if seed not in known]
+    if chosen.lowered_only:
+        seeds = [seed for seed in seeds if is_lowered(seed, chosen.lowered_every)]
     ran = outcomes(seeds, chosen.states, chosen.lowered_every, chosen.jobs, chosen.commit)
     for count, one in enumerate(ran, 1):
         append(journal, one)
         if "raised" in one or one["failed"]:
             print(one, flush=True)
-        elif count % 100 == 0:
+        elif count % (10 if chosen.lowered_only else 100) == 0:
             print(f"{count} of {len(seeds)}", flush=True)
 
 
