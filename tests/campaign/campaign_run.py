@@ -3,7 +3,7 @@
 python tests/campaign/campaign_run.py --robots 1000          the robots of seeds 0 to 999
 python tests/campaign/campaign_run.py --robots 1000:2000 --journal generated/campaign.jsonl
                                                              the next thousand, added to what that file holds
-python tests/campaign/campaign_run.py --lowered-only      those of them alone that are lowered and compiled
+python tests/campaign/campaign_run.py --lowered-only         those of them alone that are lowered and compiled
 python tests/campaign/campaign_run.py --seed 52 --urdf       one robot again, all its errors and its file
 """
 
