@@ -22,9 +22,11 @@ NOTHING = 1e-9
 """Values below this share of the largest torque (N m, N) and of one (m, J, kg m/s) are compared on that scale: a robot on
 which gravity acts along no joint has no potential energy but rounding."""
 
+ROUNDING = 1e-12
+"""An output below this share of its function's largest one is rounding: the accelerations of a single joint do not depend
+on its rate."""
 ROUNDED = 1e-6
-"""An output below this share of its function's largest one is compared on that scale: the accelerations of a single joint
-do not depend on its rate, but for rounding of the others."""
+"""Share of its function's largest output on whose scale such an output is compared."""
 
 
 def function_errors(
@@ -66,8 +68,13 @@ def _error(
     if recipe.times_theta:
         found = {name: values @ theta for name, values in found.items()}
     largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in expected.items()}
-    least = max(least, ROUNDED * max(largest.values()))
+    most = max(largest.values())
     return max(
-        float(np.abs(found[name] - values).max(initial=0.0)) / max(largest[name], least)
+        float(np.abs(found[name] - values).max(initial=0.0)) / max(_scale(largest[name], most), least)
         for name, values in expected.items()
     )
+
+
+def _scale(largest: float, most: float) -> float:
+    """On which an output is compared whose largest value is given, and its function's; what is rounding on a larger one."""
+    return largest if largest > ROUNDING * most else ROUNDED * most
