@@ -21,9 +21,9 @@ def error_of(found: dict[str, float], expected: dict[str, float]) -> float:
 
 
 def test_a_small_output_is_not_hidden_behind_a_large_one():
-    """Positions of a robot of micrometres, beside rotations of one."""
+    """Positions of a robot of 10 nm, beside rotations of one."""
     assert error_of(
-        {"position": 1.1e-6, "rotation": 1.0}, {"position": 1e-6, "rotation": 1.0}
+        {"position": 1.1e-8, "rotation": 1.0}, {"position": 1e-8, "rotation": 1.0}
     ) == pytest.approx(0.1)
 
 
