@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Literal
 from unittest.mock import patch
 
 from psdmc.bench.cases import standard_chains
@@ -41,6 +42,7 @@ from psdmc.program.trace import Tracer
 from psdmc.robot.mechanism import Mechanism
 
 TEN = slice(0, 10)
+PREVIOUS: Literal["previous"] = "previous"
 INVERSE = RECIPES["inverse_dynamics"]
 Row = tuple[str, Sequence[int | str]]
 
@@ -57,21 +59,21 @@ def operations(program: Program) -> int:
 def choices(robot: str) -> Iterator[Row]:
     """Each line adds one choice to those above it."""
     model = model_of(robot)
-    chain = model.chain
-    plain = reframe(chain, ("previous",) * len(chain))
+    chain = model.mechanism
+    plain = reframe(chain, (PREVIOUS,) * len(chain))
     search = Search(chain, model.representative, model.theta_b)
 
     def best(candidates: Iterator[Arrangement]) -> int:
         return min(operations(trace_dynamics(INVERSE, one, search.robot)) for one in candidates)
 
-    first = next(search.starts(("previous",) * len(chain)))
+    first = next(search.starts((PREVIOUS,) * len(chain)))
     compound, fold = Choices(compound=True), Choices(compound=True, fold=True)
     yield "the file's frames, every parameter", [operations(in_file_frames(chain))]
     yield "frames re-framed to modified DH", [operations(in_frames(chain, plain.frames, plain.base, plain))]
     yield "parameters on sparse carriers", [best(iter([first]))]
     yield "compound turns of parallel axes", [best(iter([replace(first, choices=compound)]))]
     yield "last body seen from before its turn", [best(iter([replace(first, choices=fold)]))]
-    yield "the better of all recursions", [best(search.starts(("previous",) * len(chain)))]
+    yield "the better of all recursions", [best(search.starts((PREVIOUS,) * len(chain)))]
     yield (
         "where frames sit on their axes",
         [best(one for feet in all_feet(chain) for one in search.starts(feet))],
@@ -113,7 +115,7 @@ def programs_of(robot: str) -> dict[str, Program]:
     """Programs as lowering makes them, before any pass."""
     model = derive_model(standard_chains()[robot]())
     assert model.theta_b is not None
-    search = Search(model.chain, model.representative, model.theta_b)
+    search = Search(model.mechanism, model.representative, model.theta_b)
     found = search.best(INVERSE, SINGLE)
     programs = {
         "inverse": trace_dynamics(RECIPES["inverse_dynamics"], found, search.robot),
@@ -203,7 +205,7 @@ def derivatives(robot: str) -> Iterator[Row]:
     n, inverse = model.n, kernels["inverse_dynamics"].single
     blocks = [Block(f"by_{name}", "tau", name, n, n) for name in ("q", "qd", "qdd")]
     for mode in ("forward", "reverse"):
-        whole = jacobians(inverse, blocks, mode)  # type: ignore[arg-type]
+        whole = jacobians(inverse, blocks, mode)
         only = Program(whole.body, tuple(out for out in whole.outputs if out[0].vector != "tau"))
         yield f"inverse dynamics, {mode} mode over its PROGRAM", [operations(only)]
     yield "inverse dynamics, by recursion", [cost(kernels[names[1]].single).total]

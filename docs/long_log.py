@@ -20,7 +20,7 @@ import numpy as np
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.compiler import derive
-from psdmc.model import evaluate
+from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.store import save
 
@@ -40,12 +40,10 @@ def synthetic_log(model: DynamicsModel, rows: int, rate: float) -> Log:
         q += size * np.sin(angle)
         qd += size * w * np.cos(angle)
         qdd -= size * w**2 * np.sin(angle)
-    assert model.theta_b is not None
+    parameters = model.standard_parameters()
     tau = np.concatenate(
         [
-            evaluate.newton_euler_torques(
-                model, model.theta_b, [part[k : k + AT_ONCE] for part in (q, qd, qdd)]
-            )
+            recursive.torques(model.mechanism, parameters, [part[k : k + AT_ONCE] for part in (q, qd, qdd)])
             for k in range(0, rows, AT_ONCE)
         ]
     )

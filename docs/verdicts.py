@@ -43,7 +43,7 @@ def wrong_logs(log: Log, constants: np.ndarray) -> Iterator[tuple[str, Log]]:
     yield "as recorded", log
     yield "torques negated", scaled(log, -1.0)
     yield "torques in kN m", scaled(log, 1e-3)
-    yield "amperes in the effort columns", scaled(log, 1.0 / constants)
+    yield "amperes in the effort columns", scaled(log, list(1.0 / constants))
     yield "effort of joint 3 turned", turned(log, 2, ["effort"])
     yield "effort of joint 6 turned", turned(log, 5, ["effort"])
     yield "position of joint 2 turned", turned(log, 1, MOVED)
@@ -71,7 +71,7 @@ def sines(model: DynamicsModel, seconds: float, rate: float) -> Trajectory:
     """Two sines per joint about the middle of its range, of frequencies that no two joints share."""
     time = np.arange(round(seconds * rate)) / rate
     n = model.n
-    limits = [joint.limits for joint in model.chain.joints]
+    limits = [joint.limits for joint in model.mechanism.joints]
     middle = np.array([0.5 * (limit.lower + limit.upper) for limit in limits])
     reach = np.array([0.25 * (limit.upper - limit.lower) for limit in limits])
     q = np.tile(middle, (len(time), 1))
@@ -122,7 +122,7 @@ def campaigns(_: Path | None) -> Iterator[tuple[str, Calibration | str]]:
     """The demonstration's three variants, parameters unknown beforehand."""
     model = replace(derive(ROBOT, drive_inertia=True), theta_b=None)
     robot = compile_model(model, functions=["regressor"])
-    runs, found = plan_campaign(model.chain, robot, model.l, CampaignOptions(table="npz"))
+    runs, found = plan_campaign(model.mechanism, robot, model.l, CampaignOptions(table="npz"))
     variants = {
         "ideal sensors": SimulateOptions(ideal_sensors=True, workers=2),
         "sensors as in its file": SimulateOptions(workers=2),

@@ -6,7 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import psdmc
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -19,3 +22,22 @@ def test_a_script_of_the_documents_starts(script: str):
 
     assert done.returncode == 0, done.stderr
     assert "usage:" in done.stdout
+
+
+def test_the_long_log_is_made_of_the_robots_own_torques(monkeypatch: pytest.MonkeyPatch):
+    """Less friction, the model's at the same states but for the noise of 0.3 N m."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    from long_log import ROBOT, synthetic_log
+
+    model = psdmc.derive(ROBOT)
+    log = synthetic_log(model, 20_000, 1000.0)
+
+    time, q, effort = (
+        log.time[::20],
+        log.position[::20],
+        log.effort[::20],
+    )  # rounded positions, differentiated twice
+    qd = np.gradient(q, time, axis=0)
+    rigid = model.inverse_dynamics(q, qd, np.gradient(qd, time, axis=0))
+    friction = 2.0 * np.tanh(qd / 0.03) + 3.0 * qd
+    assert 0.28 < (effort - rigid - friction)[5:-5].std() < 0.32
