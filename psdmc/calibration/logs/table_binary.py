@@ -79,7 +79,7 @@ def open_parquet(file: BinaryIO, name: str) -> tuple[Any, list[str]]:
     """pyarrow's file and its column names; InputError where columns hold anything but numbers."""
     parquet = _parquet()
     with decoding(name, "a Parquet file"):
-        stored = parquet.ParquetFile(file)
+        stored = parquet.ParquetFile(file, pre_buffer=False)
         fields = list(stored.schema_arrow)
         require_names([field.name for field in fields], name)
         for field in fields:
