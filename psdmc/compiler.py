@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from psdmc.emit.adapters import chosen, with_needed
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions, Real, Trig
 from psdmc.emit.package import PackageView, package_files, package_view
@@ -103,6 +104,7 @@ def emit_c(
     force: bool = False,
     progress: Progress = silent,
     payload: bool = False,
+    adapters: Sequence[str] = (),
 ) -> list[str]:
     """Write the model's C package; returns the files that changed.
 
@@ -115,8 +117,11 @@ def emit_c(
     force      whether to overwrite files that psdmc did not write
     payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
                do not admit every load
+    adapters   names of psdmc.emit.adapters.ADAPTERS: other programs that the package is for, too; what they need beside
+               `functions` is generated, too
     """
-    package = _package(model, lowering, functions, _options(lowering, real, trig), name, progress, payload)
+    options = _options(lowering, real, trig)
+    package = _package(model, lowering, functions, options, name, progress, payload, chosen(adapters))
     progress("writing")
     return write_package(directory, package_files(package), force)
 
@@ -149,15 +154,16 @@ def _package(
     name: str | None,
     progress: Progress,
     payload: bool = False,
+    adapters: Sequence[str] = (),
 ) -> PackageView:
-    names = wanted(functions)
+    names = wanted(with_needed(wanted(functions), adapters))
     require(model, names)
     kernels = lowered_once(
         (model.content_hash, lowering, *names), lambda: lower(model, lowering, names, progress)
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     info = package_info(model, name, shown, payload)
-    return package_view(info, kernels, options, reference_states(model, names))
+    return package_view(info, kernels, options, reference_states(model, names), adapters)
 
 
 def _options(lowering: str, real: Real, trig: Trig) -> EmitOptions:

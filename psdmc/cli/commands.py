@@ -204,6 +204,9 @@ def emit_c(
     name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
     payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
+    adapters: Annotated[
+        str, typer.Option("--with", metavar="NAME,...", help="also a library for another program: casadi")
+    ] = "",
 ) -> None:
     """Write a model's C package: header, sources, build files, self-test."""
     from psdmc import compiler
@@ -224,6 +227,7 @@ def emit_c(
             force,
             progress,
             payload,
+            [word.strip() for word in adapters.split(",") if word.strip()],
         )
     print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
     for note in run_time_only(found, wanted):

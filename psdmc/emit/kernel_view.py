@@ -27,9 +27,14 @@ class VectorView:
 
 @dataclass(frozen=True, slots=True)
 class OutputView(VectorView):
-    """An output; `direct`: a batch call writes its rows straight from registers, without a block of them on the stack."""
+    """An output.
+
+    direct  a batch call writes its rows straight from registers, without a block of them on the stack
+    zero    entries that are zero at every state
+    """
 
     direct: bool = False
+    zero: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +189,10 @@ def function_views(
 def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
     function = _checked(kernel.function)
     outputs = tuple(
-        OutputView(q.name, sizes.size(q), sizes.shape(q.axes), _is_direct(q, sizes)) for q in function.outputs
+        OutputView(
+            q.name, sizes.size(q), sizes.shape(q.axes), _is_direct(q, sizes), _zero(q, kernel.single, sizes)
+        )
+        for q in function.outputs
     )
     single_body = _body(kernel, kernel.single, outputs, options)
     lanes_body = _body(kernel, kernel.batch, outputs, options)
@@ -259,6 +267,12 @@ def _body(kernel: Kernel, program: Program, outputs: tuple[OutputView, ...], opt
     has_matrix = any(len(output.shape) > 1 for output in outputs)
     direct = tuple(output.name for output in outputs if output.direct)
     return make_body(program, kernel.inputs, sizes, suffix, has_matrix, direct)
+
+
+def _zero(output: Quantity, program: Program, sizes: Sizes) -> tuple[int, ...]:
+    """Entries that the PROGRAM leaves out or stores as the constant zero."""
+    values = {slot.index: program.body[i].value for slot, i in program.outputs if slot.vector == output.name}
+    return tuple(index for index in range(sizes.size(output)) if values.get(index, 0.0) == 0.0)
 
 
 def _is_direct(output: Quantity, sizes: Sizes) -> bool:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from psdmc.emit.adapters import ADAPTERS, chosen
 from psdmc.emit.cpp import CppClass, cpp_classes
 from psdmc.emit.describe import description, uses_frames
 from psdmc.emit.info import PackageInfo
@@ -38,7 +39,8 @@ from psdmc.program.kernel import Kernel
 class PackageView:
     """One package as the templates see it.
 
-    robot  identifier that every symbol starts with
+    robot     identifier that every symbol starts with
+    adapters  names of psdmc.emit.adapters
     """
 
     robot: str
@@ -46,6 +48,7 @@ class PackageView:
     options: EmitOptions
     functions: tuple[FunctionView, ...]
     references: ReferenceView | None
+    adapters: tuple[str, ...] = ()
 
     @property
     def n(self) -> int:
@@ -227,8 +230,9 @@ def package_view(
     kernels: Mapping[str, Kernel],
     options: EmitOptions,
     references: ReferenceStates | None = None,
+    adapters: Sequence[str] = (),
 ) -> PackageView:
-    """Everything decided; InputError where there is nothing to emit."""
+    """Everything decided; InputError where there is nothing to emit, or where an adapter cannot be."""
     if not kernels:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
     if info.l == 0:
@@ -236,7 +240,7 @@ def package_view(
     check_range(info, kernels, options.c_real)
     robot = identifier(info.name)
     functions = function_views(kernels, info.sizes, robot, options)
-    package = PackageView(robot, info, options, functions, None)
+    package = PackageView(robot, info, options, functions, None, chosen(adapters))
     if references is None:
         return package
     vectors, takes_theta = package.given_vectors, any(kernel.theta for kernel in package.kernels)
@@ -252,6 +256,8 @@ def package_files(package: PackageView) -> dict[str, str]:
         files["test/self_test.c"] = render("self_test.c.jinja", package=package)
         for name in ("reference", "layouts", "compare"):
             files[f"test/{name}.h"] = render(f"{name}.h.jinja", package=package)
+    for adapter in package.adapters:
+        files[f"{adapter}/{package.robot}_{adapter}.c"] = ADAPTERS[adapter](package)
     files["manifest.json"] = manifest(package.robot, package.info, package.options, package.functions, files)
     return files
 

@@ -1,0 +1,35 @@
+"""Other programs' ways of calling the emitted functions, chosen by `emit-c --with`: one file each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from psdmc.emit.adapters import casadi
+from psdmc.errors import InputError
+
+if TYPE_CHECKING:
+    from psdmc.emit.package import PackageView
+
+ADAPTERS: dict[str, Callable[[PackageView], str]] = {"casadi": casadi.source}
+"""Name to the text of its C file, <name>/<robot>_<name>.c, which includes the library's sources and becomes a shared
+library of its own, lib<robot>_<name>."""
+
+NEEDS = {"casadi": casadi.needed}
+"""Name to the functions that it wants in the package beside those that are asked for."""
+
+
+def chosen(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, each once, in the order of ADAPTERS; InputError where one is unknown."""
+    for name in names:
+        if name not in ADAPTERS:
+            raise InputError(f"there is no adapter {name!r}", f"choose from {', '.join(ADAPTERS)}")
+    return tuple(name for name in ADAPTERS if name in names)
+
+
+def with_needed(functions: Sequence[str], adapters: Sequence[str]) -> list[str]:
+    """The functions and those that the adapters want beside them."""
+    found = dict.fromkeys(functions)
+    for adapter in adapters:
+        found |= dict.fromkeys(NEEDS[adapter](functions))
+    return list(found)

@@ -1,0 +1,199 @@
+"""CasADi's external functions: the emitted functions under its calling convention, with exact Jacobians.
+
+The convention is CasADi's documented one (user guide, "Using the generated code"; Function::jacobian): beside f itself a
+library exports what f_n_in, f_sparsity_out and so on return, and jac_f: inputs of f, then its outputs (not read: empty
+patterns), to one block per output and input. Matrices are column by column, nonzeros only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import TYPE_CHECKING
+
+from psdmc.emit.kernel_view import KernelView, OutputView, VectorView
+from psdmc.emit.render import render
+from psdmc.errors import InputError
+from psdmc.functions import RECIPES
+
+if TYPE_CHECKING:
+    from psdmc.emit.package import PackageView
+
+DERIVATIVES = "_derivatives"
+"""Behind a function's name: the function that puts out d output / d input as d<output>_d<input>."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Sparsity as CasADi takes it: rows, columns, then 1 (dense), or starts of columns and rows of the nonzeros."""
+
+    name: str
+    numbers: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """An input or output as CasADi sees it; `at`: where it stands among the called function's outputs, in reals."""
+
+    name: str
+    pattern: str
+    at: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class External:
+    """One external function.
+
+    name     that CasADi looks for
+    inputs   all of them; the first `read` are handed to
+    called   the emitted function, whose outputs start at
+    starts   these places of
+    work     as many reals
+    fails    whether it returns a status
+    """
+
+    name: str
+    inputs: tuple[Argument, ...]
+    outputs: tuple[Argument, ...]
+    called: str
+    read: int
+    starts: tuple[int, ...]
+    work: int
+    fails: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CasadiView:
+    """What templates/adapters/casadi.c.jinja prints.
+
+    hidden   emitted functions whose names CasADi's take: they are compiled under others
+    zeros    length of the longest input: what is not given to a function is zero
+    """
+
+    externals: tuple[External, ...]
+    patterns: tuple[Pattern, ...]
+    hidden: tuple[str, ...]
+    sources: tuple[str, ...]
+    zeros: int
+
+
+def needed(functions: Sequence[str]) -> list[str]:
+    """Functions that give derivatives of these."""
+    return [name + DERIVATIVES for name in functions if name + DERIVATIVES in RECIPES]
+
+
+def source(package: PackageView) -> str:
+    """The adapter's C file; InputError where CasADi cannot call the package."""
+    return render("adapters/casadi.c.jinja", package=package, view=casadi_view(package))
+
+
+def casadi_view(package: PackageView) -> CasadiView:
+    if package.real != "double":
+        raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
+    kernels = {kernel.name: kernel for kernel in package.kernels if not kernel.theta}
+    if not kernels:
+        raise InputError(
+            "CasADi gets functions with baked parameters, and this model's are unknown", "calibrate it first"
+        )
+    patterns = _Patterns()
+    externals = [one for kernel in kernels.values() for one in _externals(kernel, kernels, patterns)]
+    used = {external.called for external in externals}
+    return CasadiView(
+        externals=tuple(externals),
+        patterns=patterns.all,
+        hidden=tuple(sorted(used)),
+        sources=tuple(f"{kernel.function.name}.c" for kernel in kernels.values()),
+        zeros=max(vector.size for kernel in kernels.values() for vector in kernel.inputs),
+    )
+
+
+class _Patterns:
+    """Every pattern once."""
+
+    def __init__(self) -> None:
+        self._names: dict[tuple[int, ...], str] = {}
+
+    def of(self, shape: Sequence[int], zero: Iterable[int] = ()) -> str:
+        """The name of a pattern for a row-major array whose entries `zero` are never anything else."""
+        return self._named(_numbers(shape, frozenset(zero)))
+
+    def unread(self, shape: Sequence[int]) -> str:
+        rows, columns = _matrix(shape)
+        return self._named((rows, columns, *[0] * (columns + 1)))
+
+    def _named(self, numbers: tuple[int, ...]) -> str:
+        return self._names.setdefault(numbers, f"pattern_{len(self._names)}")
+
+    @property
+    def all(self) -> tuple[Pattern, ...]:
+        return tuple(Pattern(name, numbers) for numbers, name in self._names.items())
+
+
+def _matrix(shape: Sequence[int]) -> tuple[int, int]:
+    """Rows and columns: the last axis is that of columns, a vector is a column."""
+    return (prod(shape[:-1]), shape[-1]) if len(shape) > 1 else (prod(shape), 1)
+
+
+def _numbers(shape: Sequence[int], zero: frozenset[int]) -> tuple[int, ...]:
+    rows, columns = _matrix(shape)
+    if not zero:
+        return (rows, columns, 1)
+    kept = [[row for row in range(rows) if row * columns + column not in zero] for column in range(columns)]
+    starts = [sum(len(column) for column in kept[:k]) for k in range(columns + 1)]
+    return (rows, columns, *starts, *(row for column in kept for row in column))
+
+
+def _externals(
+    kernel: KernelView, kernels: Mapping[str, KernelView], patterns: _Patterns
+) -> Iterable[External]:
+    """A function, and its Jacobian where the package has one."""
+    outputs = {output.name: output for output in kernel.outputs}
+    own = [(name, name, patterns.of(output.shape)) for name, output in outputs.items()]
+    yield _external(kernel.name, kernel, _given(kernel, patterns), own, kernel)
+    other = kernels.get(kernel.name + DERIVATIVES)
+    blocks = {} if other is None else {output.name: output for output in other.outputs}
+    named = {f"jac_{o}_{i.name}": f"d{o}_d{i.name}" for o in outputs for i in kernel.inputs}
+    if other is not None and all(block in blocks for block in named.values()):
+        unread = tuple(Argument(f"out_{o.name}", patterns.unread(o.shape)) for o in outputs.values())
+        shown = [(name, block, _block(blocks[block], patterns)) for name, block in named.items()]
+        yield _external(f"jac_{kernel.name}", kernel, (*_given(kernel, patterns), *unread), shown, other)
+
+
+def _given(kernel: KernelView, patterns: _Patterns) -> tuple[Argument, ...]:
+    """Inputs; a matrix is one column per row of ours, so that the numbers lie alike."""
+    return tuple(Argument(i.name, patterns.of(tuple(reversed(_matrix(i.shape))) if len(i.shape) > 1 else (i.size,)))
+                 for i in kernel.inputs)  # fmt: skip
+
+
+def _block(output: OutputView, patterns: _Patterns) -> str:
+    return patterns.of(output.shape, output.zero)
+
+
+def _external(
+    name: str,
+    kernel: KernelView,
+    inputs: tuple[Argument, ...],
+    shown: Sequence[tuple[str, str, str]],
+    called: KernelView,
+) -> External:
+    """shown: name for CasADi, name among the called kernel's outputs, pattern."""
+    starts = _starts(called.outputs)
+    robot_function = called.prototypes["single"].symbol
+    prefix = robot_function.removesuffix(called.name)
+    own = name.removeprefix("jac_")
+    full = f"jac_{prefix}{own}" if name != own else f"{prefix}{own}"
+    return External(
+        name=full,
+        inputs=inputs,
+        outputs=tuple(Argument(label, pattern, starts[output]) for label, output, pattern in shown),
+        called=robot_function,
+        read=len(kernel.inputs),
+        starts=tuple(starts.values()),
+        work=sum(output.size for output in called.outputs),
+        fails=called.positive is not None,
+    )
+
+
+def _starts(outputs: Sequence[VectorView]) -> dict[str, int]:
+    return {output.name: sum(one.size for one in outputs[:k]) for k, output in enumerate(outputs)}

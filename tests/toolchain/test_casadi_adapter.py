@@ -1,0 +1,151 @@
+"""emit-c --with casadi: CasADi's functions from the emitted code, their Jacobians, and an optimal control problem."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bundled import ROBOTS, bundled_model, bundled_robot
+from pinocchio_in_casadi import acceleration
+
+from psdmc.compiler import emit_c
+from psdmc.errors import InputError
+from psdmc.robot.reference import Reference, reference
+from psdmc.toolchain.compiler_command import find_compiler
+
+casadi = pytest.importorskip("casadi")
+sys.path.insert(0, str(ROBOTS.parent / "trajectory_optimisation"))
+
+FUNCTIONS = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "forward_kinematics", "kinetic_energy"]
+External = Callable[[str], "casadi.Function"]
+
+
+def external(robot: str, folder: Path, functions: list[str]) -> External:
+    """A robot's functions for CasADi, compiled as the header of the emitted file says."""
+    emit_c(bundled_model(robot), folder, "factored", functions, adapters=["casadi"], name=robot)
+    library = folder / f"lib{robot}_casadi.so"
+    command = [*find_compiler().command, "-std=c99", "-Wall", "-Wextra", "-Werror", "-O1", "-shared", "-fPIC"]
+    words = [
+        *command,
+        f"-I{folder}/include",
+        str(folder / f"casadi/{robot}_casadi.c"),
+        "-lm",
+        "-o",
+        str(library),
+    ]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return lambda name: casadi.external(f"{robot}_{name}", str(library))
+
+
+@pytest.fixture(scope="module")
+def scara(tmp_path_factory: pytest.TempPathFactory) -> External:
+    return external("scara", tmp_path_factory.mktemp("casadi") / "scara", FUNCTIONS)
+
+
+@pytest.fixture(scope="module")
+def kr6(tmp_path_factory: pytest.TempPathFactory) -> External:
+    return external("kr6", tmp_path_factory.mktemp("casadi") / "kr6", ["forward_dynamics"])
+
+
+def state(seed: int, n: int = 4) -> tuple[np.ndarray, ...]:
+    rng = np.random.default_rng(seed)
+    return tuple(limit * rng.uniform(-1.0, 1.0, n) for limit in (3.0, 3.0, 5.0))
+
+
+def pinocchio_of(name: str) -> Reference:
+    return reference(bundled_robot(name))
+
+
+def close(found: object, expected: np.ndarray, limit: float = 1e-10) -> None:
+    """Within a share of the largest entry; vectors as columns."""
+    values = np.asarray(expected, float).reshape(np.array(found).shape)
+    assert np.abs(np.array(found) - values).max() <= limit * np.abs(values).max()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_functions_are_pinocchios(scara: External, seed: int) -> None:
+    (q, qd, x), robot = state(seed), pinocchio_of("scara")
+    close(scara("inverse_dynamics")(q, qd, x), robot.inverse_dynamics(q[None], qd[None], x[None]))
+    close(scara("forward_dynamics")(q, qd, x), robot.forward_dynamics(q[None], qd[None], x[None]))
+    close(scara("mass_matrix")(q), robot.mass_matrix(q[None]))
+    _, rotation = scara("forward_kinematics")(q)
+    close(rotation, robot.poses(q[None], [robot.tip_name])[0, 0, :3, :3])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_jacobians_are_pinocchios(scara: External, seed: int) -> None:
+    given, robot = state(seed), pinocchio_of("scara")
+    rows = [v[None] for v in given]
+    inverse = scara("inverse_dynamics").jacobian()(*given, 0)
+    for block, expected in zip(inverse, robot.inverse_dynamics_derivatives(*rows), strict=True):
+        close(block, expected[0])
+    forward = scara("forward_dynamics").jacobian()(*given, 0)
+    for block, expected in zip(forward, robot.forward_dynamics_derivatives(*rows)[1:], strict=True):
+        close(block, expected[0])
+
+
+def test_entries_that_are_always_zero_are_no_nonzeros(scara: External) -> None:
+    """Turning the first joint of an arm on a floor changes no torque: Pinocchio has zeros there, CasADi stores none."""
+    by_q = scara("inverse_dynamics").jacobian().sparsity_out(0)
+    expected = pinocchio_of("scara").inverse_dynamics_derivatives(*(v[None] for v in state(7)))[0][0]
+    assert 0 < by_q.nnz() < 16
+    assert np.array_equal(np.array(casadi.DM(by_q, 1.0)) != 0.0, np.abs(expected) > 1e-9)
+
+
+def test_graphs_differentiate_through_it(scara: External) -> None:
+    """Reverse mode by MX, and calls in SX and on threads."""
+    q, qd, x = state(1)
+    f, at = scara("forward_dynamics"), casadi.MX.sym("q", 4)
+    gradient = casadi.Function("gradient", [at], [casadi.gradient(casadi.sumsqr(f(at, qd, x)), at)])
+    by_q = pinocchio_of("scara").forward_dynamics_derivatives(q[None], qd[None], x[None])
+    close(gradient(q), 2 * by_q[1][0].T @ by_q[0][0])
+    symbol = casadi.SX.sym("q", 4)
+    close(casadi.Function("sx", [symbol], [f(symbol, qd, x)])(q), by_q[0])
+    many = [np.column_stack(column) for column in zip(*map(state, range(50)), strict=True)]
+    one_by_one = np.column_stack([np.array(f(*state(k))) for k in range(50)])
+    assert np.array_equal(np.array(f.map(50, "thread", 2)(*many)), one_by_one)
+
+
+def test_missing_inputs_are_zero_and_unwanted_outputs_are_not_written(scara: External) -> None:
+    """CasADi hands over null pointers for both."""
+    f = scara("inverse_dynamics")
+    close(f(q=state(2)[0])["tau"], pinocchio_of("scara").gravity(state(2)[0][None]))
+    at = casadi.MX.sym("q", 4)
+    alone = casadi.Function("position", [at], [scara("forward_kinematics")(at)[0]])
+    close(
+        alone(state(2)[0]),
+        pinocchio_of("scara").poses(state(2)[0][None], [pinocchio_of("scara").tip_name])[0, 0, :3, 3],
+    )
+
+
+def test_a_function_without_derivatives_says_so(scara: External) -> None:
+    with pytest.raises(RuntimeError, match="Derivatives cannot be calculated"):
+        scara("mass_matrix").jacobian()
+
+
+def test_unknown_parameters_and_single_precision_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="double"):
+        emit_c(bundled_model("scara"), tmp_path, real="float32", functions=["gravity"], adapters=["casadi"])
+    with pytest.raises(InputError, match="'cassadi'"):
+        emit_c(bundled_model("scara"), tmp_path, adapters=["cassadi"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_optimal_control_problem_has_the_same_optimum_with_another_model(kr6: External) -> None:
+    """KR6 from rest to rest, multiple shooting in IPOPT; the other model is Newton-Euler on CasADi's own symbols."""
+    from shooting import point_to_point
+
+    oracle = acceleration(pinocchio_of("kr6").model)
+    q, qd, tau = state(3, 6)
+    close(oracle(q, qd, tau), pinocchio_of("kr6").forward_dynamics(q[None], qd[None], tau[None]))
+    start, goal = np.zeros(6), 0.3 * (-1.0) ** np.arange(6)
+    ours = point_to_point(kr6("forward_dynamics"), start, goal, steps=6, duration=0.4)
+    theirs = point_to_point(oracle, start, goal, steps=6, duration=0.4)
+    assert ours.cost == pytest.approx(theirs.cost, rel=1e-6)
+    assert np.abs(ours.states - theirs.states).max() < 1e-4
+    assert np.abs(ours.states[[0, -1], :6] - [start, goal]).max() < 1e-7
