@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from psdmc.bench.contestant import Runner
-from psdmc.bench.states import States
+from psdmc.bench.states import States, output_sizes
 from psdmc.functions import RECIPES
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.mechanism import Array
@@ -29,7 +29,10 @@ def disagreement(runner: Runner, states: States) -> float:
     weights = runner.contestant.weights
     if weights is not None:
         found = found.reshape(states.count, -1, len(weights)) @ weights
-    return relative_error(found, expected)
+        return relative_error(found, expected)
+    ends = np.cumsum(output_sizes(runner.contestant.function, states.n))[:-1]
+    blocks = zip(np.split(found, ends, axis=1), np.split(expected, ends, axis=1), strict=True)
+    return max(relative_error(*block) for block in blocks)
 
 
 def relative_error(found: Array, expected: Array) -> float:

@@ -75,7 +75,8 @@ def _job(contestant: Contestant, states: States, folder: Path) -> str:
     (folder / name).write_bytes(
         np.concatenate(states.inputs(contestant.function, contestant.lanes)).tobytes()
     )
-    return f"{contestant.symbol} {states.n} {contestant.outputs} {STATES} {STATES} {name}"
+    more = states.more(contestant.function)
+    return f"{contestant.symbol} {states.n} {more} {contestant.outputs} {STATES} {STATES} {name}"
 
 
 def _total(dump: Path) -> int:

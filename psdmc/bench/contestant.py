@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from psdmc.bench.states import States, at_cache_line, moved
+from psdmc.functions import RECIPES
 from psdmc.robot.mechanism import Array
 
 Layout = Literal["state", "rows", "lanes"]
@@ -22,6 +23,10 @@ RING_BYTES = 1 << 18
 BLOCK = 1024
 """States per timed block: some 50 us, long against reading the clock, short against the scheduler's slices. Batch
 calls take what the ring holds."""
+
+SEVERAL_SHARE = 4
+"""Functions with several outputs, which take rivals microseconds, go over this part of the states: `make bench` stays
+within minutes, and it is still far more than a branch predictor remembers."""
 
 LATENCY_SHARE = 4
 """Latency is taken over this part of the states: still far more than a branch predictor remembers."""
@@ -48,6 +53,7 @@ class Contestant:
     outputs       numbers per state that it puts out
     variant       which of its ways, '' where there is one
     layout        how states are handed over; `lanes` states per block where lane by lane
+    sections      reals per state of each array that a batch call fills one after the other; () where it fills one
     robot         text for its `setup`, None where the library knows its robot
     weights       where functions differ in what they put out (regressors): output rows times these are torques
     operations    (multiplications, additions), None where unknown
@@ -62,6 +68,7 @@ class Contestant:
     variant: str = ""
     layout: Layout = "state"
     lanes: int = 1
+    sections: tuple[int, ...] = ()
     robot: str | None = None
     weights: Array | None = None
     operations: tuple[int, int] | None = None
@@ -84,6 +91,8 @@ class Work(ctypes.Structure):
         ("qd", ctypes.c_void_p),
         ("x", ctypes.c_void_p),
         ("output", ctypes.c_void_p),
+        ("more", ctypes.c_size_t),
+        ("y", ctypes.c_void_p),
     ]
 
 
@@ -97,6 +106,8 @@ class Runner:
         self._output = at_cache_line(ring * contestant.outputs)
         self._block = min(BLOCK, states.count) if contestant.layout == "state" else ring
         self._states = states
+        several = len(RECIPES[contestant.function].signature.outputs) > 1
+        self._count = max(self._block, states.count // (SEVERAL_SHARE if several else 1))
         self.setup()
 
     def move(self) -> None:
@@ -114,7 +125,7 @@ class Runner:
 
     def latency(self) -> Array:
         """ns per state, block by block, where each state waits for the one before."""
-        return self._timed("latency", self._output, self._block, self._states.count // LATENCY_SHARE)
+        return self._timed("latency", self._output, self._block, self._count // LATENCY_SHARE)
 
     def tail(self) -> Array:
         """ns per call over blocks of 64 calls, the clock's own cost subtracted."""
@@ -122,25 +133,41 @@ class Runner:
 
     def outputs(self) -> Array:
         """(count, outputs) what the function puts out at every state, as rows."""
-        count, size, lanes = self._states.count, self.contestant.outputs, self.contestant.lanes
+        count, size = self._states.count, self.contestant.outputs
         output = np.full(count * size, np.nan)
         self._copy_matrices(True)
-        self._timed("throughput", output, count)
+        self._timed("throughput", output, count, count)
         self._copy_matrices(False)
-        return output.reshape(count // lanes, size, lanes).transpose(0, 2, 1).reshape(count, size)
+        lanes, arrays = self.contestant.lanes, np.split(output, np.cumsum(self._sections)[:-1] * count)
+        return np.hstack([_as_rows(array, lanes, count) for array in arrays])
 
     def _timed(self, kind: str, output: Array, block: int, count: int | None = None) -> Array:
-        """Seconds of each block from the library's loop over `count` states (all), as ns per state."""
-        count = max(block, count or self._states.count)
-        inputs = self._states.inputs(self.contestant.function, self.contestant.lanes)
-        q, qd, x = (vector.ctypes.data for vector in inputs)
-        states = self._states
+        """Seconds of each block from the library's loop over `count` states (its share), as ns per state."""
+        count = max(block, count or self._count)
+        states, function = self._states, self.contestant.function
+        q, qd, x, *others = (vector.ctypes.data for vector in states.inputs(function, self.contestant.lanes))
         ring = len(output) // self.contestant.outputs
-        work = Work(count, states.n, self.contestant.outputs, ring, q, qd, x, output.ctypes.data)
+        y = others[0] if others else None
+        work = Work(
+            count,
+            states.n,
+            self.contestant.outputs,
+            ring,
+            q,
+            qd,
+            x,
+            output.ctypes.data,
+            states.more(function),
+            y,
+        )
         seconds = np.zeros(count // block)
         loop = getattr(self._library, f"{self.contestant.symbol}_{kind}")
         loop(ctypes.byref(work), ctypes.c_size_t(block), ctypes.c_void_p(seconds.ctypes.data))
         return seconds * (1e9 / block)
+
+    @property
+    def _sections(self) -> tuple[int, ...]:
+        return self.contestant.sections or (self.contestant.outputs,)
 
     def _clock_cost(self) -> float:
         """ns for an empty block."""
@@ -151,6 +178,12 @@ class Runner:
     def _copy_matrices(self, yes: bool) -> None:
         if hasattr(self._library, "copy_matrices"):
             self._library.copy_matrices(int(yes))
+
+
+def _as_rows(array: Array, lanes: int, count: int) -> Array:
+    """(count, size) from one array of a call: blocks of lanes, or rows already."""
+    size = len(array) // count
+    return array.reshape(count // lanes, size, lanes).transpose(0, 2, 1).reshape(count, size)
 
 
 def source(name: str) -> str:

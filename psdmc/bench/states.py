@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from zlib import crc32
 
 import numpy as np
 
 from psdmc.functions import RECIPES
+from psdmc.program.signature import Quantity, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.robot.mechanism import Array, Mechanism
 
@@ -24,6 +26,16 @@ def at_cache_line(size: int) -> Array:
     memory = np.zeros(size + spare)
     first = -memory.ctypes.data // 8 % spare
     return memory[first : first + size]
+
+
+def _further(function: str) -> tuple[Quantity, ...]:
+    """What a function reads behind its third input; the loops hand over one such."""
+    return RECIPES[function].signature.inputs[3:]
+
+
+def output_sizes(function: str, n: int) -> tuple[int, ...]:
+    """Reals per state of each output of a function of states, for n joints."""
+    return tuple(Sizes.of_chain(n, 0).size(output) for output in RECIPES[function].signature.outputs)
 
 
 def moved(array: Array) -> Array:
@@ -79,13 +91,20 @@ class States:
         if RECIPES[function].times_theta:
             return self.tau
         given = {"q": self.q, "qd": self.qd, "qdd": self.qdd, "tau": self.tau}
-        (values,) = RECIPES[function].reference(self._robot, given).values()
-        return values.reshape(self.count, -1)
+        given |= {quantity.name: self._shaped(quantity) for quantity in _further(function)}
+        blocks = RECIPES[function].reference(self._robot, given).values()
+        return np.hstack([values.reshape(self.count, -1) for values in blocks])
 
-    def inputs(self, function: str, lanes: int = 1) -> tuple[Array, Array, Array]:
-        """q, qd and what the function reads third (qdd or tau), flat; with lanes > 1 in blocks [variable][lane]."""
+    def inputs(self, function: str, lanes: int = 1) -> tuple[Array, ...]:
+        """q, qd, what the function reads third (qdd or tau) and further inputs, flat; with lanes > 1 in blocks
+        [variable][lane]."""
         x = next((q.name for q in RECIPES[function].signature.inputs[2:]), "qdd")
-        return self._laid_out("q", lanes), self._laid_out("qd", lanes), self._laid_out(x, lanes)
+        first = [self._laid_out(name, getattr(self, name), lanes) for name in ("q", "qd", x)]
+        return (*first, *(self._laid_out(q.name, self._drawn(q), lanes) for q in _further(function)))
+
+    def more(self, function: str) -> int:
+        """Reals per state of the function's further input, 0 where it has none."""
+        return sum(Sizes.of_chain(self.n, 0).size(quantity) for quantity in _further(function))
 
     def move(self) -> None:
         """Put all inputs elsewhere. Which physical pages an array gets decides whose lines collide in the caches: up to
@@ -93,11 +112,21 @@ class States:
         for key, array in self._layouts.items():
             self._layouts[key] = moved(array)
 
-    def _laid_out(self, name: str, lanes: int) -> Array:
+    def _shaped(self, quantity: Quantity) -> Array:
+        """(count, ...) values of a further input."""
+        shape = Sizes.of_chain(self.n, 0).shape(quantity.axes)
+        return self._drawn(quantity).reshape(self.count, *shape)
+
+    def _drawn(self, quantity: Quantity) -> Array:
+        """(count, size) values within plus and minus its largest, the same for the same name."""
+        size = Sizes.of_chain(self.n, 0).size(quantity)
+        rng = np.random.default_rng(crc32(quantity.name.encode()))
+        return rng.uniform(-quantity.largest, quantity.largest, (self.count, size))
+
+    def _laid_out(self, name: str, rows: Array, lanes: int) -> Array:
         """Shared by all contestants, so that none finds a cache colder than another."""
         if (name, lanes) not in self._layouts:
-            rows: Array = getattr(self, name)
-            blocks = rows.reshape(-1, lanes, self.n).transpose(0, 2, 1)
+            blocks = rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1)
             flat = at_cache_line(rows.size)
             flat[:] = blocks.ravel()
             self._layouts[name, lanes] = flat

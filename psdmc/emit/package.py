@@ -257,7 +257,9 @@ def package_files(package: PackageView) -> dict[str, str]:
         for name in ("reference", "layouts", "compare"):
             files[f"test/{name}.h"] = render(f"{name}.h.jinja", package=package)
     for adapter in package.adapters:
-        files[f"{adapter}/{package.robot}_{adapter}.c"] = ADAPTERS[adapter](package)
+        files[f"{adapter}/{package.robot}_{adapter}.c"] = ADAPTERS[adapter](
+            package.robot, package.real, package.kernels
+        )
     files["manifest.json"] = manifest(package.robot, package.info, package.options, package.functions, files)
     return files
 

@@ -88,4 +88,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     needs=Needs.POSITIVE_MASS,
+    benched=True,
 )

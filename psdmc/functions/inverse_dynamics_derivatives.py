@@ -47,4 +47,5 @@ RECIPE = Recipe(
     "computeRNEADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    benched=True,
 )

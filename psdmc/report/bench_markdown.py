@@ -12,29 +12,22 @@ from psdmc.errors import exit_status_of
 from psdmc.report.bench_page import read_result
 from psdmc.report.bench_view import OURS, PINOCCHIO
 
-COLUMNS = (
-    ("inverse_dynamics", "state"),
-    ("forward_dynamics", "state"),
-    ("mass_matrix", "state"),
-    ("regressor", "state"),
+DYNAMICS = (
+    ("inverse_dynamics", "state", "inverse dynamics"),
+    ("forward_dynamics", "state", "forward dynamics"),
+    ("mass_matrix", "state", "mass matrix"),
+    ("regressor", "state", "regressor"),
+    ("inverse_dynamics", "rows", "inverse, batch rows"),
+    ("forward_dynamics", "rows", "forward, batch rows"),
+    ("inverse_dynamics", "lanes", "inverse, lane by lane"),
+    ("forward_dynamics", "lanes", "forward, lane by lane"),
 )
-BATCH = (
-    ("inverse_dynamics", "rows"),
-    ("forward_dynamics", "rows"),
-    ("inverse_dynamics", "lanes"),
-    ("forward_dynamics", "lanes"),
+DERIVATIVES = tuple(
+    (f"{name}_dynamics_derivatives", layout, f"derivatives of {name} dynamics{how}")
+    for layout, how in (("state", ""), ("rows", ", batch rows"), ("lanes", ", lane by lane"))
+    for name in ("inverse", "forward")
 )
-TITLES = (
-    "robot",
-    "inverse dynamics",
-    "forward dynamics",
-    "mass matrix",
-    "regressor",
-    "inverse, batch rows",
-    "forward, batch rows",
-    "inverse, lane by lane",
-    "forward, lane by lane",
-)
+"""Function, layout and title of the two tables' columns."""
 
 
 def markdown(result: BenchResult, command: str = "make bench") -> str:
@@ -43,11 +36,13 @@ def markdown(result: BenchResult, command: str = "make bench") -> str:
 
 
 def _lines(result: BenchResult, command: str) -> Iterator[str]:
-    yield "| " + " | ".join(TITLES) + " |"
-    yield "|" + "---|" * len(TITLES)
-    for case in result.cases:
-        yield f"| {case.name} | " + " | ".join(_cell(case, *column) for column in (*COLUMNS, *BATCH)) + " |"
-    yield ""
+    for columns in (DYNAMICS, DERIVATIVES):
+        yield "| robot | " + " | ".join(title for _, _, title in columns) + " |"
+        yield "|" + "---|" * (len(columns) + 1)
+        for case in result.cases:
+            cells = (_cell(case, function, layout) for function, layout, _ in columns)
+            yield f"| {case.name} | " + " | ".join(cells) + " |"
+        yield ""
     machine = result.machine
     yield (
         "ns per state (times faster than Pinocchio's C++ / than CasADi's C, which take one state a call). "

@@ -18,6 +18,7 @@ PACKAGE = Path(psdmc.functions.__file__).parents[1]
 
 NAMES_SEVERAL = {
     "bench/rivals/casadi_c.py": "what this rival has, and under which names",
+    "bench/rivals/cppadcg_c.py": "what this rival has, and under which names",
     "bench/rivals/mujoco_c.py": "what this rival has",
     "bench/rivals/pinocchio_cpp.py": "what this rival has, and under which names",
     "report/bench_markdown.py": "the columns of README's table",

@@ -9,7 +9,7 @@ from typing import Protocol
 from psdmc.bench.build import native_flags
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable
-from psdmc.bench.rivals import casadi_c, mujoco_c, pinocchio_cpp, psdmc_c
+from psdmc.bench.rivals import casadi_c, cppadcg_c, mujoco_c, pinocchio_cpp, psdmc_c
 from psdmc.errors import PsdmcError
 
 
@@ -43,5 +43,6 @@ EVERYONE = (
     Entrant("Pinocchio", pinocchio_cpp.library, counted=True),
     Entrant("Pinocchio header-only", pinocchio_cpp.header_only),
     Entrant("CasADi", casadi_c.contestants, counted=True),
+    Entrant("CppADCodeGen", cppadcg_c.contestants),
     Entrant("MuJoCo", mujoco_c.contestants),
 )

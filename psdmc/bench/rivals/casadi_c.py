@@ -6,6 +6,7 @@ import ctypes
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
@@ -17,6 +18,7 @@ from psdmc.bench.rivals.pinocchio_cpp import (
     includes,
     incomparable,
     is_comparable,
+    outputs_of,
     pinocchio_prefix,
     standard_parameters,
 )
@@ -29,8 +31,13 @@ RIVAL = "CasADi"
 WAYS = {
     **{name: (name,) for name in SYMBOLS},
     "forward_dynamics": ("forward_dynamics_aba", "forward_dynamics_ldl"),
+    **{
+        f"{name}_derivatives": (f"{name}_derivatives_jacobian", f"{name}_derivatives_recursion")
+        for name in ("inverse_dynamics", "forward_dynamics")
+    },
 }
-"""Its functions; forward dynamics by articulated bodies, or from M and h by L D L^T."""
+"""Its functions; forward dynamics by articulated bodies, or from M and h by L D L^T; derivatives by CasADi's own
+differentiation of rnea and of the latter, or by Pinocchio's recursions."""
 
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
@@ -48,15 +55,13 @@ def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavail
 def _entered(
     case: Case, library: Path, by_lane: bool, counts: dict[str, tuple[int, int]]
 ) -> list[Contestant]:
-    n = case.n
-    outputs = {"mass_matrix": n * n, "regressor": 10 * n * n}
     return [
         Contestant(
             RIVAL,
             function,
             library,
             way,
-            outputs.get(function, n),
+            outputs_of(case, function),
             variant=way.removeprefix(function).strip("_").upper(),
             layout="lanes" if by_lane else "state",
             lanes=ctypes.CDLL(str(library)).lanes() if by_lane else 1,
@@ -71,17 +76,29 @@ def _entered(
 
 def written(case: Case) -> tuple[str, dict[str, tuple[int, int]]]:
     """CasADi's C for the case, and (multiplications, additions) of its functions."""
-    command = [str(_writer()), "robot.txt", "generated"]
-    product = built("generated.c", command, {"robot.txt": robot_as_numbers(case.chain)})
+    product = _generated(case)
     lines = (line.split() for line in product.with_suffix(".txt").read_text().splitlines())
     return product.read_text(), {name: (int(mul), int(add)) for name, mul, add in lines}
+
+
+def symbolic(case: Case) -> Any:
+    """Pinocchio's articulated bodies on CasADi's symbols for the case: a casadi.Function (q, qd, tau) -> qdd."""
+    import casadi
+
+    return casadi.Function.load(str(_generated(case).with_suffix(".casadi")))
+
+
+def _generated(case: Case) -> Path:
+    """The C that the writer makes; what else it writes stands beside it."""
+    command = [str(_writer()), "robot.txt", "generated"]
+    return built("generated.c", command, {"robot.txt": robot_as_numbers(case.chain)})
 
 
 @lru_cache
 def _writer() -> Path:
     """The program that writes C; it is compiled once for all robots, unoptimised: it runs for a tenth of a second."""
     prefix, casadi = pinocchio_prefix(), _casadi()
-    names = ("casadi_writer.cpp", "pinocchio_model.hpp")
+    names = ("casadi_writer.cpp", "pinocchio_model.hpp", "serial_joints.hpp")
     command = [cxx(), "-std=c++17", "-O0", "-DNDEBUG", INSTANTIATED, *DEFINES, *includes(prefix)]
     command += ["-isystem", str(casadi / "include"), "casadi_writer.cpp", "-o", "casadi_writer"]
     command += [f"-L{prefix / 'lib'}", f"-L{casadi}", "-lcasadi", "-lpinocchio_default"]
@@ -132,7 +149,7 @@ def _scalar(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
 
 def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
     """The same C as C++, where its number is a vector."""
-    size = dict.fromkeys(_all_ways(), case.n) | {"mass_matrix": case.n**2, "regressor": 10 * case.n**2}
+    size = {way: outputs_of(case, function) for function, ways in WAYS.items() for way in ways}
     lines = [
         '#include "loops.hpp"',
         '#include "casadi_lanes.hpp"',

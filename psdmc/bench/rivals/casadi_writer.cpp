@@ -1,34 +1,23 @@
 // Writes C for one robot: Pinocchio's algorithms run on CasADi's symbols, printed by CasADi's code generator.
 //
-// usage: casadi_writer ROBOT.txt NAME; writes NAME.c, and NAME.txt: per function its multiplications and additions
+// usage: casadi_writer ROBOT.txt NAME; writes NAME.c, NAME.txt: per function its multiplications and additions, and
+// NAME.casadi: forward dynamics as CasADi's own file
 #include <pinocchio/autodiff/casadi.hpp>
 
 #include <fstream>
+#include <pinocchio/algorithm/aba-derivatives.hpp>
 #include <pinocchio/algorithm/aba.hpp>
 #include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/regressor.hpp>
+#include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
 #include "pinocchio_model.hpp"
+#include "serial_joints.hpp"
 
 namespace {
 
 using casadi::SX;
-
-/// The two kinds of joint that psdmc knows, instead of Pinocchio's twenty: compiles in a quarter of the time.
-template <class Scalar_, int Options_>
-struct SerialJoints {
-  using Scalar = Scalar_;
-  static constexpr int Options = Options_;
-  using JointModelRZ = pinocchio::JointModelRevoluteTpl<Scalar, Options, 2>;
-  using JointModelPZ = pinocchio::JointModelPrismaticTpl<Scalar, Options, 2>;
-  using Mimic = pinocchio::JointModelMimicTpl<Scalar, Options, SerialJoints>;  // Pinocchio asks for it by name
-  using MimicData = pinocchio::JointDataMimicTpl<Scalar, Options, SerialJoints>;
-  using JointModelVariant = boost::variant<JointModelRZ, JointModelPZ, boost::recursive_wrapper<Mimic>>;
-  using JointDataRZ = pinocchio::JointDataRevoluteTpl<Scalar, Options, 2>;
-  using JointDataPZ = pinocchio::JointDataPrismaticTpl<Scalar, Options, 2>;
-  using JointDataVariant = boost::variant<JointDataRZ, JointDataPZ, boost::recursive_wrapper<MimicData>>;
-};
 
 using Model = pinocchio::ModelTpl<SX, 0, SerialJoints>;
 using Data = pinocchio::DataTpl<SX, 0, SerialJoints>;
@@ -41,6 +30,15 @@ SX column(const Matrix &matrix) {
   for (Eigen::Index row = 0; row < matrix.rows(); ++row)
     for (Eigen::Index k = 0; k < matrix.cols(); ++k) all(row * matrix.cols() + k) = matrix(row, k);
   return casadi::SX::densify(all);
+}
+
+SX row_major(const SX &matrix) { return casadi::SX::densify(SX::vec(matrix.T())); }
+
+/// The matrix whose upper triangle is given.
+Matrix symmetric(Matrix M) {
+  for (Eigen::Index i = 0; i < M.rows(); ++i)
+    for (Eigen::Index j = 0; j < i; ++j) M(i, j) = M(j, i);
+  return M;
 }
 
 /// x with A x = b, A symmetric and positive definite: unrolled A = L D L^T, from the last joint to the first.
@@ -107,17 +105,48 @@ struct Writer {
     for (int i = 0; i < n; ++i) q_(i) = q(i), qd_(i) = qd(i), x_(i) = x(i);
   }
 
-  casadi::Function function(const std::string &name, const Matrix &output) const {
-    return casadi::Function(name, {q, qd, x}, {cse(column(output))});
+  casadi::Function function(const std::string &name, const Matrix &output) const { return function(name, column(output)); }
+
+  casadi::Function function(const std::string &name, const SX &output) const {
+    return casadi::Function(name, {q, qd, x}, {cse(output)});
+  }
+
+  /// The derivatives of `output` by each of `inputs`, behind each other.
+  static SX jacobians(const Vector &output, const std::vector<SX> &inputs) {
+    std::vector<SX> all;
+    for (const SX &input : inputs) all.push_back(row_major(SX::jacobian(column(output), input)));
+    return SX::vertcat(all);
+  }
+
+  /// CasADi differentiates Pinocchio's rnea.
+  SX inverse_dynamics_jacobian() const {
+    Data data(model);
+    return jacobians(pinocchio::rnea(model, data, q_, qd_, x_), {q, qd, x});
+  }
+
+  /// Pinocchio's own recursion on CasADi's symbols.
+  SX inverse_dynamics_recursion() const {
+    Data data(model);
+    pinocchio::computeRNEADerivatives(model, data, q_, qd_, x_);
+    return SX::vertcat({column(data.dtau_dq), column(data.dtau_dv), column(symmetric(data.M))});
+  }
+
+  SX forward_dynamics_jacobian() const {
+    const Vector accelerations = solved(mass_matrix(), x_ - nonlinear_effects());
+    return SX::vertcat({column(accelerations), jacobians(accelerations, {q, qd, x})});
+  }
+
+  SX forward_dynamics_recursion() const {
+    Data data(model);
+    pinocchio::computeABADerivatives(model, data, q_, qd_, x_);
+    const Matrix by_q = data.ddq_dq, by_qd = data.ddq_dv;
+    return SX::vertcat({column(data.ddq), column(by_q), column(by_qd), column(symmetric(data.Minv))});
   }
 
   Matrix mass_matrix() const {
     Data data(model);
     pinocchio::crba(model, data, q_, pinocchio::Convention::LOCAL);
-    Matrix M = data.M;
-    for (Eigen::Index i = 0; i < M.rows(); ++i)
-      for (Eigen::Index j = 0; j < i; ++j) M(i, j) = M(j, i);
-    return M;
+    return symmetric(data.M);
   }
 
   Vector nonlinear_effects() const {
@@ -135,7 +164,12 @@ struct Writer {
     code.add(function("nonlinear_effects", nonlinear_effects()));
     code.add(function("gravity", pinocchio::computeGeneralizedGravity(model, data, q_)));
     code.add(function("regressor", pinocchio::computeJointTorqueRegressor(model, data, q_, qd_, x_)));
+    code.add(function("inverse_dynamics_derivatives_jacobian", inverse_dynamics_jacobian()));
+    code.add(function("inverse_dynamics_derivatives_recursion", inverse_dynamics_recursion()));
+    code.add(function("forward_dynamics_derivatives_jacobian", forward_dynamics_jacobian()));
+    code.add(function("forward_dynamics_derivatives_recursion", forward_dynamics_recursion()));
     code.generate();
+    function("forward_dynamics", Matrix(pinocchio::aba(model, data, q_, qd_, x_))).save(name + ".casadi");
   }
 };
 

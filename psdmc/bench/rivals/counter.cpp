@@ -1,7 +1,7 @@
 // Runs contestants' loops once each, under callgrind, which counts what happens inside them and nothing else.
 //
-// usage: counter LIBRARY ROBOT.txt JOBS.txt; a job is a line: symbol, n, outputs, states a call, states in all, file of
-// q, qd and x as doubles.
+// usage: counter LIBRARY ROBOT.txt JOBS.txt; a job is a line: symbol, n, length of a fourth input, outputs, states a call,
+// states in all, file of q, qd, x and the fourth input as doubles.
 #include <dlfcn.h>
 
 #include <fstream>
@@ -22,12 +22,12 @@ int main(int, char **arguments) {
 
   std::ifstream jobs(arguments[3]);
   std::string symbol, states;
-  std::size_t n, outputs, block, count;
-  while (jobs >> symbol >> n >> outputs >> block >> count >> states) {
-    std::vector<double> values(3 * n * count), output(outputs * count), seconds(count);
+  std::size_t n, more, outputs, block, count;
+  while (jobs >> symbol >> n >> more >> outputs >> block >> count >> states) {
+    std::vector<double> values((3 * n + more) * count), output(outputs * count), seconds(count);
     std::ifstream(states, std::ios::binary).read(reinterpret_cast<char *>(values.data()), std::streamsize(values.size() * 8));
     const double *q = values.data();
-    const bench::Work work{count, n, outputs, count, q, q + n * count, q + 2 * n * count, output.data()};
+    const bench::Work work{count, n, outputs, count, q, q + n * count, q + 2 * n * count, output.data(), more, q + 3 * n * count};
     using Loop = void (*)(const bench::Work *, std::size_t, double *);
     auto loop = reinterpret_cast<Loop>(dlsym(library, (symbol + "_throughput").c_str()));
     if (!loop) return std::cerr << dlerror() << "\n", 1;

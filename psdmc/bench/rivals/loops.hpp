@@ -1,11 +1,13 @@
 // The timing loops, one source for every contestant: what is timed differs, how it is timed does not.
 //
-// A contestant is a callable (q, qd, x, output) on one state, or (count, q, qd, x, output) on many; x is qdd or tau.
+// A contestant is a callable (q, qd, x, output) on one state, or (count, q, qd, x, output) on many; x is qdd or tau. Where
+// its function reads a fourth input, that is y before the output.
 #pragma once
 
 #include <time.h>
 
 #include <cstddef>
+#include <type_traits>
 
 #if defined(__GNUC__)
 #define PSDMC_EXPORT extern "C" __attribute__((visibility("default"), noinline))
@@ -27,6 +29,8 @@ struct Work {
   const double *qd;
   const double *x;
   double *output;
+  std::size_t more;  // length of a fourth input; 0 where there is none
+  const double *y;
 };
 
 inline double now() {
@@ -38,6 +42,24 @@ inline double now() {
 /// Outputs count as read: the compiler can drop no call and move none past the clock.
 inline void keep() { asm volatile("" ::: "memory"); }
 
+/// The contestant with the inputs that it reads.
+template <class Call>
+inline void call_one(Call call, const double *q, const double *qd, const double *x, const double *y, double *output) {
+  if constexpr (std::is_invocable_v<Call, const double *, const double *, const double *, const double *, double *>)
+    call(q, qd, x, y, output);
+  else
+    call(q, qd, x, output);
+}
+
+template <class Call>
+inline void call_many(Call call, const Work &w, std::size_t count, std::size_t i) {
+  const double *q = w.q + i * w.n, *qd = w.qd + i * w.n, *x = w.x + i * w.n;
+  if constexpr (std::is_invocable_v<Call, std::size_t, const double *, const double *, const double *, const double *, double *>)
+    call(count, q, qd, x, w.y + i * w.more, w.output);
+  else
+    call(count, q, qd, x, w.output);
+}
+
 /// Seconds of each block of calls, one after the other, none waiting for another.
 template <class Call>
 void throughput(const Work &w, std::size_t block, double *seconds, Call call) {
@@ -45,7 +67,7 @@ void throughput(const Work &w, std::size_t block, double *seconds, Call call) {
   for (std::size_t b = 0; b < w.count / block; ++b) {
     const double start = now();
     for (std::size_t i = b * block; i < (b + 1) * block; ++i) {
-      call(w.q + i * w.n, w.qd + i * w.n, w.x + i * w.n, w.output + slot * w.outputs);
+      call_one(call, w.q + i * w.n, w.qd + i * w.n, w.x + i * w.n, w.y + i * w.more, w.output + slot * w.outputs);
       keep();
       slot = slot + 1 == w.ring ? 0 : slot + 1;
     }
@@ -68,7 +90,7 @@ void latency(const Work &w, std::size_t block, double *seconds, Call call) {
         qd[j] = w.qd[i * w.n + j] + wait;
         x[j] = w.x[i * w.n + j] + wait;
       }
-      call(q, qd, x, w.output);
+      call_one(call, q, qd, x, w.y + i * w.more, w.output);
       keep();
     }
     seconds[b] = now() - start;
@@ -81,7 +103,7 @@ void batch(const Work &w, std::size_t block, double *seconds, Call call) {
   for (std::size_t b = 0; b < w.count / block; ++b) {
     const std::size_t i = b * block;
     const double start = now();
-    call(block, w.q + i * w.n, w.qd + i * w.n, w.x + i * w.n, w.output);
+    call_many(call, w, block, i);
     keep();
     seconds[b] = now() - start;
   }

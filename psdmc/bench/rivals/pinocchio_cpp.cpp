@@ -4,9 +4,11 @@
 // asks for them to check them: the rival is not charged for copies.
 #include "loops.hpp"
 
+#include <pinocchio/algorithm/aba-derivatives.hpp>
 #include <pinocchio/algorithm/aba.hpp>
 #include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/regressor.hpp>
+#include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 #include <memory>
 #include <sstream>
@@ -66,6 +68,23 @@ void regressor(const double *q, const double *qd, const double *qdd, double *Y) 
   give_matrix(pinocchio::computeJointTorqueRegressor(*model, *data, q_, qd_, qdd_), Y);
 }
 
+/// Matrices behind each other at `to`; the last one's lower triangle is filled first, as Pinocchio leaves it open.
+void give_matrices(const Eigen::MatrixXd &by_q, const Eigen::MatrixXd &by_qd, Eigen::MatrixXd last, double *to) {
+  last.triangularView<Eigen::StrictlyLower>() = last.transpose();
+  for (const auto &matrix : {by_q, by_qd, last}) give_matrix(matrix, to), to += matrix.size();
+}
+
+void rnea_derivatives(const double *q, const double *qd, const double *qdd, double *out) {
+  pinocchio::computeRNEADerivatives(*model, *data, vector(q), vector(qd), vector(qdd));
+  if (copies_matrices) give_matrices(data->dtau_dq, data->dtau_dv, data->M, out);
+}
+
+void aba_derivatives(const double *q, const double *qd, const double *tau, double *out) {
+  pinocchio::computeABADerivatives(*model, *data, vector(q), vector(qd), vector(tau));
+  give(data->ddq, out);
+  if (copies_matrices) give_matrices(data->ddq_dq, data->ddq_dv, data->Minv, out + model->nv);
+}
+
 }  // namespace
 
 PSDMC_EXPORT int setup(const char *robot) {
@@ -86,3 +105,5 @@ PSDMC_CONTESTANT(mass_matrix_world, crba<Convention::WORLD>)
 PSDMC_CONTESTANT(nonlinear_effects, nonlinear_effects)
 PSDMC_CONTESTANT(gravity, gravity)
 PSDMC_CONTESTANT(regressor, regressor)
+PSDMC_CONTESTANT(inverse_dynamics_derivatives, rnea_derivatives)
+PSDMC_CONTESTANT(forward_dynamics_derivatives, aba_derivatives)

@@ -12,6 +12,7 @@ import numpy as np
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import DRIVE, Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.bench.states import output_sizes
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError
@@ -27,6 +28,8 @@ SYMBOLS = {
     "nonlinear_effects": ("nonlinear_effects",),
     "gravity": ("gravity",),
     "regressor": ("regressor",),
+    "inverse_dynamics_derivatives": ("inverse_dynamics_derivatives",),
+    "forward_dynamics_derivatives": ("forward_dynamics_derivatives",),
 }
 
 DEFINES = (
@@ -55,15 +58,13 @@ def header_only(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavail
 def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contestant | Unavailable]:
     """Pinocchio's algorithms for one robot."""
     robot = robot_as_numbers(case.chain)
-    n = case.n
-    outputs = {"mass_matrix": n * n, "regressor": 10 * n * n}
     found: list[Contestant | Unavailable] = [
         Contestant(
             rival,
             function,
             compiled_library,
             symbol,
-            outputs.get(function, n),
+            outputs_of(case, function),
             variant=symbol.removeprefix(function).strip("_").upper(),
             robot=robot,
             weights=standard_parameters(case) if function == "regressor" else None,
@@ -73,6 +74,11 @@ def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contesta
         if is_comparable(case, function)
     ]
     return [*found, *incomparable(case, rival)]
+
+
+def outputs_of(case: Case, function: str) -> int:
+    """Numbers per state that a rival puts out: psdmc's, but for standard parameters in place of base parameters."""
+    return 10 * case.n**2 if function == "regressor" else sum(output_sizes(function, case.n))
 
 
 def is_comparable(case: Case, function: str) -> bool:

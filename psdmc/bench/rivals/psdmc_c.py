@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import accumulate
 from pathlib import Path
 
 from psdmc.bench.build import built, cxx, produced
@@ -68,7 +69,8 @@ def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, .
 
 def _ways(case: Case, rival: str, kernel: Kernel, library: Path, lanes: int) -> list[Contestant]:
     name = kernel.name
-    size = Sizes.of_chain(case.n, case.model.l).size(kernel.function.outputs[0])
+    sections = _sections(kernel.function, case.n, case.model.l)
+    size = sum(sections)
     weights = case.model.theta_b if RECIPES[name].times_theta else None
     single, batch = (cost(program) for program in (kernel.single, kernel.batch))
     one = Contestant(
@@ -76,11 +78,12 @@ def _ways(case: Case, rival: str, kernel: Kernel, library: Path, lanes: int) -> 
     )
     many = (batch.mul, batch.add + batch.div)
     rows = Contestant(
-        rival, name, library, f"{name}_batch", size, layout="rows", weights=weights, operations=many
-    )
+        rival, name, library, f"{name}_batch", size,
+        layout="rows", sections=sections, weights=weights, operations=many,
+    )  # fmt: skip
     by_lane = Contestant(
         rival, name, library, f"{name}_batch_soa", size,
-        layout="lanes", lanes=lanes, weights=weights, operations=many,
+        layout="lanes", lanes=lanes, sections=sections, weights=weights, operations=many,
     )  # fmt: skip
     return [one, rows, by_lane]
 
@@ -122,18 +125,33 @@ def glue(package: PackageView) -> str:
     """C++ that puts the package's functions behind the loops."""
     lines = ['#include "loops.hpp"', '#include "library.h"']
     for view in package.functions:
-        symbol = f"{package.robot}_{view.name}"
+        symbol, given = f"{package.robot}_{view.name}", _given(view.signature)
+        sizes = _sections(view.signature, package.n, package.l)
+        one, many = (", ".join(_arguments(view.signature, sizes, each)) for each in ("", "count * "))
+        lines += [f"PSDMC_CONTESTANT({view.name}, []({given}) {{ {symbol}({one}); }})"]
         lines += [
-            f"PSDMC_CONTESTANT({view.name}, [](const double *q, const double *qd, const double *x, double *out) "
-            f"{{ {symbol}({_arguments(view.signature)}); }})"
-        ]
-        lines += [
-            f"PSDMC_BATCH_CONTESTANT({view.name}{suffix}, [](size_t count, const double *q, const double *qd, "
-            f"const double *x, double *out) {{ {symbol}{suffix}(count, {_arguments(view.signature)}); }})"
+            f"PSDMC_BATCH_CONTESTANT({view.name}{suffix}, [](size_t count, {given}) {{ {symbol}{suffix}(count, {many}); }})"
             for suffix in ("_batch", "_batch_soa")
         ]
     return "\n".join(lines) + "\n"
 
 
-def _arguments(function: Signature) -> str:
-    return ", ".join((*(("q", "qd", "x")[: len(function.inputs)]), "out"))
+INPUTS = ("q", "qd", "x", "y")
+"""A contestant's inputs; all have the first three."""
+
+
+def _given(function: Signature) -> str:
+    names = INPUTS[: max(3, len(function.inputs))]
+    return ", ".join([*(f"const double *{name}" for name in names), "double *out"])
+
+
+def _arguments(function: Signature, sizes: Sequence[int], each: str) -> list[str]:
+    """What the function is called with: its inputs, and every output at its place in one array."""
+    starts = [0, *accumulate(sizes[:-1])]
+    outputs = [f"out + {each}{start}" if start else "out" for start in starts]
+    return [*INPUTS[: len(function.inputs)], *outputs]
+
+
+def _sections(function: Signature, n: int, l: int) -> tuple[int, ...]:
+    """Reals per state of each output."""
+    return tuple(Sizes.of_chain(n, l).size(output) for output in function.outputs)

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 from psdmc.emit.adapters import casadi
+from psdmc.emit.kernel_view import KernelView
 from psdmc.errors import InputError
 
-if TYPE_CHECKING:
-    from psdmc.emit.package import PackageView
-
-ADAPTERS: dict[str, Callable[[PackageView], str]] = {"casadi": casadi.source}
-"""Name to the text of its C file, <name>/<robot>_<name>.c, which includes the library's sources and becomes a shared
-library of its own, lib<robot>_<name>."""
+ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView]], str]] = {"casadi": casadi.source}
+"""Name to what makes its C file, <name>/<robot>_<name>.c, of the robot's identifier, the package's real type and its
+kernels. The file includes the library's sources and becomes a shared library of its own, lib<robot>_<name>."""
 
 NEEDS = {"casadi": casadi.needed}
 """Name to the functions that it wants in the package beside those that are asked for."""

@@ -10,15 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import TYPE_CHECKING
 
 from psdmc.emit.kernel_view import KernelView, OutputView, VectorView
 from psdmc.emit.render import render
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
-
-if TYPE_CHECKING:
-    from psdmc.emit.package import PackageView
 
 DERIVATIVES = "_derivatives"
 """Behind a function's name: the function that puts out d output / d input as d<output>_d<input>."""
@@ -67,10 +63,12 @@ class External:
 class CasadiView:
     """What templates/adapters/casadi.c.jinja prints.
 
+    robot    identifier that every symbol starts with
     hidden   emitted functions whose names CasADi's take: they are compiled under others
     zeros    length of the longest input: what is not given to a function is zero
     """
 
+    robot: str
     externals: tuple[External, ...]
     patterns: tuple[Pattern, ...]
     hidden: tuple[str, ...]
@@ -83,15 +81,15 @@ def needed(functions: Sequence[str]) -> list[str]:
     return [name + DERIVATIVES for name in functions if name + DERIVATIVES in RECIPES]
 
 
-def source(package: PackageView) -> str:
+def source(robot: str, real: str, kernels: Sequence[KernelView]) -> str:
     """The adapter's C file; InputError where CasADi cannot call the package."""
-    return render("adapters/casadi.c.jinja", package=package, view=casadi_view(package))
+    return render("adapters/casadi.c.jinja", view=casadi_view(robot, real, kernels))
 
 
-def casadi_view(package: PackageView) -> CasadiView:
-    if package.real != "double":
+def casadi_view(robot: str, real: str, every: Sequence[KernelView]) -> CasadiView:
+    if real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
-    kernels = {kernel.name: kernel for kernel in package.kernels if not kernel.theta}
+    kernels = {kernel.name: kernel for kernel in every if not kernel.theta}
     if not kernels:
         raise InputError(
             "CasADi gets functions with baked parameters, and this model's are unknown", "calibrate it first"
@@ -100,6 +98,7 @@ def casadi_view(package: PackageView) -> CasadiView:
     externals = [one for kernel in kernels.values() for one in _externals(kernel, kernels, patterns)]
     used = {external.called for external in externals}
     return CasadiView(
+        robot=robot,
         externals=tuple(externals),
         patterns=patterns.all,
         hidden=tuple(sorted(used)),
