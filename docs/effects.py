@@ -34,13 +34,15 @@ from psdmc.lower.search import SINGLE, Search, all_feet
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.differentiate import Block, jacobians
-from psdmc.program.passes.fuse_sums import FUSED_LATENCY, LATENCY, fuse_sums
+from psdmc.program.passes.fuse_sums import cycles, fuse_sums
 from psdmc.program.passes.schedule import live_values, schedule
-from psdmc.program.pipeline import LAST, LAST_FOR_ONE_STATE, LONGEST, ROUND, Pass, optimize
+from psdmc.program.pipeline import LAST, LONGEST, ROUND, Pass, optimize
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.trace import Tracer
 from psdmc.robot.mechanism import Mechanism
+from psdmc.target.native import COSTS
 
+LAST_FOR_ONE_STATE: tuple[Pass, ...] = (fuse_sums, schedule)
 TEN = slice(0, 10)
 PREVIOUS: Literal["previous"] = "previous"
 INVERSE = RECIPES["inverse_dynamics"]
@@ -164,7 +166,7 @@ def _weight(program: Program) -> int:
 
 
 def orders(robot: str) -> Iterator[Row]:
-    """Cycles of the longest dependency chain (latencies as in fuse_sums, sines apart), and values alive per
+    """Cycles of the longest dependency chain (latencies of the default target, sines apart), and values alive per
     instruction, of one state's inverse dynamics."""
     program = programs_of(robot)["inverse"]
     variants = {
@@ -191,9 +193,9 @@ def longest_chain(program: Program) -> int:
             fused = max(products, key=lambda a: ready[a])
             others = [ready[a] for a in instr.args if a != fused]
             start = max([*others, *(ready[a] for a in program.body[fused].args)])
-            ready.append(start + FUSED_LATENCY)
+            ready.append(start + COSTS.latency.fused)
         else:
-            ready.append(start + LATENCY[instr.op])
+            ready.append(start + cycles(COSTS.latency)[instr.op])
     return max(ready[i] for _, i in program.outputs)
 
 

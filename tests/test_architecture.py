@@ -16,13 +16,14 @@ MAY_IMPORT = {
     "dynamics": {"robot"},
     "model": {"robot", "dynamics"},
     "derivation": {"robot", "dynamics", "model"},
-    "program": set(),
+    "target": set(),
+    "program": {"target"},
     "recipes": {"robot", "dynamics", "model", "program"},
     "functions": {"robot", "dynamics", "model", "program", "recipes"},
     "verification": {"robot", "dynamics", "model", "program", "recipes", "functions"},
-    "lower": {"robot", "dynamics", "model", "program", "recipes", "functions"},
-    "emit": {"robot", "program", "model", "recipes", "functions"},
-    "toolchain": {"emit", "program", "functions"},
+    "lower": {"robot", "dynamics", "model", "program", "recipes", "functions", "target"},
+    "emit": {"robot", "program", "model", "recipes", "functions", "target"},
+    "toolchain": {"emit", "program", "functions", "target"},
 }
 LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {

@@ -10,21 +10,20 @@ from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, RECIPES
 from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.factored import Arrangement, trace_geometry
-from psdmc.lower.search import BATCH, SINGLE, Search, Spaces, Target
+from psdmc.lower.search import Scoring, Search, Spaces, for_lanes, for_one_state
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.derivable import require_derivable
+from psdmc.target.costs import Costs
+from psdmc.target.native import COSTS
 
 Lowering = Literal["auto", "expanded", "factored"]
 
 EXPANDED_LIMIT = 600
 """`auto` tries the expanded lowering up to this many functions p; beyond, it has never been the cheaper."""
-
-WORTH_TWO_BODIES = 1.03
-"""Lanes get a body of their own only where it saves them this much: the C of both is long."""
 
 
 def lower(
@@ -33,14 +32,16 @@ def lower(
     functions: Sequence[str] | None = None,
     progress: Callable[[str], None] = lambda message: None,
     theta_variants: bool = True,
+    costs: Costs = COSTS,
 ) -> dict[str, Kernel]:
     """Kernels by name, `_theta` variants included where wanted, in the order of psdmc.functions.
 
     functions  names; None takes the default ones; without theta_b only those variants that need none are made
+    costs      of the target
     Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
     require_derivable(model.mechanism)
-    lowered = _Lowered(model, lowering)
+    lowered = _Lowered(model, lowering, costs)
     kernels: dict[str, Kernel] = {}
     for recipe in map(RECIPES.__getitem__, wanted(functions)):
         takes_theta = recipe.signature.theta
@@ -79,22 +80,25 @@ def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> I
     )
 
 
-def _kernel(recipe: Recipe, theta: bool, single: Program, batch: Program, lowering: str) -> Kernel:
-    function = recipe.signature
-    for_one, shared = ordered(shortened(single))
+def _kernel(
+    recipe: Recipe, theta: bool, single: Program, batch: Program, lowering: str, costs: Costs
+) -> Kernel:
+    function, score = recipe.signature, for_lanes(costs).score
+    one, shared = ordered(shortened(single), costs)
     if batch == single:
-        return Kernel(function, theta, for_one, shared, lowering)
-    for_lanes = ordered(shortened(batch))[1]
-    if shared == for_one and BATCH.score(for_one) <= WORTH_TWO_BODIES * BATCH.score(for_lanes):
-        for_lanes = shared
-    return Kernel(function, theta, for_one, for_lanes, lowering)
+        return Kernel(function, theta, one, shared, lowering)
+    lanes = ordered(shortened(batch), costs)[1]
+    if shared == one and score(one) <= costs.worth_two_bodies * score(lanes):
+        lanes = shared
+    return Kernel(function, theta, one, lanes, lowering)
 
 
 class _Lowered:
     """One model's programs; searches are shared between the functions that run the same recursion."""
 
-    def __init__(self, model: DynamicsModel, lowering: Lowering) -> None:
-        self.model, self.lowering = model, lowering
+    def __init__(self, model: DynamicsModel, lowering: Lowering, costs: Costs) -> None:
+        self.model, self.lowering, self.costs = model, lowering, costs
+        self.single, self.batch = for_one_state(costs), for_lanes(costs)
         self._spaces: Spaces = {}
         self._searches: dict[bool, Search] = {}
         self._arrangements: dict[tuple[str, bool], Arrangement] = {}
@@ -103,24 +107,24 @@ class _Lowered:
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
         candidates: list[Kernel] = []
         if self._may_expand(recipe):
-            program = lower_expanded(self.model, recipe, theta)
-            candidates.append(_kernel(recipe, theta, program, program, "expanded"))
+            program = lower_expanded(self.model, recipe, theta, self.costs)
+            candidates.append(_kernel(recipe, theta, program, program, "expanded", self.costs))
         if self.lowering != "expanded" or not candidates:
-            single = self._factored(recipe, theta, SINGLE)
-            batch = self._factored(recipe, theta, BATCH)
-            candidates.append(_kernel(recipe, theta, single, batch, "factored"))
-        return min(candidates, key=lambda kernel: SINGLE.score(kernel.single))
+            single = self._factored(recipe, theta, self.single)
+            batch = self._factored(recipe, theta, self.batch)
+            candidates.append(_kernel(recipe, theta, single, batch, "factored", self.costs))
+        return min(candidates, key=lambda kernel: self.single.score(kernel.single))
 
     def _may_expand(self, recipe: Recipe) -> bool:
         if self.lowering == "factored" or recipe.polynomials is None or self.model.p is None:
             return False
         return self.lowering == "expanded" or self.model.p <= EXPANDED_LIMIT
 
-    def _factored(self, recipe: Recipe, theta: bool, target: Target) -> Program:
-        return min(self._candidates(recipe, theta), key=target.score)
+    def _factored(self, recipe: Recipe, theta: bool, scoring: Scoring) -> Program:
+        return min(self._candidates(recipe, theta), key=scoring.score)
 
     def _candidates(self, recipe: Recipe, theta: bool) -> tuple[Program, ...]:
-        """What the targets choose from; traced once for all of them."""
+        """What code for one state and code for lanes choose from; traced once for both."""
         if (recipe.name, theta) not in self._traced:
             self._traced[recipe.name, theta] = tuple(self._traces(recipe, theta))
         return self._traced[recipe.name, theta]
@@ -138,13 +142,17 @@ class _Lowered:
         key = recipe.name, theta
         if key not in self._arrangements:
             start = self._arrangement(RECIPES[recipe.starts], theta) if recipe.starts else None
-            self._arrangements[key] = self._search(theta).best(recipe, SINGLE, start)
+            self._arrangements[key] = self._search(theta).best(recipe, self.single, start)
         return self._arrangements[key]
 
     def _search(self, theta: bool) -> Search:
         if theta not in self._searches:
             baked = None if theta else self.model.theta_b
             self._searches[theta] = Search(
-                self.model.mechanism, self.model.representative, baked, spaces=self._spaces
+                self.model.mechanism,
+                self.model.representative,
+                baked,
+                spaces=self._spaces,
+                costs=self.costs,
             )
         return self._searches[theta]

@@ -23,6 +23,8 @@ from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism
+from psdmc.target.costs import Costs
+from psdmc.target.native import COSTS
 
 BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
@@ -31,22 +33,13 @@ LARGEST_TRANSFER = 1e4
 """Carriers whose values would be larger multiples of theta_b (in units of the chain) are not considered: torques would
 be small differences of large numbers."""
 
-SINCOS_LANES = 8
-"""Angles that one vector sincos takes at once in code for one state."""
-
-SINCOS_COST = 30.0
-"""Instructions of one vector sincos."""
-
-ANGLE_COST = 1.0
-"""What one angle more costs where a vector has room for it: to put it in and to take sine and cosine out."""
-
 
 @dataclass(frozen=True, slots=True)
-class Target:
-    """What a lowering is for. In code for one state, angles share a vector sincos; with one state per lane each angle
-    has its own."""
+class Scoring:
+    """What PROGRAMs cost on a target. In code for one state, angles share a vector sincos; with one state per lane each
+    angle has its own."""
 
-    name: str
+    costs: Costs
     angles_per_sincos: int
 
     def score(self, program: Program) -> float:
@@ -54,14 +47,24 @@ class Target:
         return self.weight(cost(program))
 
     def weight(self, c: Cost) -> float:
-        """Operations, with half the weight off those that fuse, and trigonometry."""
-        calls = math.ceil(c.sincos / self.angles_per_sincos)
-        operations = c.total - 0.5 * c.fused + 0.1 * c.neg + 8.0 * c.div
-        return operations + SINCOS_COST * calls + ANGLE_COST * c.sincos
+        """Operations, with the target's weights, and trigonometry."""
+        calls, costs = math.ceil(c.sincos / self.angles_per_sincos), self.costs
+        operations = c.total - costs.fused * c.fused + costs.neg * c.neg + costs.div * c.div
+        return operations + costs.sincos * calls + costs.angle * c.sincos
 
 
-SINGLE = Target("single", SINCOS_LANES)
-BATCH = Target("batch", 1)
+def for_one_state(costs: Costs) -> Scoring:
+    """Of code for one state a call."""
+    return Scoring(costs, costs.angles_per_sincos)
+
+
+def for_lanes(costs: Costs) -> Scoring:
+    """Of code for one state per lane."""
+    return Scoring(costs, 1)
+
+
+SINGLE, BATCH = for_one_state(COSTS), for_lanes(COSTS)
+"""For the default target."""
 
 CHOICES = tuple(
     Choices(compound, fold, double) for compound, fold, double in product((False, True), repeat=3)
@@ -90,16 +93,18 @@ class Search:
         theta_b: Array | None,
         budget: int = BUDGET,
         spaces: Spaces | None = None,
+        costs: Costs = COSTS,
     ) -> None:
         sizes = Sizes.of_chain(len(chain), representative.shape[1], len(chain.frames))
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.chain, self.representative, self.budget = chain, representative, budget
+        self.single, self.batch = for_one_state(costs), for_lanes(costs)
         self._spaces: Spaces = {} if spaces is None else spaces
         self._frames: dict[tuple[Foot, ...], Reframed] = {}
 
-    def best(self, recipe: Recipe, target: Target, start: Arrangement | None = None) -> Arrangement:
+    def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function; `start` is one found for another, whose geometry stays."""
-        descent = _Descent(lambda a: target.weight(cost_of_dynamics(recipe, a, self.robot)), self.budget)
+        descent = _Descent(lambda a: scoring.weight(cost_of_dynamics(recipe, a, self.robot)), self.budget)
         if start is not None:
             descent.consider(replace(start, choices=choices) for choices in distinct(recipe, CHOICES))
         else:
@@ -110,16 +115,17 @@ class Search:
             pass
         return descent.arrangement
 
-    def rearranged(self, recipe: Recipe, found: Arrangement, target: Target) -> Program:
+    def rearranged(self, recipe: Recipe, found: Arrangement, scoring: Scoring) -> Program:
         """The PROGRAM of a function in an arrangement found for another function or target: only the choices within
         the recursion are made anew."""
-        return min(self.rearrangements(recipe, found), key=target.score)
+        return min(self.rearrangements(recipe, found), key=scoring.score)
 
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
-        """The PROGRAMs that `rearranged` chooses from: the cheapest for each target, the others are only counted."""
+        """The PROGRAMs that `rearranged` chooses from: the cheapest for one state and for lanes, the others are only
+        counted."""
         tried = [replace(found, choices=choices) for choices in _felt(found, distinct(recipe, ALL_CHOICES))]
         costs = [cost_of_dynamics(recipe, arrangement, self.robot) for arrangement in tried]
-        weights = [[target.weight(each) for each in costs] for target in (SINGLE, BATCH)]
+        weights = [[scoring.weight(each) for each in costs] for scoring in (self.single, self.batch)]
         for best in sorted({each.index(min(each)) for each in weights}):
             yield trace_dynamics(recipe, tried[best], self.robot)
 

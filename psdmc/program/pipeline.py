@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 
 from psdmc.program.check import check
 from psdmc.program.cost import cost
@@ -14,6 +15,8 @@ from psdmc.program.passes.fuse_sums import fuse_sums
 from psdmc.program.passes.merge_duplicates import merge_duplicates
 from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.program import Program
+from psdmc.target.costs import Costs
+from psdmc.target.native import COSTS
 
 Pass = Callable[[Program], Program]
 
@@ -30,26 +33,32 @@ ROUND: tuple[Pass, ...] = (
 LAST: tuple[Pass, ...] = (merge_duplicates, drop_unused)
 """Before instructions are put in order, for both."""
 
-LAST_FOR_ONE_STATE: tuple[Pass, ...] = (fuse_sums, schedule)
-"""One state waits for its chain of dependent operations: make it short."""
 
 LAST_FOR_LANES: tuple[Pass, ...] = (schedule,)
 """Many states hide each other's waiting; what costs them is values that do not fit the registers."""
 
-CROWDED = 1.08
-"""Lanes take the order for one state, so that one body serves both, unless it keeps this much more alive. It does for
-forward dynamics (by 21 % in KR6: 8 lanes take 13.7 ns a state so, 12.8 ns in their own order) and for little else."""
+
+def last_for_one_state(costs: Costs) -> tuple[Pass, ...]:
+    """One state waits for its chain of dependent operations: make it short, with the target's latencies."""
+
+    @wraps(fuse_sums)
+    def fuse(program: Program) -> Program:
+        return fuse_sums(program, costs.latency)
+
+    return fuse, schedule
+
 
 LONGEST = 10
 """Rounds at most; two or three are usual."""
 
 
-def optimize(program: Program, *, lanes: bool = False) -> Program:
-    """The same function of its inputs in fewer operations, up to rounding; `lanes` for one state per SIMD lane.
+def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> Program:
+    """The same function of its inputs in fewer operations, up to rounding, in the order that suits the target; `lanes`
+    for one state per SIMD lane.
 
     InternalError, naming the pass, where one breaks a PROGRAM's rules.
     """
-    return ordered(shortened(program))[1 if lanes else 0]
+    return ordered(shortened(program), costs)[1 if lanes else 0]
 
 
 def shortened(program: Program) -> Program:
@@ -62,12 +71,15 @@ def shortened(program: Program) -> Program:
     return program
 
 
-def ordered(short: Program) -> tuple[Program, Program]:
+def ordered(short: Program, costs: Costs = COSTS) -> tuple[Program, Program]:
     """A shortened PROGRAM in the order for one state a call, and in that for one state per SIMD lane: the first again
-    where it serves both."""
+    where it serves both, or where the target has no lanes."""
     last = _applied(LAST, short)
-    for_one, for_lanes = _applied(LAST_FOR_ONE_STATE, last), _applied(LAST_FOR_LANES, last)
-    return for_one, for_lanes if live_values(for_one) > CROWDED * live_values(for_lanes) else for_one
+    for_lanes = _applied(LAST_FOR_LANES, last)
+    for_one = _applied(last_for_one_state(costs), last)
+    if not costs.has_vectors or live_values(for_one) <= costs.crowded * live_values(for_lanes):
+        return for_one, for_one
+    return for_one, for_lanes
 
 
 def _applied(passes: tuple[Pass, ...], program: Program) -> Program:

@@ -17,7 +17,7 @@ from psdmc.toolchain.cache import cache_key, cached
 
 KERNELS = "kernels.json"
 
-DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "robot")
+DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "robot", "target")
 """Folders of psdmc whose sources decide what a lowering gives."""
 
 

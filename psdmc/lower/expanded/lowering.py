@@ -30,6 +30,8 @@ from psdmc.program.program import Program, Slot
 from psdmc.program.signature import Sizes
 from psdmc.program.trace import Number, Symbol, Tracer
 from psdmc.recipes.recipe import Polynomials, Recipe
+from psdmc.target.costs import Costs
+from psdmc.target.native import COSTS
 
 Outputs = list[tuple[Slot, Symbol | Number]]
 
@@ -38,7 +40,7 @@ TRACED = 3
 """Diagrams, of those that should be cheapest, that are traced and optimized to find the one that is."""
 
 
-def lower_expanded(model: DynamicsModel, recipe: Recipe, theta: bool) -> Program:
+def lower_expanded(model: DynamicsModel, recipe: Recipe, theta: bool, costs: Costs = COSTS) -> Program:
     """The PROGRAM of one function that is a part of the torques' polynomials; with `theta`, theta_b is an input instead
     of constants.
 
@@ -49,7 +51,7 @@ def lower_expanded(model: DynamicsModel, recipe: Recipe, theta: bool) -> Program
     if recipe.polynomials is None or (theta and not recipe.signature.theta):
         raise ValueError(f"the expanded lowering does not make {recipe.name}{'_theta' * theta}")
     diagrams = sorted(_diagrams(model, recipe.polynomials, theta), key=lambda d: sum(operations(d)))
-    programs = (_traced(model, recipe, theta, diagram) for diagram in diagrams[:TRACED])
+    programs = (_traced(model, recipe, theta, diagram, costs) for diagram in diagrams[:TRACED])
     return min(programs, key=lambda program: cost(program).total)
 
 
@@ -95,10 +97,10 @@ def _part(part: Polynomials, torque: Terms, n: int) -> Terms:
     return torque
 
 
-def _traced(model: DynamicsModel, recipe: Recipe, theta: bool, diagram: Diagram) -> Program:
+def _traced(model: DynamicsModel, recipe: Recipe, theta: bool, diagram: Diagram, costs: Costs) -> Program:
     tracer = Tracer()
     values = polynomial_values(diagram, row_symbols(tracer, model, theta))
-    return optimize(tracer.finish(_outputs(tracer, model, recipe, values)))
+    return optimize(tracer.finish(_outputs(tracer, model, recipe, values)), costs)
 
 
 def _outputs(tracer: Tracer, model: DynamicsModel, recipe: Recipe, values: dict[int, Scalar]) -> Outputs:

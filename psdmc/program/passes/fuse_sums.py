@@ -5,34 +5,36 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from psdmc.program.program import Instr, Op, Program
+from psdmc.target.costs import Latency
+from psdmc.target.native import COSTS
 
 Term = tuple[bool, int]
 """A term of a sum: whether it is subtracted, and the value."""
 
-LATENCY = {
-    Op.LOAD: 5,
-    Op.CONST: 0,
-    Op.ADD: 3,
-    Op.SUB: 3,
-    Op.MUL: 3,
-    Op.DIV: 13,
-    Op.NEG: 1,
-    Op.SIN: 60,
-    Op.COS: 60,
-}
-"""Cycles until a result is ready, about as on current x86 and Arm cores; only their order of size matters."""
 
-FUSED_LATENCY = 4
+def cycles(latency: Latency) -> dict[Op, int]:
+    """Cycles until the result of each operation is ready."""
+    return {
+        Op.LOAD: latency.load,
+        Op.CONST: 0,
+        Op.ADD: latency.add,
+        Op.SUB: latency.add,
+        Op.MUL: latency.mul,
+        Op.DIV: latency.div,
+        Op.NEG: latency.neg,
+        Op.SIN: latency.sincos,
+        Op.COS: latency.sincos,
+    }
 
 
-def fuse_sums(program: Program) -> Program:
-    """Re-nest every sum, always adding the two parts that are ready soonest.
+def fuse_sums(program: Program, latency: Latency = COSTS.latency) -> Program:
+    """Re-nest every sum, always adding the two parts that are ready soonest on the target.
 
     Needs:  every argument precedes its use.
     Keeps:  operation counts; output values up to rounding (sums are reordered).
     Gives:  short dependency chains, counted with fused multiply-adds.
     """
-    return _Fusion(program).run()
+    return _Fusion(program, latency).run()
 
 
 class _Part(NamedTuple):
@@ -46,8 +48,9 @@ class _Part(NamedTuple):
 class _Fusion:
     """Rebuilds the program; sums whose value is used once inside another sum are taken apart first."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, latency: Latency) -> None:
         self.program, self.uses = program, program.uses()
+        self.cycles, self.fused = cycles(latency), latency.fused
         self.inner = self._inner_sums()
         self.body: list[Instr] = []
         self.ready: list[int] = []
@@ -118,10 +121,10 @@ class _Fusion:
 
     def _sum_done(self, a: _Part, b: _Part) -> int:
         if not a.factors and not b.factors:
-            return max(self.ready[a.value], self.ready[b.value]) + LATENCY[Op.ADD]
+            return max(self.ready[a.value], self.ready[b.value]) + self.cycles[Op.ADD]
         if a.factors and b.factors:
-            return min(max(self.ready[x.value], self._done(y)) + FUSED_LATENCY for x, y in ((a, b), (b, a)))
-        return max(self._done(a), self._done(b)) + FUSED_LATENCY
+            return min(max(self.ready[x.value], self._done(y)) + self.fused for x, y in ((a, b), (b, a)))
+        return max(self._done(a), self._done(b)) + self.fused
 
     def _add(self, a: _Part, b: _Part) -> _Part:
         """The sum of two parts, negated where both or the one that is left negative are."""
@@ -138,5 +141,5 @@ class _Fusion:
     def _append(self, instr: Instr) -> int:
         start = max((self.ready[a] for a in instr.args), default=0)
         self.body.append(instr)
-        self.ready.append(start + LATENCY[instr.op])
+        self.ready.append(start + self.cycles[instr.op])
         return len(self.body) - 1

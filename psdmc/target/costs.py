@@ -1,0 +1,56 @@
+"""What arithmetic costs on a machine, as lowering's search and the passes count it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Latency:
+    """Cycles until a result can be used; only their order of size matters.
+
+    fused   of a multiply-add; where there is none, of a product and a sum
+    sincos  of the inline sine and cosine
+    """
+
+    load: int
+    add: int
+    mul: int
+    fused: int
+    div: int
+    neg: int
+    sincos: int
+
+
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """Figures that choose among equal programs. Weights are in additions.
+
+    latency             what orders sums (fuse_sums)
+    div, neg            weight of a division, of a change of sign
+    fused               weight that a multiply-add takes off its product and its sum
+    sincos              weight of one inline sincos, which serves `angles_per_sincos` angles
+    angle               weight of each further angle: to put it in and to take sine and cosine out
+    angles_per_sincos   in code for one state; 1 where the target has no vectors
+    registers           for reals; read where `spills_wait`
+    spills_wait         whether a spilled value delays the code (one instruction after the other); other machines hide it
+    crowded             lanes take the order for one state unless it keeps this much more alive
+    worth_two_bodies    lanes get a body of their own where it saves them this much
+    """
+
+    latency: Latency
+    div: float
+    neg: float
+    fused: float
+    sincos: float
+    angle: float
+    angles_per_sincos: int
+    registers: int
+    spills_wait: bool
+    crowded: float
+    worth_two_bodies: float
+
+    @property
+    def has_vectors(self) -> bool:
+        """Whether code with one state per lane differs from code for one state."""
+        return self.angles_per_sincos > 1
