@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from psdmc.emit.adapters import chosen, with_needed
 from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions, Real, Trig
+from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_files, package_view
 from psdmc.emit.reference_states import reference_states
 from psdmc.emit.write import write_package
@@ -18,6 +18,7 @@ from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load_options import DEFAULT_SNAP
+from psdmc.target.target import Real, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.kept_kernels import lowered_once
 from psdmc.toolchain.kept_libraries import compiled_once

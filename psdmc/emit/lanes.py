@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.store_groups import GROUP
+from psdmc.target.vectors import VectorUnit
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +23,10 @@ class TransposeStage:
 
 @dataclass(frozen=True, slots=True)
 class VectorWidth:
-    """One vector size that the target may have: reals per vector, bytes, and the integer as wide as a real."""
+    """One vector size that the target may have: reals per vector, and the integer as wide as a real."""
 
     lanes: int
-    bytes: int
+    unit: VectorUnit
     integer: str
 
     @property
@@ -46,9 +47,11 @@ class VectorWidth:
 
 
 def vector_widths(options: EmitOptions) -> tuple[VectorWidth, ...]:
-    """64, 32 and 16 bytes, widest first."""
-    size, integer = (8, "long long") if options.real == "float64" else (4, "int")
-    return tuple(VectorWidth(width // size, width, integer) for width in (64, 32, 16))
+    """Those of the target, widest first."""
+    integer = "long long" if options.real == "float64" else "int"
+    return tuple(
+        VectorWidth(unit.bytes // options.real_bytes, unit, integer) for unit in options.target.vectors
+    )
 
 
 def _stage(width: int, distance: int) -> TransposeStage:

@@ -23,7 +23,6 @@ from psdmc.emit.render import render
 from psdmc.emit.self_test import GivenVector, SelfCheck, given_vectors, labels, self_checks
 from psdmc.emit.tables import Table, number, tables
 from psdmc.emit.trig import (
-    HAS_VECTORS,
     ScalarTrig,
     TrigPreamble,
     VectorTrig,
@@ -33,6 +32,9 @@ from psdmc.emit.trig import (
 )
 from psdmc.errors import InputError
 from psdmc.program.kernel import Kernel
+from psdmc.target.flags import ARITHMETIC, GCC_ONLY
+from psdmc.target.target import Target
+from psdmc.target.vectors import HAS_VECTORS, LANE_BLOCK_BYTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,25 @@ class PackageView:
         return self.options.lanes
 
     @property
+    def target(self) -> Target:
+        return self.options.target
+
+    @property
+    def block_bytes(self) -> int:
+        """Of one variable in a block of lanes."""
+        return LANE_BLOCK_BYTES
+
+    @property
+    def arithmetic_flags(self) -> str:
+        """Compiler flags that suit the C on every machine."""
+        return " ".join(ARITHMETIC)
+
+    @property
+    def gcc_flags(self) -> str:
+        """Those for GCC alone."""
+        return " ".join(GCC_ONLY)
+
+    @property
     def suffix(self) -> str:
         """Suffix of constants and libm functions."""
         return "" if self.real == "double" else "f"
@@ -79,7 +100,7 @@ class PackageView:
     def trig_vectors(self) -> tuple[VectorTrig, ...]:
         """The inline sincos for each vector width that internal.h may choose."""
         return tuple(
-            vector_trig(self.robot, self.real, width.lanes, self.options.far, vec="lanes", ivec="lane_bits")
+            vector_trig(self.robot, self.real, width.unit, self.options.far, vec="lanes", ivec="lane_bits")
             for width in self.widths
         )
 

@@ -9,8 +9,8 @@ error bounds; tests/trig/minimax.py is where the numbers come from, and a test h
 How a generated C file gets it, `templates/trig/` being rendered with `trig=` one of these views:
 
     preamble.jinja         trig_preamble(prefix, real, far)       once per C file
-    #if HAS_VECTORS
-    types.jinja            vector_trig(prefix, real, lanes, far)  unless the file has such types itself
+    #if HAS_VECTORS                                               (psdmc/target/vectors.py)
+    types.jinja            vector_trig(prefix, real, unit, far)   unless the file has such types itself
     sincos_vector.jinja    the same view                          <symbol>(const vec *x, vec *s, vec *c)
     #else
     sincos_scalar.jinja    scalar_trig(prefix, real, far)         <symbol>(const real *x, real *s, real *c)
@@ -23,33 +23,18 @@ from dataclasses import dataclass
 from typing import Literal
 
 from psdmc.emit.trig_numbers import NUMBERS, Constants, Real, constants, plain_number
-from psdmc.errors import InternalError
+from psdmc.target.vectors import VectorUnit
 
 Far = Literal["libm", "nan"]
 """What an angle beyond the limit gives: libm's sine and cosine on a rare branch, or NaN (freestanding)."""
 
-HAS_VECTORS = "defined(__GNUC__) && (!defined(__i386__) || defined(__SSE2_MATH__))"
-"""Compilers with GCC's vector extension, x87 aside: its excess precision would break the rounding of k."""
-
-VECTOR_BYTES = (16, 32, 64)
-
 SIGNED: dict[Real, str] = {"double": "long long", "float": "int"}
 """Signed integer as wide as a real, as C spells it and as GCC's builtins want it."""
-
-MOVE_MASK: dict[tuple[Real, int], tuple[str, str, str]] = {
-    ("double", 2): ("__SSE2__", "__builtin_ia32_movmskpd", "real"),
-    ("double", 4): ("__AVX__", "__builtin_ia32_movmskpd256", "real"),
-    ("double", 8): ("__AVX512DQ__", "__builtin_ia32_cvtq2mask512", "integer"),
-    ("float", 4): ("__SSE2__", "__builtin_ia32_movmskps", "real"),
-    ("float", 8): ("__AVX__", "__builtin_ia32_movmskps256", "real"),
-    ("float", 16): ("__AVX512DQ__", "__builtin_ia32_cvtd2mask512", "integer"),
-}
-"""Sign bits of all lanes as one integer: macro where it exists, its name in GCC and clang, its operand."""
 
 
 @dataclass(frozen=True, slots=True)
 class AnySign:
-    """C test whether any lane of `*bits` is negative: `c` where `guard` is defined, else `plain` < 0."""
+    """C test whether any lane of `*bits` is negative: `c` where `guard` is defined, else `plain` < 0; no guard: always."""
 
     guard: str
     c: str
@@ -127,18 +112,19 @@ def scalar_trig(prefix: str, real: Real, far: Far = "libm") -> ScalarTrig:
 
 
 def vector_trig(
-    prefix: str, real: Real, lanes: int, far: Far = "libm", vec: str | None = None, ivec: str | None = None
+    prefix: str,
+    real: Real,
+    unit: VectorUnit,
+    far: Far = "libm",
+    vec: str | None = None,
+    ivec: str | None = None,
 ) -> VectorTrig:
-    """View of sincos_vector.jinja: <prefix>_sincos_f64x8 and so on, for vectors of 16, 32 or 64 bytes.
+    """View of sincos_vector.jinja: <prefix>_sincos_f64x8 and so on, for vectors of one of a target's units.
 
     vec and ivec name types that the C file has; by default types.jinja's <prefix>_f64x8, <prefix>_i64x8.
     """
     bits = NUMBERS[real].bits
-    size = lanes * bits // 8
-    if size not in VECTOR_BYTES:
-        raise InternalError(
-            f"no sincos for {lanes} lanes of {real}: {size} bytes, expected one of {VECTOR_BYTES}"
-        )
+    lanes = unit.bytes * 8 // bits
     suffix = f"{_suffix(real)}x{lanes}"
     vec = vec or f"{prefix}_{suffix}"
     ivec = ivec or f"{prefix}_i{bits}x{lanes}"
@@ -156,25 +142,26 @@ def vector_trig(
         ivec=ivec,
         to_bits=f"({ivec})",
         to_real=f"({vec})",
-        keep=f"{_macro(prefix)}_KEEP_{size}",
+        keep=f"{_macro(prefix)}_KEEP_{unit.bytes}",
         sign=f"({ivec})({vec}){_filled(-0.0, real, lanes)}",
         limit=f"({ivec})({vec}){_filled(NUMBERS[real].limit, real, lanes)}",
         odd=f"(index << {bits - 1}) >> {bits - 1}",
         uses_libm=far == "libm",
         constants=constants(real),
         lanes=lanes,
-        bytes=size,
-        any_sign=_any_sign(real, lanes, vec, ivec),
+        bytes=unit.bytes,
+        any_sign=_any_sign(real, unit, lanes, vec, ivec),
     )
 
 
-def _any_sign(real: Real, lanes: int, vec: str, ivec: str) -> AnySign:
-    """x86's move-mask where there is one; else all lanes or-ed together."""
-    guard, builtin, operand = MOVE_MASK[real, lanes]
-    cast = vec if operand == "real" else ivec
-    return AnySign(
-        guard, f"{builtin}(({cast})*bits) != 0", " | ".join(f"(*bits)[{lane}]" for lane in range(lanes))
-    )
+def _any_sign(real: Real, unit: VectorUnit, lanes: int, vec: str, ivec: str) -> AnySign:
+    """The unit's instruction for it where there is one; else all lanes or-ed together."""
+    plain, mask = " | ".join(f"(*bits)[{lane}]" for lane in range(lanes)), unit.sign_mask
+    if mask is None:
+        return AnySign("", "", plain)
+    cast = vec if mask.operand == "real" else ivec
+    builtin = mask.float64 if real == "double" else mask.float32
+    return AnySign(mask.macro, f"{builtin}(({cast})*bits) != 0", plain)
 
 
 def _macro(prefix: str) -> str:

@@ -13,14 +13,11 @@ from dataclasses import dataclass
 from functools import cache
 
 from psdmc.errors import ToolchainError
+from psdmc.target.flags import ARITHMETIC, GCC_ONLY
+from psdmc.target.native import NATIVE
 
 CANDIDATES = ("cc", "gcc", "clang")
-FLAGS = ("-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fPIC")
-GCC_FLAGS = ("-fno-tree-slp-vectorize",)
-"""GCC packs pairs of one state's scalars into vectors and spends more on packing than it saves: mass matrix 7 %,
-regressor up to 6 %. clang's own packing pays in code for lanes."""
-NATIVE_FLAGS = ("-march=native", "-mcpu=native")
-"""How compilers are told to use this CPU's instructions; the first that works is taken."""
+FLAGS = ("-O3", *ARITHMETIC, "-fPIC")
 SECONDS = 600
 """Longest that one run of the compiler may take."""
 
@@ -80,7 +77,7 @@ def _named(wanted: str) -> tuple[str, ...]:
 @cache
 def _described(command: tuple[str, ...]) -> Compiler:
     version = run([*command, "--version"], "C compiler")
-    portable = (*FLAGS, *GCC_FLAGS) if "Free Software Foundation" in version else FLAGS
+    portable = (*FLAGS, *GCC_ONLY) if "Free Software Foundation" in version else FLAGS
     flags, macros = _native(command, portable)
     if "__STDC__" not in macros:
         raise ToolchainError(
@@ -92,7 +89,7 @@ def _described(command: tuple[str, ...]) -> Compiler:
 
 def _native(command: tuple[str, ...], portable: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
     """Flags that the compiler takes, this CPU's if it can, and the macros that it predefines under them."""
-    for native in NATIVE_FLAGS:
+    for native in NATIVE.host_flags:
         with contextlib.suppress(ToolchainError):
             return (*portable, native), _macros(command, (*portable, native))
     return portable, _macros(command, portable)

@@ -14,7 +14,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from psdmc.emit.trig import Far, scalar_trig, trig_preamble, vector_trig
-from psdmc.emit.trig_numbers import NUMBERS, Real
+from psdmc.emit.trig_numbers import Real
+from psdmc.target.vectors import WIDEST_FIRST
 
 TEMPLATES = Path(__file__).parents[2] / "templates"
 STRICT = ("-std=c99", *(f"-W{kind}" for kind in ("all", "extra", "pedantic", "conversion", "shadow")))
@@ -88,13 +89,13 @@ def render_function(build: Build, real: Real) -> Function:
         return environment.get_template(f"trig/{template}.jinja").render(trig=view) + "\n"
 
     preamble = fill("preamble", trig_preamble("arm", real, build.far))
-    lanes = build.vector_bytes * 8 // NUMBERS[real].bits
-    if lanes == 0:
+    if build.vector_bytes == 0:
         scalar = scalar_trig("arm", real, build.far)
         return Function(preamble + fill("sincos_scalar", scalar), scalar.symbol, scalar.vec, 1)
-    vector = vector_trig("arm", real, lanes, build.far)
+    unit = next(unit for unit in WIDEST_FIRST if unit.bytes == build.vector_bytes)
+    vector = vector_trig("arm", real, unit, build.far)
     source = preamble + fill("types", vector) + fill("sincos_vector", vector)
-    return Function(source, vector.symbol, vector.vec, lanes)
+    return Function(source, vector.symbol, vector.vec, vector.lanes)
 
 
 def render(build: Build, real: Real) -> str:

@@ -8,9 +8,8 @@ import minimax
 import mpmath as mp
 import pytest
 
-from psdmc.emit.trig import vector_trig
 from psdmc.emit.trig_numbers import NUMBERS, Real, c_number, polynomial
-from psdmc.errors import InternalError
+from psdmc.target.vectors import VectorUnit
 
 EXACT_PARTS = {"double": 2, "float": 3}
 INDEX_DIGITS = {"double": 16, "float": 10}
@@ -71,5 +70,5 @@ def test_polynomials_are_nested_in_pairs() -> None:
 
 
 def test_a_vector_of_odd_size_is_refused() -> None:
-    with pytest.raises(InternalError, match="3 lanes of double"):
-        vector_trig("arm", "double", 3)
+    with pytest.raises(ValueError, match="vectors of 24 bytes"):
+        VectorUnit(24)

@@ -17,7 +17,8 @@ from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError
 from psdmc.robot.mechanism import Array
-from psdmc.toolchain.compiler_command import GCC_FLAGS
+from psdmc.target.flags import GCC_ONLY
+from psdmc.target.native import NATIVE
 
 Way = Literal["library", "header-only"]
 
@@ -98,8 +99,9 @@ def compiled(way: Way, flags: tuple[str, ...]) -> Path:
     prefix = pinocchio_prefix()
     link = _library_flags(prefix) if way == "library" else ()
     # The shipped library is plain x86-64, and Eigen's alignment follows the instruction set: the two never mix.
-    # What is good for psdmc's scalars (GCC_FLAGS) would take a sixth off Eigen's speed.
-    left_out = GCC_FLAGS if way == "header-only" else (*GCC_FLAGS, "-march", "-mcpu")
+    # What is good for psdmc's scalars (GCC_ONLY) would take a sixth off Eigen's speed.
+    machine = tuple(flag.partition("=")[0] for flag in NATIVE.host_flags)
+    left_out = GCC_ONLY if way == "header-only" else (*GCC_ONLY, *machine)
     used = tuple(flag for flag in flags if not flag.startswith(left_out))
     product = f"pinocchio_{way.replace('-', '_')}.so"
     names = ("pinocchio_cpp.cpp", "pinocchio_model.hpp", "loops.hpp")

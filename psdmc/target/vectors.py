@@ -1,0 +1,60 @@
+"""Vector registers that a target may have, and how C asks compilers for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+HAS_VECTORS = "defined(__GNUC__) && (!defined(__i386__) || defined(__SSE2_MATH__))"
+"""C condition: the compiler has GCC's vector extension, x87 aside: its excess precision would break the rounding of
+the inline sine."""
+
+LANE_BLOCK_BYTES = 64
+"""Of one variable in a block of the lane-by-lane layout. The same for every target: R_LANES is part of the interface."""
+
+
+@dataclass(frozen=True, slots=True)
+class SignMask:
+    """The instruction that gathers the sign bits of all lanes in one integer.
+
+    macro             which compilers predefine where it exists
+    float64, float32  its name in GCC and clang, for vectors of these
+    operand           'real' or 'integer': what it takes
+    """
+
+    macro: str
+    float64: str
+    float32: str
+    operand: str
+
+
+@dataclass(frozen=True, slots=True)
+class VectorUnit:
+    """Registers of `bytes`.
+
+    macro      which compilers predefine where there are such registers; a target's narrowest unit needs none
+    sign_mask  None: signs are gathered lane by lane
+    """
+
+    bytes: int
+    macro: str = ""
+    sign_mask: SignMask | None = None
+
+    def __post_init__(self) -> None:
+        if self.bytes not in (16, 32, 64):
+            raise ValueError(f"no sincos for vectors of {self.bytes} bytes, expected 16, 32 or 64")
+
+
+SSE2 = VectorUnit(
+    16, "__SSE2__", SignMask("__SSE2__", "__builtin_ia32_movmskpd", "__builtin_ia32_movmskps", "real")
+)
+AVX = VectorUnit(
+    32, "__AVX__", SignMask("__AVX__", "__builtin_ia32_movmskpd256", "__builtin_ia32_movmskps256", "real")
+)
+AVX512 = VectorUnit(
+    64,
+    "__AVX512F__",
+    SignMask("__AVX512DQ__", "__builtin_ia32_cvtq2mask512", "__builtin_ia32_cvtd2mask512", "integer"),
+)
+NEON = VectorUnit(16, "__ARM_NEON")
+
+WIDEST_FIRST = (AVX512, AVX, SSE2)
