@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 CHUNK_BYTES = 64 * 2**20
 """Function values held at once."""
+BLOCK_BYTES = 2**18
+"""Function values multiplied at once: a share of a core's own cache."""
 
 
 def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
@@ -40,19 +42,60 @@ def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], lis
     return shape[:-1], [np.broadcast_to(a, shape).reshape(-1, n) for a in arrays.values()]
 
 
-def function_values(expansion: Expansion, chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Array:
-    """(p, states) values of y from (states, n) arrays: products of the rows of E, gravity functions times
-    |g|."""
-    rows = np.concatenate([q.T, np.sin(q).T, np.cos(q).T, qd.T, qdd.T])
-    moving = expansion.E[3 * expansion.n :].any(axis=0)
-    strength = np.where(moving, 1.0, np.linalg.norm(chain.gravity))
-    values: Array = np.repeat(strength[:, None], q.shape[0], axis=1)
-    for powers, row in zip(expansion.E, rows, strict=True):
-        for power in (1, 2):
-            chosen = powers == power
-            if chosen.any():
-                values[chosen] *= row**power
-    return values
+class _Products:
+    """The functions y of an expansion, ready to be valued: products of the rows of E, gravity functions times |g|.
+
+    Functions share the part that the position decides, and few factors come after it: each part is computed once.
+    """
+
+    def __init__(self, expansion: Expansion, chain: Mechanism) -> None:
+        n, exponents = expansion.n, expansion.E
+        moving = exponents[3 * n :].any(axis=0)
+        self.part, first = _alike(np.vstack([exponents[: 3 * n], moving]))
+        self.parts = exponents[: 3 * n, first]
+        self.strength = np.where(moving, 1.0, np.linalg.norm(chain.gravity))[first]
+        self.factors = tuple(_factors(exponents[3 * n :]))
+
+    def values(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """(p, states) from (states, n) arrays; each function's factors in the order of E's rows."""
+        placed = np.repeat(self.strength[:, None], q.shape[0], axis=1)
+        for powers, row in zip(self.parts, np.concatenate([q.T, np.sin(q).T, np.cos(q).T]), strict=True):
+            for power in (1, 2):
+                chosen = powers == power
+                if chosen.any():
+                    placed[chosen] *= row**power
+        rates = np.concatenate([qd.T, qdd.T])
+        table = np.concatenate([np.ones((1, q.shape[0])), rates, rates**2])
+        values: Array = np.empty((len(self.part), q.shape[0]))
+        block = max(1, BLOCK_BYTES // max(1, values.itemsize * q.shape[0]))
+        for start in range(0, len(self.part), block):
+            rows = slice(start, start + block)
+            values[rows] = placed[self.part[rows]]
+            for factor in self.factors:
+                values[rows] *= table[factor[rows]]
+        return values
+
+
+def _alike(columns: NDArray[np.uint8]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Which column's equal each one is, as (p,) numbers, and one column of each number."""
+    number = np.zeros(columns.shape[1], dtype=np.int64)
+    for row in columns:
+        _, first, number = np.unique(number * 3 + row, return_index=True, return_inverse=True)
+    return number, first
+
+
+def _factors(exponents: NDArray[np.uint8]) -> Iterator[NDArray[np.intp]]:
+    """(p,) each: which of 1, the rates, their squares is a function's first factor, its second, and so on.
+
+    exponents  (2n, p) of qd and qdd, at most 2
+    """
+    columns, rows = np.nonzero(exponents.T)
+    place = np.arange(len(columns)) - np.searchsorted(columns, columns)
+    which = 1 + rows + len(exponents) * (exponents[rows, columns].astype(np.intp) - 1)
+    for turn in range(int(place.max(initial=-1)) + 1):
+        factor = np.zeros(exponents.shape[1], dtype=np.intp)
+        factor[columns[place == turn]] = which[place == turn]
+        yield factor
 
 
 def torques(expansion: Expansion, chain: Mechanism, theta: Array, arrays: list[Array]) -> Array:
@@ -98,4 +141,5 @@ def _by_chunks(
     count = len(arrays[0])
     size = max(1, CHUNK_BYTES // (8 * max(1, expansion.p)))
     pieces = ([a[start : start + size] for a in arrays] for start in range(0, max(count, 1), size))
-    return np.concatenate([result(function_values(expansion, chain, *piece)) for piece in pieces])
+    products = _Products(expansion, chain)
+    return np.concatenate([result(products.values(*piece)) for piece in pieces])
