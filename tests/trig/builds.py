@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from psdmc.emit.trig import Far, scalar_trig, trig_preamble, vector_trig
 from psdmc.emit.trig_numbers import Real
 from psdmc.target.vectors import WIDEST_FIRST
+from psdmc.toolchain.cache import cache_key, cached
 
 TEMPLATES = Path(__file__).parents[2] / "templates"
 STRICT = ("-std=c99", *(f"-W{kind}" for kind in ("all", "extra", "pedantic", "conversion", "shadow")))
 STRICT += ("-Wdouble-promotion", "-Werror")
+LIBRARY = "sincos.so"
 FAST_CONTRACT = "-ffp-contract=fast"
 
 
@@ -111,13 +113,20 @@ def render(build: Build, real: Real) -> str:
     )
 
 
-def compile_build(build: Build, real: Real, folder: Path) -> Path:
-    """Object file, position independent, without a warning."""
-    source = folder / f"{build.name}.c"
-    target = source.with_suffix(".o")
-    source.write_text(render(build, real))
-    run(build.compiler, *STRICT, "-fPIC", *build.flags.split(), "-c", str(source), "-o", str(target))
-    return target
+def compile_build(build: Build, real: Real) -> Path:
+    """Object file, position independent, without a warning, and beside it a library of it; made once a test run."""
+    source, made = render(build, real), f"{build.name}.o"
+    words = [build.compiler, *STRICT, "-fPIC", *build.flags.split()]
+
+    def compile_into(folder: Path) -> None:
+        text = folder / f"{build.name}.c"
+        text.write_text(source)
+        run(*words, "-c", str(text), "-o", str(folder / made))
+        run("gcc", "-shared", str(folder / made), "-lm", "-o", str(folder / LIBRARY))
+
+    return (
+        cached(cache_key({f"{build.name}.c": source}, ("trig", *words)), compile_into, [made, LIBRARY]) / made
+    )
 
 
 def run(*command: str) -> str:
@@ -132,9 +141,7 @@ Sincos = Callable[[NDArray[np.floating]], tuple[NDArray[np.floating], NDArray[np
 
 def load(compiled: Path, name: str, real: Real) -> Sincos:
     """The compiled function on NumPy arrays whose length is a multiple of 16."""
-    library = compiled.with_suffix(".so")
-    run("gcc", "-shared", str(compiled), "-lm", "-o", str(library))
-    function = getattr(ctypes.CDLL(str(library)), name)
+    function = getattr(ctypes.CDLL(str(compiled.with_name(LIBRARY))), name)
     dtype = np.float64 if real == "double" else np.float32
 
     def sincos(angles: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,8 +29,8 @@ def among_others(angle: float) -> np.ndarray:
 @each_build
 @each_real
 @pytest.mark.parametrize("angle", [np.nan, np.inf, -np.inf])
-def test_no_angle_gives_no_sine(build: Build, real: Real, angle: float, tmp_path: Path) -> None:
-    sincos = load(compile_build(build, real, tmp_path), build.name, real)
+def test_no_angle_gives_no_sine(build: Build, real: Real, angle: float) -> None:
+    sincos = load(compile_build(build, real), build.name, real)
 
     s, c = sincos(among_others(angle))
 
@@ -41,10 +40,8 @@ def test_no_angle_gives_no_sine(build: Build, real: Real, angle: float, tmp_path
 
 @each_build
 @each_real
-def test_the_limit_still_counts_and_beyond_it_libm_or_nan_takes_over(
-    build: Build, real: Real, tmp_path: Path
-) -> None:
-    sincos = load(compile_build(build, real, tmp_path), build.name, real)
+def test_the_limit_still_counts_and_beyond_it_libm_or_nan_takes_over(build: Build, real: Real) -> None:
+    sincos = load(compile_build(build, real), build.name, real)
     limit = NUMBERS[real].limit
     dtype = np.float64 if real == "double" else np.float32
     inside = np.array([limit, -limit, np.nextafter(dtype(limit), dtype(0))] + [1.0] * 13, dtype=dtype)
@@ -63,8 +60,8 @@ def test_the_limit_still_counts_and_beyond_it_libm_or_nan_takes_over(
 
 @each_build
 @each_real
-def test_small_angles_keep_their_value_and_zero_its_sign(build: Build, real: Real, tmp_path: Path) -> None:
-    sincos = load(compile_build(build, real, tmp_path), build.name, real)
+def test_small_angles_keep_their_value_and_zero_its_sign(build: Build, real: Real) -> None:
+    sincos = load(compile_build(build, real), build.name, real)
     dtype = np.float64 if real == "double" else np.float32
     tiny = np.finfo(dtype).tiny
     denormal = [] if build.fast_math else [tiny / 4, -np.finfo(dtype).smallest_subnormal]
@@ -80,7 +77,7 @@ def test_small_angles_keep_their_value_and_zero_its_sign(build: Build, real: Rea
 
 @pytest.mark.parametrize("build", [b for b in builds() if b.far == "nan"], ids=lambda build: build.name)
 @each_real
-def test_the_freestanding_form_calls_nothing(build: Build, real: Real, tmp_path: Path) -> None:
-    undefined = run("nm", "-u", str(compile_build(build, real, tmp_path))).split()
+def test_the_freestanding_form_calls_nothing(build: Build, real: Real) -> None:
+    undefined = run("nm", "-u", str(compile_build(build, real))).split()
 
     assert [name for name in undefined if name not in ("U", "memcpy", "_GLOBAL_OFFSET_TABLE_")] == []
