@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from traced import arm_kernels, arm_package, arm_references
+from unoptimised import wrapper
 
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_files
@@ -39,6 +40,12 @@ def _run(words: list[str], **more: object) -> str:
     done = subprocess.run(words, capture_output=True, text=True, check=False, **more)  # type: ignore[call-overload]
     assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     return str(done.stdout)
+
+
+@pytest.fixture
+def unoptimised(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The package's build files call a compiler that does not optimise: for what they do, not what they make."""
+    monkeypatch.setenv("CC", str(wrapper(tmp_path_factory.mktemp("unoptimised"))))
 
 
 @pytest.fixture(scope="module")
@@ -85,6 +92,7 @@ def _spoilt(name: str, value: float) -> ReferenceStates:
     return ReferenceStates(good.given, {**good.expected, name: wrong}, good.theta_b)
 
 
+@pytest.mark.usefixtures("unoptimised")
 @pytest.mark.parametrize("tool", ["cmake", "make"])
 def test_a_failed_self_test_says_which_checks_failed_and_by_how_much(
     tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -107,6 +115,7 @@ def test_a_failed_self_test_says_which_checks_failed_and_by_how_much(
     assert "run it to see everything: " in str(caught.value.hint)
 
 
+@pytest.mark.usefixtures("unoptimised")
 def test_more_failures_than_a_line_holds_are_counted(tmp_path: Path) -> None:
     good = arm_references()
     spoilt = {name: 2.0 * values for name, values in good.expected.items()}
@@ -114,6 +123,7 @@ def test_more_failures_than_a_line_holds_are_counted(tmp_path: Path) -> None:
         build_package(_emit(tmp_path / "arm", ReferenceStates(good.given, spoilt, good.theta_b)))
 
 
+@pytest.mark.usefixtures("unoptimised")
 def test_a_self_test_that_dies_is_not_called_failed_checks(tmp_path: Path) -> None:
     folder = _emit(tmp_path / "arm")
     source = folder / "test" / "self_test.c"
@@ -125,6 +135,7 @@ def test_a_self_test_that_dies_is_not_called_failed_checks(tmp_path: Path) -> No
         build_package(folder, edited=True)
 
 
+@pytest.mark.usefixtures("unoptimised")
 @pytest.mark.parametrize("name", ["inverse_dynamics", "forward_dynamics_theta"])
 def test_a_self_test_does_not_let_a_nan_pass(name: str, tmp_path: Path) -> None:
     with pytest.raises(ToolchainError, match=rf"{name}, rows: error nan"):
@@ -152,6 +163,7 @@ def test_a_function_that_gives_no_number_fails_whatever_the_compiler_assumes(
     assert "inverse_dynamics, one state: error nan, tolerance 1e-10: FAILED" in done.stdout
 
 
+@pytest.mark.usefixtures("unoptimised")
 def test_the_self_test_checks_whatever_was_emitted(tmp_path: Path) -> None:
     """The functions of a new user's first try, for which it was an empty main once."""
     package = arm_package(names=["gravity", "jacobian"], references=arm_references())
@@ -188,7 +200,7 @@ def test_a_fault_in_any_function_fails_its_checks_in_every_layout(tmp_path: Path
         if path.endswith(".inc"):
             files[path] = _with_a_fault(files[path])
     write_package(tmp_path, files)
-    words = ["make", "-C", str(tmp_path), "CC=gcc", "CFLAGS=-O1", "check"]
+    words = ["make", "-C", str(tmp_path), "CC=gcc", "CFLAGS=-O0", "check"]
     report = subprocess.run(words, capture_output=True, text=True, check=False).stdout
     for name in arm_kernels():
         for layout in (
@@ -284,6 +296,7 @@ def test_openmp_gives_the_same_results(tmp_path: Path) -> None:
     assert report.count(": ok") == 10
 
 
+@pytest.mark.usefixtures("unoptimised")
 def test_an_edited_package_is_named_and_built_only_on_request(tmp_path: Path) -> None:
     folder = _emit(tmp_path / "arm")
     with open(folder / "src" / "tables.c", "a", encoding="utf-8") as stream:
@@ -308,6 +321,7 @@ def test_a_manifest_that_is_none(text: str, tmp_path: Path) -> None:
         build_package(folder)
 
 
+@pytest.mark.usefixtures("unoptimised")
 @pytest.mark.parametrize("tool", ["cmake", "make"])
 def test_what_a_killed_build_left_is_not_built_on(
     tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -340,7 +354,7 @@ def test_spaces_and_letters_in_paths_and_compilers(
     (own / "gcc").write_text('#!/bin/sh\nexec gcc "$@"\n')
     (own / "gcc").chmod(0o755)
     if tool == "make":  # CMake takes no such path from CC
-        monkeypatch.setenv("CC", f"'{own / 'gcc'}' -O1")
+        monkeypatch.setenv("CC", f"'{own / 'gcc'}' -O0")
     assert ": ok" in build_package(_emit(tmp_path / "mein Röboter 'x'"))
 
 
