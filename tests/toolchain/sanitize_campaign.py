@@ -3,6 +3,8 @@
 Status 0 where nothing was found. Tools that are not installed are listed.
 
 python tests/toolchain/sanitize_campaign.py --jobs 1 scara     one robot, one build at a time
+python tests/toolchain/sanitize_campaign.py --functions gravity,momentum --options 1 two_link
+                                                               these functions, in one precision with one sine
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from sanitizers import DYNAMIC, STATIC, Outcome, Tool, look  # noqa: E402
 from psdmc.emit.info import package_info  # noqa: E402
 from psdmc.emit.options import EmitOptions  # noqa: E402
 from psdmc.emit.package import PackageView, package_view  # noqa: E402
-from psdmc.lower.kernels import lower  # noqa: E402
+from psdmc.lower.kernels import lower, wanted  # noqa: E402
 
 ROBOTS = ("two_link", "scara", "kr6")
 """A small one, one with a sliding joint, six turning joints."""
@@ -34,11 +36,13 @@ LARGE = {"kr6": OPTIONS[::3]}
 """Of a six-joint arm the inline code only, in both precisions: the other sines are the same text in every robot."""
 
 
-def packages(robots: tuple[str, ...]) -> Iterator[tuple[str, PackageView]]:
+def packages(
+    robots: tuple[str, ...], functions: tuple[str, ...], count: int
+) -> Iterator[tuple[str, PackageView]]:
     for robot in robots:
         model = bundled_model(robot)
-        kernels = lower(model)
-        for options in LARGE.get(robot, OPTIONS):
+        kernels = lower(model, functions=functions)
+        for options in LARGE.get(robot, OPTIONS)[:count]:
             package = package_view(package_info(model), kernels, options)
             yield f"{robot} {options.real} {options.trig}", package
 
@@ -49,7 +53,12 @@ def main() -> int:
     )
     parser.add_argument("robots", nargs="*", choices=ROBOTS, help="default: all", default=[*ROBOTS])
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument(
+        "--functions", default="all", help="NAME,... or 'default'; default: all that there are"
+    )
+    parser.add_argument("--options", type=int, default=len(OPTIONS), help="of how many precisions and sines")
     chosen = parser.parse_args()
+    functions = wanted([word.strip() for word in chosen.functions.split(",")])
     found: list[tuple[str, Outcome]] = []
 
     def one(job: tuple[str, PackageView, Tool]) -> None:
@@ -64,7 +73,7 @@ def main() -> int:
 
     jobs = [
         (name, package, tool)
-        for name, package in packages(tuple(chosen.robots))
+        for name, package in packages(tuple(chosen.robots), functions, chosen.options)
         for tool in (*DYNAMIC, *STATIC)
     ]
     with ThreadPoolExecutor(chosen.jobs) as pool:

@@ -129,7 +129,8 @@ def look(tool: Tool, package: PackageView, folder: Path) -> Outcome:
         return Outcome(tool.name, missing=missing)
     write_sources(package, folder)
     (folder / "stress.c").write_text(stress_program(package))
-    (folder / "stress.h").write_text(RUNTIME.read_text())
+    for header in RUNTIME:
+        (folder / header.name).write_text(header.read_text())
     return _read(tool, package, folder) if tool.is_static else _run(tool, package, folder)
 
 

@@ -7,26 +7,23 @@ from pathlib import Path
 from psdmc.emit.kernel_view import KernelView
 from psdmc.emit.package import PackageView
 
-RUNTIME = Path(__file__).with_name("stress.h")
+RUNTIME = tuple(Path(__file__).with_name(name) for name in ("stress.h", "stress_threads.h"))
 
 
 def stress_program(package: PackageView) -> str:
-    """C text of the program that calls all of the package's functions in all layouts.
-
-    stress.h knows functions of one output whose inputs have n entries each; ValueError where the package has others.
-    """
-    others = [kernel.name for kernel in package.kernels if not _is_plain(kernel, package.n)]
-    if others:
-        raise ValueError(f"stress.h does not know how to call {', '.join(others)}")
+    """C text of the program that calls all of the package's functions in all layouts, whatever their signatures."""
     own = f"{package.robot}_theta_b"
     known = all(parameter.value is not None for parameter in package.info.parameters)
+    widest = max(vector.size for kernel in package.kernels for vector in kernel.inputs)
     lines = [
         f'#include "{package.robot}/{package.robot}.h"',
         f"typedef {package.real} real;",
-        f"#define N {package.n}",
         f"#define L {package.l}",
         f"#define LANES {package.lanes}",
-        f"#define MOST {package.largest_output}",
+        f"#define VECTORS {max(len(kernel.inputs) for kernel in package.kernels)}",
+        f"#define OUTPUTS {package.most_outputs}",
+        f"#define WIDEST {widest}",
+        f"#define MOST {max(package.largest_output, widest, package.l)}",
     ]
     for kernel in package.kernels:
         lines += _wrappers(kernel)
@@ -38,23 +35,20 @@ def stress_program(package: PackageView) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _is_plain(kernel: KernelView, n: int) -> bool:
-    return len(kernel.outputs) == 1 and all(vector.size == n for vector in kernel.inputs)
-
-
 def _wrappers(kernel: KernelView) -> list[str]:
     """Each form with the signature that stress.h's table has."""
     inputs = [f"in[{k}]" for k in range(len(kernel.inputs))] + (["theta"] if kernel.theta else [])
+    outputs = [f"out[{k}]" for k in range(len(kernel.outputs))]
     ignored = "" if kernel.theta else "(void)theta; "
     made = []
     for form, prototype in kernel.prototypes.items():
         many = form != "single"
-        arguments = ", ".join([*(["count"] if many else []), *inputs, "out"])
+        arguments = ", ".join([*(["count"] if many else []), *inputs, *outputs])
         call = f"{prototype.symbol}({arguments})"
         body = f"{call}; return 0;" if prototype.returns == "void" else f"return (size_t){call};"
         count = "size_t count, " if many else ""
         made.append(
-            f"static size_t call_{kernel.name}_{form}({count}const real *const *in, const real *theta, real *out)"
+            f"static size_t call_{kernel.name}_{form}({count}const real *const *in, const real *theta, real *const *out)"
             f" {{ {ignored}{body} }}"
         )
     return made
@@ -62,10 +56,12 @@ def _wrappers(kernel: KernelView) -> list[str]:
 
 def _entry(kernel: KernelView) -> str:
     lanes = f"call_{kernel.name}_batch_soa" if "batch_soa" in kernel.prototypes else "0"
+    inputs, outputs = ([str(vector.size) for vector in side] for side in (kernel.inputs, kernel.outputs))
     fields = [
         f'"{kernel.name}"',
-        str(len(kernel.inputs)),
-        str(kernel.outputs[0].size),
+        *(str(len(inputs)), "{" + ", ".join(inputs) + "}"),
+        *(str(len(outputs)), "{" + ", ".join(outputs) + "}"),
+        str(sum(map(int, outputs))),
         str(int(kernel.theta)),
     ]
     return "{" + ", ".join([*fields, f"call_{kernel.name}_single", f"call_{kernel.name}_batch", lanes]) + "}"

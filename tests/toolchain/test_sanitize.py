@@ -6,30 +6,42 @@ from pathlib import Path
 
 import pytest
 import sanitizers
+from odd_package import odd_package
 from sanitizers import DYNAMIC, STATIC, Outcome, Tool, look
 from traced import arm_package
 
 from psdmc.emit.options import EmitOptions
+from psdmc.emit.package import PackageView
 
 NAMES = ["inverse_dynamics", "forward_dynamics", "jacobian"]
 """Torques with parameters, pivots, a matrix written straight into rows."""
+
+
+def arm(options: EmitOptions) -> PackageView:
+    return arm_package(options=options, names=NAMES)
+
+
+def odd(options: EmitOptions) -> PackageView:
+    """Several outputs, some written straight into rows, an input longer than q, and pivots."""
+    return odd_package(options.real, trig=options.trig)
+
+
 SHORT = {
-    "ASan and UBSan, gcc -O0, widest vectors": ("float64", "inline"),
-    "ASan and UBSan, gcc -O0, no vectors": ("float32", "freestanding"),
-    "TSan, gcc -O1, widest vectors": ("float64", "libm"),
-    "memcheck, gcc -O2, AVX2": ("float32", "inline"),
-    "guard pages, gcc -O3, SSE2": ("float64", "inline"),
-    "guard pages, clang -O3, widest vectors": ("float32", "libm"),
-    "gcc -fanalyzer": ("float64", "inline"),
-    "gcc, all warnings": ("float64", "freestanding"),
-    "clang, all warnings": ("float32", "inline"),
-    "clang-tidy": ("float64", "inline"),
+    "ASan and UBSan, gcc -O0, widest vectors": ("float64", "inline", odd),
+    "ASan and UBSan, gcc -O0, no vectors": ("float32", "freestanding", arm),
+    "TSan, gcc -O1, widest vectors": ("float64", "libm", arm),
+    "memcheck, gcc -O2, AVX2": ("float32", "inline", odd),
+    "guard pages, gcc -O3, SSE2": ("float64", "inline", arm),
+    "guard pages, clang -O3, widest vectors": ("float32", "libm", odd),
+    "gcc -fanalyzer": ("float64", "inline", arm),
+    "gcc, all warnings": ("float64", "freestanding", arm),
+    "clang, all warnings": ("float32", "inline", arm),
+    "clang-tidy": ("float64", "inline", arm),
 }
 TOOLS = {tool.name: tool for tool in (*DYNAMIC, *STATIC)}
 
 
-def _looked(tool: Tool, real: str, trig: str, folder: Path) -> Outcome:
-    package = arm_package(options=EmitOptions(real, trig), names=NAMES)  # type: ignore[arg-type]
+def _looked(tool: Tool, package: PackageView, folder: Path) -> Outcome:
     outcome = look(tool, package, folder)
     if outcome.missing:
         pytest.skip(f"{outcome.missing} is not installed")
@@ -38,7 +50,8 @@ def _looked(tool: Tool, real: str, trig: str, folder: Path) -> Outcome:
 
 @pytest.mark.parametrize("name", SHORT)
 def test_nothing_is_found(name: str, tmp_path: Path) -> None:
-    outcome = _looked(TOOLS[name], *SHORT[name], tmp_path)
+    real, trig, package = SHORT[name]
+    outcome = _looked(TOOLS[name], package(EmitOptions(real, trig)), tmp_path)
     assert outcome.findings == ""
     assert outcome.calls > 500 or TOOLS[name].is_static
 
@@ -48,26 +61,36 @@ FAULTS = {
         "src/rows.h",
         "(lane < count ? lane : count - 1) * n",
         "(lane < count ? lane : count) * n",
+        arm,
         ("guard pages, gcc -O3, SSE2", "ASan and UBSan, gcc -O0, widest vectors"),
     ),
     "writes beyond the last row": (
         "src/rows.h",
         "for (size_t lane = 0; lane < count; lane++)",
         "for (size_t lane = 0; lane <= count; lane++)",
+        odd,
         ("guard pages, gcc -O3, SSE2", "memcheck, gcc -O2, AVX2"),
     ),
     "keeps a state between calls": (
         "src/pivots.h",
         "    int bad = 0;",
         "    static int bad; bad = 0;",
+        arm,
         ("TSan, gcc -O1, widest vectors",),
+    ),
+    "spoils the row behind one that fails": (
+        "src/spoil.h",
+        "spoil(width, rows + lane * width)",
+        "spoil(width, rows + (lane + 1) * width)",
+        odd,
+        ("guard pages, gcc -O3, SSE2",),
     ),
 }
 
 
-@pytest.mark.parametrize(("fault", "tool"), [(f, tool) for f, row in FAULTS.items() for tool in row[3]])
+@pytest.mark.parametrize(("fault", "tool"), [(f, tool) for f, row in FAULTS.items() for tool in row[4]])
 def test_a_fault_is_seen(fault: str, tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, right, wrong, _ = FAULTS[fault]
+    path, right, wrong, package, _ = FAULTS[fault]
     write = sanitizers.write_sources
 
     def spoilt(package: object, folder: Path) -> Path:
@@ -78,4 +101,4 @@ def test_a_fault_is_seen(fault: str, tool: str, tmp_path: Path, monkeypatch: pyt
         return folder
 
     monkeypatch.setattr(sanitizers, "write_sources", spoilt)
-    assert _looked(TOOLS[tool], "float64", "inline", tmp_path).findings != ""
+    assert _looked(TOOLS[tool], package(EmitOptions()), tmp_path).findings != ""
