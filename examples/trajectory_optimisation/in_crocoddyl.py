@@ -20,7 +20,9 @@ class PsdmcStep(crocoddyl.ActionModelAbstract):
 
     def __init__(self, problem: ilqr.Problem, is_last: bool) -> None:
         size = len(problem.start)
-        crocoddyl.ActionModelAbstract.__init__(self, crocoddyl.StateVector(size), problem.actuated.shape[1], size)
+        crocoddyl.ActionModelAbstract.__init__(
+            self, crocoddyl.StateVector(size), problem.actuated.shape[1], size
+        )
         self.problem, self.is_last = problem, is_last
 
     def calc(self, data, x, u=None) -> None:
@@ -62,7 +64,9 @@ def with_pinocchio(problem: ilqr.Problem, robot: pinocchio.Model) -> crocoddyl.S
 
     running = costs(away=(problem.running, away), effort=(problem.effort, effort))
     final = costs(away=(problem.final, away))
-    dynamics = [crocoddyl.DifferentialActionModelFreeFwdDynamics(state, actuation, c) for c in (running, final)]
+    dynamics = [
+        crocoddyl.DifferentialActionModelFreeFwdDynamics(state, actuation, c) for c in (running, final)
+    ]
     for one in dynamics:  # else Crocoddyl 3.2.1 beside Pinocchio 4.1 leaves gravity out of the accelerations
         one.armature = np.zeros(robot.nv)
     step = crocoddyl.IntegratedActionModelEuler(dynamics[0], problem.dt)
@@ -97,7 +101,9 @@ def main() -> None:
         print(f"{name:<50} cost {cost:.9f}, {iterations} iterations, {iterations / seconds:.0f} a second")
     own = ilqr.solve(problem)
     rate = (len(own.costs) - 1) / own.seconds
-    print(f"{'iLQR in NumPy, psdmc':<50} cost {own.costs[-1]:.9f}, {len(own.costs) - 1} iterations, {rate:.0f} a second")
+    print(
+        f"{'iLQR in NumPy, psdmc':<50} cost {own.costs[-1]:.9f}, {len(own.costs) - 1} iterations, {rate:.0f} a second"
+    )
 
 
 if __name__ == "__main__":

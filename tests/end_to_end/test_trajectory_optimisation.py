@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from bundled import ROBOTS, bundled_robot
+from bundled import ROBOTS, bundled_model, bundled_robot
 
+from psdmc.compiler import emit_c
 from psdmc.robot.reference import reference
 
 EXAMPLES = ROBOTS.parent / "trajectory_optimisation"
@@ -63,3 +67,19 @@ def test_crocoddyl_finds_the_same_motion(kr6: ilqr.Problem) -> None:
     theirs, *_ = in_crocoddyl.solved(in_crocoddyl.with_pinocchio(kr6, in_crocoddyl.kr6_of_pinocchio()), kr6)
     assert cost == pytest.approx(own, rel=1e-7)
     assert theirs == pytest.approx(own, rel=1e-7)
+
+
+def test_the_step_of_a_1_khz_controller_compiles_and_arrives(tmp_path: Path) -> None:
+    if shutil.which("g++") is None or shutil.which("make") is None:
+        pytest.skip("g++ or make is not installed")
+    functions = ["gravity", "forward_dynamics", "forward_dynamics_derivatives"]
+    emit_c(bundled_model("kr6"), tmp_path / "package", functions=functions, name="robot")
+    flags = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
+    source, library = str(EXAMPLES / "mpc_step.cpp"), "package/build/librobot.a"
+    for words in (
+        ["make", "-s", "-C", "package", "CFLAGS=-O1", "build/librobot.a"],
+        ["g++", "-std=c++17", "-O1", *flags, "-Ipackage/include", source, library, "-lm", "-o", "mpc"],
+    ):
+        subprocess.run(words, cwd=tmp_path, check=True)
+    done = subprocess.run([str(tmp_path / "mpc")], capture_output=True, text=True, check=True)
+    assert "largest error after 1.5 s" in done.stdout
