@@ -18,7 +18,9 @@ from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load_options import DEFAULT_SNAP
-from psdmc.target.target import Real, Trig
+from psdmc.target.native import NATIVE
+from psdmc.target.presets import preset
+from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.kept_kernels import lowered_once
 from psdmc.toolchain.kept_libraries import compiled_once
@@ -99,29 +101,37 @@ def emit_c(
     directory: str | Path,
     lowering: Lowering = "auto",
     functions: Sequence[str] | None = None,
-    real: Real = "float64",
-    trig: Trig = "inline",
+    real: Real | None = None,
+    trig: Trig | None = None,
     name: str | None = None,
     force: bool = False,
     progress: Progress = silent,
     payload: bool = False,
     adapters: Sequence[str] = (),
+    target: str | Target = NATIVE,
 ) -> list[str]:
     """Write the model's C package; returns the files that changed.
 
     lowering   which arithmetic: "auto" takes the cheaper per function
     functions  names of functions to generate; None: psdmc.functions.DEFAULT. InputError where theta_b is known and the
                mass matrix is not positive definite within the joint limits, unless forward_dynamics is left out
-    real       precision of the package
-    trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"
+    real       precision of the package, "float64" or "float32"; None: the target's
+    trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"; None: the
+               target's
     name       the robot's name in C; None: the robot's own
     force      whether to overwrite files that psdmc did not write
     payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
                do not admit every load
     adapters   names of psdmc.emit.adapters.ADAPTERS: other programs that the package is for, too; what they need beside
                `functions` is generated, too
+    target     the machine that the package is for, by its name in psdmc.target.presets
     """
-    options = _options(lowering, real, trig)
+    options = _options(lowering, real, trig, target)
+    if adapters and not options.target.hosted:
+        raise InputError(
+            f"target {options.target.name} has no shared libraries, which {adapters[0]} loads",
+            "leave --with out, or emit another package for it",
+        )
     package = _package(model, lowering, functions, options, name, progress, payload, chosen(adapters))
     progress("writing")
     return write_package(directory, package_files(package), force)
@@ -131,20 +141,31 @@ def compile(
     model: DynamicsModel,
     lowering: Lowering = "auto",
     functions: Sequence[str] | None = None,
-    real: Real = "float64",
-    trig: Trig = "inline",
+    real: Real | None = None,
+    trig: Trig | None = None,
     progress: Progress = silent,
+    target: str | Target = NATIVE,
 ) -> CompiledRobot:
-    """The model's functions, compiled for this machine and callable on NumPy arrays; cached by content."""
-    options = _options(lowering, real, trig)
+    """The model's functions, compiled for this machine and callable on NumPy arrays; cached by content.
+
+    Options as those of `emit_c`. InputError for a target that has no functions for many states, which Python calls;
+    ToolchainError for one that the compiler or this machine's CPU is not.
+    """
+    options = _options(lowering, real, trig, target)
+    machine = options.target
+    if not machine.has_batches:
+        raise InputError(
+            f"target {machine.name} has no functions for many states, which Python calls",
+            "emit a package for it: psdmc emit-c --target",
+        )
 
     def make() -> PackageView:
         package = _package(model, lowering, functions, options, None, progress)
         progress("compiling")
         return package
 
-    parts = (model.content_hash, lowering, real, trig, *wanted(functions))
-    return CompiledRobot(*compiled_once(parts, make))
+    parts = (model.content_hash, lowering, options.real, options.trig, *wanted(functions))
+    return CompiledRobot(*compiled_once(parts, make, machine))
 
 
 def _package(
@@ -159,20 +180,26 @@ def _package(
 ) -> PackageView:
     names = wanted(with_needed(wanted(functions), adapters))
     require(model, names)
+    costs = options.target.costs
     kernels = lowered_once(
-        (model.content_hash, lowering, *names), lambda: lower(model, lowering, names, progress)
+        (model.content_hash, lowering, repr(costs), *names),
+        lambda: lower(model, lowering, names, progress, costs=costs),
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     info = package_info(model, name, shown, payload)
     return package_view(info, kernels, options, reference_states(model, names), adapters)
 
 
-def _options(lowering: str, real: Real, trig: Trig) -> EmitOptions:
-    """InputError where a choice is none."""
+def _options(
+    lowering: str, real: Real | None = None, trig: Trig | None = None, target: str | Target = NATIVE
+) -> EmitOptions:
+    """What is chosen, and the target's own precision and sines where nothing is; InputError where a choice is none."""
+    machine = preset(target) if isinstance(target, str) else target
+    real, trig = real or machine.real, trig or machine.trig
     _choose("lowering", lowering, ("auto", "expanded", "factored"))
     _choose("real", real, ("float64", "float32"))
     _choose("trig", trig, ("inline", "libm", "freestanding"))
-    return EmitOptions(real, trig)
+    return EmitOptions(real, trig, machine)
 
 
 def _choose(option: str, value: str, allowed: Sequence[str]) -> None:

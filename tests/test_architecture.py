@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -221,3 +222,64 @@ def test_no_vague_module_names():
         for _, path in modules()
         if path.parent.name in vague or path.stem in {"utils", "helpers", "common"}
     ]
+
+
+MACHINE = re.compile(
+    r"-m(arch|cpu|fpu|tune|float-abi)\b|__(AVX|SSE|ARM|NEON|aarch64)|__builtin_ia32|cortex|x86[-_]64|\bavx|vector_size\([0-9]",
+    re.IGNORECASE,
+)
+"""What only machines, and compilers that are told of one, are called by."""
+
+MAY_NAME_MACHINES = {
+    "report/bench_method.html.jinja": "how instructions are counted, for readers",
+    "trig/preamble.jinja": "constraints of inline assembly: how GCC is told that a value is in a register",
+}
+
+
+def said(path: Path) -> Iterator[str]:
+    """Strings of a module that are no docstrings; all of a template."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        yield text
+        return
+    tree = ast.parse(text)
+    documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documents:
+            yield node.value
+
+
+def machines(path: Path) -> list[str]:
+    return [found[0] for text in said(path) for found in MACHINE.finditer(text)]
+
+
+def test_no_file_but_the_targets_names_machines():
+    target = PACKAGE / "target"
+    templates = PACKAGE.parent / "templates"
+    files = [path for _, path in modules() if target not in path.parents]
+    files += sorted(templates.rglob("*.jinja"))
+    named = {str(path.relative_to(PACKAGE.parent)): found for path in files if (found := machines(path))}
+
+    assert set(named) == {f"templates/{name}" for name in MAY_NAME_MACHINES}
+    assert any(machines(path) for path in target.glob("*.py")), "the words are not those that targets use"
+
+
+WEIGHING = ("lower", "program", "emit", "toolchain")
+"""Stages that choose by what arithmetic costs, and write or compile C."""
+
+COSTS = re.compile(
+    r"latency|sincos_cost|angle_cost|crowded|worth_two|registers|cache_line|vector_bytes|march|native_flags"
+)
+
+
+def test_what_arithmetic_costs_is_a_constant_of_targets_alone():
+    """By name: a module that chooses by such a figure takes it from its argument."""
+    for stage, path in modules():
+        if stage not in WEIGHING:
+            continue
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            names = [name.id for name in targets if isinstance(name, ast.Name)]
+            assert not any(COSTS.search(name.lower()) for name in names), (
+                f"{path.relative_to(PACKAGE)}: {names}"
+            )

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from psdmc.errors import ToolchainError
+from psdmc.target.presets import X86_64_V3
 from psdmc.toolchain.cache import cache_key, cached
 from psdmc.toolchain.compiler_command import find_compiler, run
 
@@ -21,7 +22,7 @@ def native_flags() -> tuple[str, ...]:
 
 def counted_flags() -> tuple[str, ...]:
     """psdmc's own flags for counting instructions: valgrind knows no AVX-512, and every x86-64 runner counts alike."""
-    return (*find_compiler().portable, "-march=x86-64-v3")
+    return (*find_compiler().portable, *X86_64_V3.flags)
 
 
 def built(

@@ -11,6 +11,8 @@ from psdmc.cli.output import check_output
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 from psdmc.robot.load_options import DEFAULT_SNAP
+from psdmc.target.native import NATIVE
+from psdmc.target.presets import PRESETS
 from psdmc.version import psdmc_version
 
 if TYPE_CHECKING:
@@ -197,16 +199,23 @@ def emit_c(
     functions: Annotated[
         str, typer.Option(metavar="NAME,...", help="generate these functions; 'default', 'all'")
     ] = "",
-    real: Annotated[str, typer.Option(help="float64 or float32")] = "float64",
+    real: Annotated[str | None, typer.Option(help="float64 or float32; default: the target's")] = None,
     trig: Annotated[
-        str, typer.Option(help="inline, freestanding (no libm, NaN beyond 1e5 rad) or libm")
-    ] = "inline",
+        str | None,
+        typer.Option(
+            help="inline, freestanding (no libm, NaN beyond 1e5 rad) or libm; default: the target's"
+        ),
+    ] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
     payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
     adapters: Annotated[
         str, typer.Option("--with", metavar="NAME,...", help="also a library for another program: casadi")
     ] = "",
+    target: Annotated[
+        str,
+        typer.Option(metavar="MACHINE", help=f"{', '.join(PRESETS)}: which machine, see docs/shipping.md"),
+    ] = NATIVE.name,
 ) -> None:
     """Write a model's C package: header, sources, build files, self-test."""
     from psdmc import compiler
@@ -228,6 +237,7 @@ def emit_c(
             progress,
             payload,
             [word.strip() for word in adapters.split(",") if word.strip()],
+            target,
         )
     print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
     for note in run_time_only(found, wanted):

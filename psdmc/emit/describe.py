@@ -9,6 +9,8 @@ from psdmc.emit.info import JointInfo, PackageInfo
 from psdmc.emit.kernel_view import FunctionView
 from psdmc.emit.options import EmitOptions
 from psdmc.program.signature import Signature
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
 
 
 def description(
@@ -21,6 +23,7 @@ def description(
         f"Robot: {info.name}, from {info.base} to {info.tip}",
         f"Model: {info.model_hash or 'not hashed'}",
         f"Options: {', '.join(f'{key}={value}' for key, value in option_items(info, options).items())}",
+        *_target(options.target),
         "Units: SI. Positions rad (m), rates rad/s (m/s), torques N m (N) for revolute (prismatic) joints.",
         f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the base frame",
         "",
@@ -31,24 +34,46 @@ def description(
         *(f"  {i}  {parameter.equation}  [{parameter.unit}]" for i, parameter in enumerate(info.parameters)),
         "",
         "Arrays: n reals per vector; matrices row-major. Inputs may overlap each other. An output may overlap any",
-        "input of a call for one state. In a batch it may be the very array of an input whose rows are equally long,",
-        "and must not overlap an input (theta_b is one) in any other way.",
-        "  _batch      one state per row",
-        "  _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too",
-        "  _theta      with the base parameters theta_b given at run time (_theta_batch: one theta_b for all rows)",
+        *_forms(options.target),
     ]
     if any(len(function.signature.outputs) > 1 for function in functions):
         lines += ["Several outputs of one call must not overlap each other."]
-    lines += [line for function in functions for line in _failure(function.signature)]
+    lines += [line for function in functions for line in _failure(function.signature, options.target)]
     if with_frames:
         lines += ["", "Frames, in the order of every array over them:"]
         lines += [f"  {i}  {name}" for i, name in enumerate(info.frames)]
     return tuple(lines)
 
 
-def _failure(function: Signature) -> tuple[str, ...]:
+def _forms(target: Target) -> tuple[str, ...]:
+    """What a call may overlap, and what the variants' names mean."""
+    if not target.has_batches:
+        return ("input.", "  _theta      with the base parameters theta_b given at run time")
+    return (
+        "input of a call for one state. In a batch it may be the very array of an input whose rows are equally long,",
+        "and must not overlap an input (theta_b is one) in any other way.",
+        "  _batch      one state per row",
+        "  _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too",
+        "  _theta      with the base parameters theta_b given at run time (_theta_batch: one theta_b for all rows)",
+    )
+
+
+def _target(target: Target) -> tuple[str, ...]:
+    """What a target that was chosen is, and how compilers are told of it; nothing for the default."""
+    if target == NATIVE:
+        return ()
+    flags = f"; compile with {' '.join(target.flags)}" if target.flags else ""
+    return (f"Target: {target.name}, {target.about}{flags}",)
+
+
+def _failure(function: Signature, target: Target) -> tuple[str, ...]:
     if function.positive is None:
         return ()
+    if not target.has_batches:
+        return (
+            f"{function.name} returns 0, or 1 + {function.positive.which};",
+            f"the {function.positive.spoilt} of such a state are NaN.",
+        )
     return (
         f"{function.name} returns 0, or 1 + {function.positive.which}, or (batch) 1 + the first",
         f"row that has one; the {function.positive.spoilt} of such a state are NaN.",
@@ -62,7 +87,9 @@ def uses_frames(functions: Iterable[FunctionView]) -> bool:
 
 
 def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
-    return {"real": options.real, "trig": options.trig, **info.options}
+    """What was chosen, by name; the target only where it is not the default."""
+    target = {} if options.target == NATIVE else {"target": options.target.name}
+    return {"real": options.real, "trig": options.trig, **info.options, **target}
 
 
 def joint_line(joint: JointInfo) -> str:

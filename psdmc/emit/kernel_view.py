@@ -188,14 +188,19 @@ def function_views(
 
 def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
     function = _checked(kernel.function)
+    has_batches = options.target.has_batches
     outputs = tuple(
         OutputView(
-            q.name, sizes.size(q), sizes.shape(q.axes), _is_direct(q, sizes), _zero(q, kernel.single, sizes)
+            q.name,
+            sizes.size(q),
+            sizes.shape(q.axes),
+            has_batches and _is_direct(q, sizes),
+            _zero(q, kernel.single, sizes),
         )
         for q in function.outputs
     )
     single_body = _body(kernel, kernel.single, outputs, options)
-    lanes_body = _body(kernel, kernel.batch, outputs, options)
+    lanes_body = _body(kernel, kernel.batch, outputs, options) if has_batches else single_body
     shared = single_body == lanes_body
     positive = _vector(function.positive.quantity, sizes) if function.positive else None
     return KernelView(
@@ -205,7 +210,7 @@ def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) 
         inputs=tuple(_vector(q, sizes) for q in function.inputs),
         outputs=outputs,
         positive=positive,
-        prototypes=_prototypes(function, kernel.theta, robot, options.c_real),
+        prototypes=_prototypes(function, kernel.theta, robot, options),
         single_file=f"{kernel.name}.inc",
         lanes_file=f"{kernel.name}.inc" if shared else f"{kernel.name}_lanes.inc",
         single_body=single_body,
@@ -279,8 +284,8 @@ def _is_direct(output: Quantity, sizes: Sizes) -> bool:
     return len(output.axes) > 1 and sizes.size(output) >= GROUP
 
 
-def _prototypes(function: Signature, theta: bool, robot: str, real: str) -> dict[str, Prototype]:
+def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:
+    """By form, those that the target has."""
     variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
-    names = ("single", "batch", "batch_soa")
-    made = [prototype(function, variant, robot, real) for variant in variants]
-    return dict(zip(names, made, strict=False))
+    made = (prototype(function, variant, robot, options.c_real) for variant in variants)
+    return dict(zip(options.target.forms, made, strict=False))

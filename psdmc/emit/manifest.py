@@ -12,6 +12,8 @@ from psdmc.emit.describe import option_items
 from psdmc.emit.info import JointInfo, PackageInfo
 from psdmc.emit.kernel_view import FunctionView
 from psdmc.emit.options import EmitOptions
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
 
 SCHEMA = 1
 GENERATOR = "psdmc"
@@ -36,6 +38,7 @@ def manifest(
         "tip": info.tip,
         "gravity_m_s2": list(info.gravity),
         "options": option_items(info, options),
+        **_target(options.target),
         "real": options.c_real,
         "lanes": options.lanes,
         "joints": [_joint(joint) for joint in info.joints],
@@ -46,6 +49,11 @@ def manifest(
         "files": {path: digest(text) for path, text in files.items()},
     }
     return json.dumps(content, indent=2, ensure_ascii=True, allow_nan=False) + "\n"
+
+
+def _target(target: Target) -> dict[str, Any]:
+    """A target that was chosen: its name, and the flags that compilers take for it."""
+    return {} if target == NATIVE else {"target": {"name": target.name, "flags": list(target.flags)}}
 
 
 def digest(text: str) -> str:

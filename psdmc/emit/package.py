@@ -115,7 +115,7 @@ class PackageView:
 
     @property
     def trig_scalar(self) -> ScalarTrig:
-        return scalar_trig(self.robot, self.real, self.options.far)
+        return scalar_trig(self.robot, self.real, self.options.far, short=not self.widths)
 
     @property
     def description(self) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ class PackageView:
 
     @property
     def tables(self) -> tuple[Table, ...]:
-        return tables(self.info, self.robot, self.real, self.uses_frames)
+        return tables(self.info, self.robot, self.real, self.uses_frames, self.target.texts)
 
     @property
     def table_declarations(self) -> tuple[str, ...]:
@@ -285,6 +285,14 @@ def package_files(package: PackageView) -> dict[str, str]:
     return files
 
 
+_FOR_BATCHES = {
+    "src/lane_states.h": "lane_states.h.jinja",
+    "src/rows.h": "rows.h.jinja",
+    "src/lane_rows.h": "lane_rows.h.jinja",
+    "src/groups.h": "groups.h.jinja",
+}
+
+
 def library_files(package: PackageView) -> dict[str, str]:
     """The library alone: headers and sources."""
     trig = "sincos_libm.h.jinja" if package.options.trig == "libm" else "sincos_inline.h.jinja"
@@ -296,10 +304,7 @@ def library_files(package: PackageView) -> dict[str, str]:
         "src/vectors.h": "vectors.h.jinja",
         "src/sincos.h": trig,
         "src/one_state.h": "one_state.h.jinja",
-        "src/lane_states.h": "lane_states.h.jinja",
-        "src/rows.h": "rows.h.jinja",
-        "src/lane_rows.h": "lane_rows.h.jinja",
-        "src/groups.h": "groups.h.jinja",
+        **(_FOR_BATCHES if package.target.has_batches else {}),
         "src/pivots.h": "pivots.h.jinja",
     }
     files = {path: render(template, package=package) for path, template in named.items()}

@@ -46,8 +46,8 @@ class SelfCheck:
     """One output of a kernel that is called state by state, row by row and, where it has that form, lane by lane.
 
     rows, columns  of the output per state
-    single, batch  C calls, `row` being the state's number and `count` the batch's size; lanes: '' where there is no
-                   such form
+    single, batch  C calls, `row` being the state's number and `count` the batch's size; batch, lanes: '' where there is
+                   no such form
     status         whether the calls return one
     expected       array that it should reproduce; '' where no reference state has a value
     """
@@ -120,7 +120,7 @@ def _check(kernel: KernelView, k: int, n: int, options: EmitOptions, known: Coll
         rows=rows,
         columns=output.size // rows,
         single=_call(prototypes["single"], [*each, *theta, *found(f"found + row * {output.size}")]),
-        batch=_call(prototypes["batch"], [*batch, *theta, *found("found")]),
+        batch=_call(prototypes["batch"], [*batch, *theta, *found("found")]) if "batch" in prototypes else "",
         lanes=_call(prototypes["batch_soa"], [*lanes, *found("blocks")]) if "batch_soa" in prototypes else "",
         status=kernel.positive is not None,
         expected=f"{label}_expected" if label in known else "",

@@ -27,10 +27,13 @@ class Table:
     entries: tuple[str, ...]
     cpp_type: str
     cpp_entries: tuple[str, ...]
+    is_text: bool = False
 
 
-def tables(info: PackageInfo, robot: str, real: str, with_frames: bool = False) -> tuple[Table, ...]:
-    """All tables of a package, in the header's order."""
+def tables(
+    info: PackageInfo, robot: str, real: str, with_frames: bool = False, with_texts: bool = True
+) -> tuple[Table, ...]:
+    """All tables of a package, in the header's order; texts only where the target has them."""
     lengths = {"dof": f"{robot}_DOF", "base_parameters": f"{robot}_BASE_PARAMETERS", "3": "3"}
     lengths["frames"] = f"{robot}_FRAMES"
 
@@ -44,11 +47,11 @@ def tables(info: PackageInfo, robot: str, real: str, with_frames: bool = False) 
     def texts(name: str, length: str, values: Iterable[str]) -> Table:
         entries = tuple(map(c_string, values))
         declaration = f"const char *const {robot}_{name}[{lengths[length]}]"
-        return Table(name, declaration, entries, f"const char *, {length}", entries)
+        return Table(name, declaration, entries, f"const char *, {length}", entries, is_text=True)
 
     joints, parameters = info.joints, info.parameters
     frames = (texts("frame_names", "frames", info.frames),) if with_frames else ()
-    return (
+    every = (
         texts("joint_names", "dof", (joint.name for joint in joints)),
         texts("joint_units", "dof", (joint.unit for joint in joints)),
         numbers("position_lower", "dof", (joint.lower for joint in joints)),
@@ -62,6 +65,7 @@ def tables(info: PackageInfo, robot: str, real: str, with_frames: bool = False) 
         texts("base_parameter_units", "base_parameters", (p.unit for p in parameters)),
         *frames,
     )
+    return every if with_texts else tuple(table for table in every if not table.is_text)
 
 
 def _cpp_number(value: float | None, real: str) -> str:

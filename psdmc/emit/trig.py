@@ -52,7 +52,10 @@ class TrigPreamble:
 
 @dataclass(frozen=True, slots=True)
 class ScalarTrig:
-    """View of sincos_scalar.jinja: vec is the real type itself, ivec an unsigned integer of its size (vectors: signed)."""
+    """View of sincos_scalar.jinja: vec is the real type itself, ivec an unsigned integer of its size (vectors: signed).
+
+    rounded  integer that k is converted to
+    """
 
     macro: str
     symbol: str
@@ -69,6 +72,7 @@ class ScalarTrig:
     odd: str
     uses_libm: bool
     constants: Constants
+    rounded: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +93,11 @@ def trig_preamble(prefix: str, real: Real, far: Far = "libm") -> TrigPreamble:
     return TrigPreamble(_macro(prefix), real, far == "libm")
 
 
-def scalar_trig(prefix: str, real: Real, far: Far = "libm") -> ScalarTrig:
-    """View of sincos_scalar.jinja: <prefix>_sincos_f64 or _f32, angle and results behind pointers."""
+def scalar_trig(prefix: str, real: Real, far: Far = "libm", short: bool = False) -> ScalarTrig:
+    """View of sincos_scalar.jinja: <prefix>_sincos_f64 or _f32, angle and results behind pointers.
+
+    short  convert k to int, which it fits, for machines on which wider ones take a call
+    """
     suffix = _suffix(real)
     return ScalarTrig(
         macro=_macro(prefix),
@@ -108,6 +115,7 @@ def scalar_trig(prefix: str, real: Real, far: Far = "libm") -> ScalarTrig:
         odd="0 - (index & 1)",
         uses_libm=far == "libm",
         constants=constants(real),
+        rounded="int" if short else SIGNED[real],
     )
 
 
@@ -148,6 +156,7 @@ def vector_trig(
         odd=f"(index << {bits - 1}) >> {bits - 1}",
         uses_libm=far == "libm",
         constants=constants(real),
+        rounded=SIGNED[real],
         lanes=lanes,
         bytes=unit.bytes,
         any_sign=_any_sign(real, unit, lanes, vec, ivec),

@@ -13,7 +13,7 @@ from psdmc.program.passes.factor_common import factor_common
 from psdmc.program.passes.fold_constants import fold_constants
 from psdmc.program.passes.fuse_sums import fuse_sums
 from psdmc.program.passes.merge_duplicates import merge_duplicates
-from psdmc.program.passes.schedule import live_values, schedule
+from psdmc.program.passes.schedule import beyond_registers, live_values, schedule
 from psdmc.program.program import Program
 from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS
@@ -73,10 +73,13 @@ def shortened(program: Program) -> Program:
 
 def ordered(short: Program, costs: Costs = COSTS) -> tuple[Program, Program]:
     """A shortened PROGRAM in the order for one state a call, and in that for one state per SIMD lane: the first again
-    where it serves both, or where the target has no lanes."""
+    where it serves both, or where the target has no lanes. Where spilled values delay one state's code, too, it takes
+    the order that spills less."""
     last = _applied(LAST, short)
     for_lanes = _applied(LAST_FOR_LANES, last)
     for_one = _applied(last_for_one_state(costs), last)
+    if costs.spills_wait:
+        for_one = min(for_one, for_lanes, key=lambda each: beyond_registers(each, costs.registers))
     if not costs.has_vectors or live_values(for_one) <= costs.crowded * live_values(for_lanes):
         return for_one, for_one
     return for_one, for_lanes

@@ -20,7 +20,7 @@ def compile_library(package: PackageView) -> Path:
     this user's alone.
     """
     files = library_files(package)
-    compiler = find_compiler()
+    compiler = find_compiler(package.options.target)
     key = cache_key(files, (*compiler.identity, package.info.psdmc_version))
     return cached(key, lambda own: _build(package, files, compiler, own), [LIBRARY]) / LIBRARY
 

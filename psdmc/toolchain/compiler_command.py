@@ -15,9 +15,12 @@ from functools import cache
 from psdmc.errors import ToolchainError
 from psdmc.target.flags import ARITHMETIC, GCC_ONLY
 from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
 
 CANDIDATES = ("cc", "gcc", "clang")
 FLAGS = ("-O3", *ARITHMETIC, "-fPIC")
+SHOWN = 3
+"""Missing CPU features that a message names."""
 SECONDS = 600
 """Longest that one run of the compiler may take."""
 
@@ -45,9 +48,10 @@ class Compiler:
         return (*self.command, self.version, self.target, *self.flags)
 
 
-def find_compiler() -> Compiler:
-    """The compiler that CC names, else the first of CANDIDATES; ToolchainError where there is none."""
-    return _described(_command(os.environ.get("CC", "")))
+def find_compiler(target: Target = NATIVE) -> Compiler:
+    """The compiler that CC names, else the first of CANDIDATES, with its flags for a target; ToolchainError where there is
+    none, where it does not take the target's flags, or where this machine cannot run what it makes under them."""
+    return _described(_command(os.environ.get("CC", "")), target)
 
 
 def _command(wanted: str) -> tuple[str, ...]:
@@ -75,21 +79,58 @@ def _named(wanted: str) -> tuple[str, ...]:
 
 
 @cache
-def _described(command: tuple[str, ...]) -> Compiler:
+def _described(command: tuple[str, ...], target: Target) -> Compiler:
     version = run([*command, "--version"], "C compiler")
     portable = (*FLAGS, *GCC_ONLY) if "Free Software Foundation" in version else FLAGS
-    flags, macros = _native(command, portable)
+    flags, macros = _native(command, portable, target.host_flags)
     if "__STDC__" not in macros:
         raise ToolchainError(
             f"{shlex.join(command)} is no C compiler: it predefines no macros",
             "set CC to a compiler, or unset it",
         )
+    if target.flags:
+        flags = (*portable, *target.flags)
+        macros = _taken(command, flags, target)
+        _check_runs_here(command, portable, macros, target)
     return Compiler(command, version, portable, flags, "\n".join(sorted(macros.splitlines())))
 
 
-def _native(command: tuple[str, ...], portable: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
+def _taken(command: tuple[str, ...], flags: tuple[str, ...], target: Target) -> str:
+    """The macros that a compiler predefines for a target; ToolchainError where it knows no such target."""
+    try:
+        return _macros(command, flags)
+    except ToolchainError:
+        raise ToolchainError(
+            f"target {target.name}: {shlex.join(command)} does not take {' '.join(target.flags)}",
+            "compile makes code for this machine: choose a target that it is, or set CC; emit-c writes packages for others",
+        ) from None
+
+
+def _check_runs_here(
+    command: tuple[str, ...], portable: tuple[str, ...], macros: str, target: Target
+) -> None:
+    """ToolchainError where a target has instructions that this machine's CPU, as the compiler finds it, has not: running
+    them would end the process."""
+    here = _names(_native(command, portable, NATIVE.host_flags)[1])
+    lacking = sorted(_names(macros) - _names(_macros(command, portable)) - here)
+    if lacking:
+        raise ToolchainError(
+            f"target {target.name}: this machine's CPU lacks {', '.join(name.strip('_') for name in lacking[:SHOWN])}",
+            "choose another target; emit-c writes packages for other machines",
+        )
+
+
+def _names(macros: str) -> set[str]:
+    """Names of macros, compilers' words about tuning aside."""
+    names = {line.split()[1].partition("(")[0] for line in macros.splitlines() if line.startswith("#define ")}
+    return {name for name in names if "tune" not in name}
+
+
+def _native(
+    command: tuple[str, ...], portable: tuple[str, ...], host_flags: tuple[str, ...]
+) -> tuple[tuple[str, ...], str]:
     """Flags that the compiler takes, this CPU's if it can, and the macros that it predefines under them."""
-    for native in NATIVE.host_flags:
+    for native in host_flags:
         with contextlib.suppress(ToolchainError):
             return (*portable, native), _macros(command, (*portable, native))
     return portable, _macros(command, portable)

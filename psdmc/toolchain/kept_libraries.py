@@ -11,6 +11,8 @@ from pathlib import Path
 
 from psdmc.emit.package import PackageView
 from psdmc.errors import InternalError
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
 from psdmc.toolchain.cache import cache_key, cached, found
 from psdmc.toolchain.compile import LIBRARY, compile_library
 from psdmc.toolchain.compiler_command import find_compiler
@@ -21,10 +23,13 @@ from psdmc.version import psdmc_version
 INTERFACE = "interface.json"
 
 
-def compiled_once(parts: Sequence[str], make: Callable[[], PackageView]) -> tuple[Interface, Path]:
+def compiled_once(
+    parts: Sequence[str], make: Callable[[], PackageView], target: Target = NATIVE
+) -> tuple[Interface, Path]:
     """Interface and shared library of the package that `make` gives, from the cache where an equal call was made before.
 
-    parts  everything that decides the package besides psdmc's own sources: the model's hash, the options
+    parts   everything that decides the package besides psdmc's own sources: the model's hash, the options
+    target  the package's
 
     Raises what `make` and `compile_library` raise. An interface whose library is gone or altered is not believed.
     """
@@ -36,7 +41,8 @@ def compiled_once(parts: Sequence[str], make: Callable[[], PackageView]) -> tupl
         made.append((interface_of(package), library))
         (folder / INTERFACE).write_text(interface_to_json(made[0][0], library.parent.name), encoding="utf-8")
 
-    key = cache_key({}, ("interface", *sources_digests(), *_emission(), *find_compiler().identity, *parts))
+    decides = (*sources_digests(), *_emission(), *find_compiler(target).identity, repr(target), *parts)
+    key = cache_key({}, ("interface", *decides))
     entry = cached(key, build, [INTERFACE])
     return made[0] if made else _opened(entry) or _made(make())
 

@@ -30,6 +30,24 @@ def live_values(program: Program) -> int:
     return sum(last[i] - i for i, (_, args, _, _) in enumerate(program.body) if args)
 
 
+def beyond_registers(program: Program, registers: int) -> int:
+    """Sum over all instructions of the values alive behind it that no register is left for; loads and constants do not
+    count."""
+    ends = [0] * (len(program.body) + 1)
+    last = list(range(len(program.body)))
+    for i, (_, args, _, _) in enumerate(program.body):
+        for a in args:
+            last[a] = i
+    alive = total = 0
+    for i, (_, args, _, _) in enumerate(program.body):
+        if args and last[i] > i:
+            alive += 1
+            ends[last[i]] += 1
+        alive -= ends[i]
+        total += max(alive - registers, 0)
+    return total
+
+
 def _need(program: Program) -> list[int]:
     """Values alive at once while one value is computed, if nothing were shared."""
     need: list[int] = []

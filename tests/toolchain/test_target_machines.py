@@ -1,0 +1,204 @@
+"""Targets on their machines: compiled here where this machine is one, cross-compiled and run by qemu where it is not."""
+
+from __future__ import annotations
+
+import platform
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import psdmc
+from psdmc.errors import InputError, ToolchainError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.target.native import COSTS, NATIVE
+from psdmc.target.presets import AARCH64, CORTEX_M4F, CORTEX_M7, SCALAR, X86_64_V3, preset
+from psdmc.target.target import Target
+from psdmc.toolchain import compile, compiler_command
+from psdmc.toolchain.build_package import build_package
+from psdmc.toolchain.compiler_command import find_compiler
+
+ROBOTS = Path(__file__).parents[2] / "examples" / "robots"
+HERE = Path(__file__).parent
+X86 = platform.machine() in ("x86_64", "AMD64")
+FEW = ["inverse_dynamics", "forward_dynamics", "mass_matrix"]
+
+
+@pytest.fixture(scope="module")
+def two_link() -> DynamicsModel:
+    return psdmc.derive(ROBOTS / "two_link_full.toml")
+
+
+@pytest.fixture(scope="module")
+def kr6() -> DynamicsModel:
+    return psdmc.derive(ROBOTS / "kr6.toml", expand=False)
+
+
+def need(*programs: str) -> None:
+    for program in programs:
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed")
+
+
+def run(*words: str | Path) -> str:
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", ["native", "scalar", "x86-64-v2", "x86-64-v3", "x86-64-v4"])
+def test_every_target_that_this_machine_is_gives_the_models_results(
+    two_link: DynamicsModel, name: str
+) -> None:
+    try:
+        robot = psdmc.compile(two_link, functions=FEW, target=name)
+    except ToolchainError as refused:
+        assert name.startswith("x86-64")
+        pytest.skip(str(refused))
+    q, qd, qdd = np.random.default_rng(4).normal(size=(3, 19, 2))
+
+    tau = robot.inverse_dynamics(q, qd, qdd)
+
+    np.testing.assert_allclose(tau, two_link.inverse_dynamics(q, qd, qdd), rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(robot.forward_dynamics(q, qd, tau), qdd, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("target", [CORTEX_M4F, CORTEX_M7])
+def test_python_has_no_use_for_one_state_a_call(two_link: DynamicsModel, target: Target) -> None:
+    with pytest.raises(InputError, match=f"target {target.name} has no functions for many states"):
+        psdmc.compile(two_link, functions=["gravity"], target=target.name)
+
+
+def test_a_compiler_that_knows_no_such_target_is_told(two_link: DynamicsModel) -> None:
+    other = replace(X86_64_V3, name="other", flags=("-march=z80",))
+    with pytest.raises(ToolchainError, match=r"target other: .* does not take -march=z80"):
+        psdmc.compile(two_link, functions=["gravity"], target=other)
+
+
+@pytest.mark.skipif(not X86, reason="instructions of x86-64")
+def test_a_target_that_this_cpu_is_not_is_refused_before_it_runs(two_link: DynamicsModel) -> None:
+    """Xeon Phi's AVX-512ER is in no other CPU."""
+    need("gcc")
+    other = replace(X86_64_V3, name="phi", flags=("-march=x86-64-v3", "-mavx512er"))
+    with pytest.raises(ToolchainError, match=r"target phi: this machine's CPU lacks .*AVX512ER"):
+        psdmc.compile(two_link, functions=["gravity"], target=other)
+
+
+def test_the_default_targets_flags_are_those_for_this_machine() -> None:
+    compiler = find_compiler()
+    assert compiler == find_compiler(NATIVE)
+    assert compiler.flags[: len(compiler.portable)] == compiler.portable
+    assert compiler.flags[len(compiler.portable) :] in [(flag,) for flag in NATIVE.host_flags] + [()]
+    assert find_compiler(SCALAR).flags == compiler.portable
+
+
+def test_targets_share_lowerings_where_their_costs_are_equal(
+    two_link: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
+
+    def kept() -> int:
+        return len(list((tmp_path / "cache").glob("*/kernels.json")))
+
+    made = []
+    for number, name in enumerate(("native", "x86-64-v4", "x86-64-v3", "cortex-m4f", "cortex-m4f")):
+        psdmc.emit_c(two_link, tmp_path / str(number), functions=["gravity"], target=name)
+        made.append(kept())
+
+    assert made == [1, 1, 2, 3, 3]
+    assert preset("x86-64-v4").costs == COSTS
+
+
+@pytest.mark.parametrize("target", [SCALAR, X86_64_V3], ids=lambda target: target.name)
+def test_libraries_are_compiled_with_the_targets_flags(
+    two_link: DynamicsModel, target: Target, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
+    try:
+        flags = find_compiler(target).flags
+    except ToolchainError as refused:
+        pytest.skip(str(refused))
+    commands: list[tuple[str, ...]] = []
+
+    def recorded(words: Sequence[str], *more: str) -> str:
+        commands.append(tuple(words))
+        return compiler_command.run(words, *more)
+
+    monkeypatch.setattr(compile, "run", recorded)
+    psdmc.compile(two_link, functions=["gravity"], target=target.name)
+
+    compiled = [words for words in commands if "-c" in words]
+    assert compiled
+    assert all(set(flags) <= set(words) and "-march=native" not in words for words in compiled)
+
+
+def test_libraries_of_different_targets_are_kept_apart(two_link: DynamicsModel) -> None:
+    libraries = {
+        psdmc.compile(two_link, functions=["gravity"], target=target).library
+        for target in (NATIVE, SCALAR, replace(SCALAR, name="other", blocks_ahead=3))
+    }
+    assert len(libraries) == 3
+
+
+@pytest.mark.parametrize("target", [CORTEX_M4F, X86_64_V3])
+def test_a_package_builds_and_tests_itself_on_the_machine_at_hand(
+    two_link: DynamicsModel, target: Target, tmp_path: Path
+) -> None:
+    """With the target's flags where the compiler takes them, without where it does not."""
+    psdmc.emit_c(two_link, tmp_path / "arm", functions=FEW, target=target.name)
+    try:
+        find_compiler(X86_64_V3)
+    except ToolchainError as refused:
+        if target == X86_64_V3:
+            pytest.skip(str(refused))
+
+    assert "0 failed" in build_package(tmp_path / "arm")
+    need("make")
+    commands = run("make", "-C", tmp_path / "arm", "BUILD=by_make", "check")
+    assert "0 failed" in commands
+    assert (" ".join(target.flags) in commands) == (target == X86_64_V3 and X86)
+
+
+@pytest.mark.parametrize("robot", ["two_link", "kr6"])
+@pytest.mark.parametrize("target", [CORTEX_M4F, CORTEX_M7], ids=lambda target: target.name)
+def test_the_self_test_passes_compiled_for_a_microcontroller(
+    robot: str, target: Target, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """The very instructions: linked with newlib, on Linux's system calls. The library alone needs no other."""
+    need("arm-none-eabi-gcc", "qemu-arm", "make")
+    package = tmp_path / "arm"
+    psdmc.emit_c(request.getfixturevalue(robot), package, target=target.name, name="arm")
+    made = run("make", "-C", package, "CC=arm-none-eabi-gcc", "AR=arm-none-eabi-ar", "build/libarm.a")
+    program = [*target.flags, "-std=c99", "-O2", "-nostartfiles", f"-I{package}/include"]
+    sources = [package / "test" / "self_test.c", HERE / "bare_metal.c", package / "build" / "libarm.a"]
+    run("arm-none-eabi-gcc", *program, *sources, "-lm", "-o", package / "self_test.elf")
+
+    assert " ".join(target.flags) in made
+    assert ", 0 failed" in run("qemu-arm", package / "self_test.elf")
+    assert undefined(package / "build" / "libarm.a") == set()
+
+
+def undefined(library: Path) -> set[str]:
+    """Symbols that a library needs of others; its own tables are not."""
+    words = [line.split() for line in run("arm-none-eabi-nm", library).splitlines()]
+    needed = {line[-1] for line in words if line[-2:-1] == ["U"]}
+    return needed - {line[-1] for line in words if len(line) == 3} - {"memcpy", "memset"}
+
+
+@pytest.mark.parametrize("robot", ["two_link", "kr6"])
+@pytest.mark.parametrize("target", [AARCH64, NATIVE], ids=lambda target: target.name)
+def test_the_self_test_passes_compiled_for_64_bit_arm(
+    robot: str, target: Target, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    need("aarch64-linux-gnu-gcc", "qemu-aarch64", "make")
+    package = tmp_path / "arm"
+    psdmc.emit_c(request.getfixturevalue(robot), package, functions=FEW, target=target.name, name="arm")
+    words = ["CC=aarch64-linux-gnu-gcc", "AR=aarch64-linux-gnu-ar", "LDFLAGS=-static"]
+    made = run("make", "-C", package, *words, "build/self_test")
+
+    assert " ".join(target.flags) in made
+    assert ", 0 failed" in run("qemu-aarch64", package / "build" / "self_test")
