@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.derivation.last_digit import LAST, extended_torques, last_digit_effect
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
@@ -33,36 +36,118 @@ ROUNDING = 1e-12
 
 SCALES = "check the units of masses, inertias and lengths: these do not belong to one robot"
 
+DOUBTFUL = 1e-13
+"""A robot whose last digits change a torque by more than this share of its largest is measured against extended precision,
+and what they change is part of its certificate. Ordinary robots stay below 2e-14."""
+
+PROMISED = 1e-11
+"""Such a robot's certificate must not exceed this."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """A model's errors at fresh states, and what they are judged by; errors relative to each joint's largest torque.
+
+    model      whose errors
+    x          (11 n,) standard parameters that were used
+    states     q, qd, qdd
+    reference  (states, n) torques by Newton-Euler
+    errors     (n,) of what the model computes, E and P where it has them
+    plain      (n,) of its base parameters alone; zero where they were not looked at
+    last_digit (n,) what the last digits of the robot's own numbers change; zero where that is below DOUBTFUL throughout
+    """
+
+    model: DynamicsModel
+    x: Array
+    states: States
+    reference: Array
+    errors: Array
+    plain: Array
+    last_digit: Array
+
 
 def certificate(model: DynamicsModel) -> Array:
     """(n,) largest torque error per joint relative to that joint's largest torque.
 
     The model's own parameters where they are known, else random ones from the span.
-    Where one exceeds WORST_ALLOWED: DerivationError if the robot's own numbers are the cause (they overflow, or a joint's
-    torque is a small difference of large contributions), else InternalError.
+    DerivationError or InternalError as `judged` says.
     """
+    return judged(measured(model))
+
+
+def measured(model: DynamicsModel) -> Measured:
     rng = np.random.default_rng(SEED)
     x, theta = _parameters(model, rng)
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, size=(SAMPLES, model.n)) for limit in RANGES)
-    chain = model.mechanism
+    chain, none = model.mechanism, np.zeros(model.n)
     states = (list(q.T), list(qd.T), list(qdd.T))
     with np.errstate(over="ignore", invalid="ignore"):
-        expected = newton_euler(
-            frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), *states, base_acceleration(chain)
+        torques = model.torques_for(theta, q, qd, qdd)
+        last_digit = last_digit_effect(chain, x, states)
+        if not np.any(last_digit > DOUBTFUL):
+            reference = _newton_euler(chain, x, states)
+            return Measured(model, x, states, reference, relative_errors(torques, reference), none, none)
+        reference = extended_torques(chain, x, states)
+        plain = replace(model, expansion=None).torques_for(theta, q, qd, qdd)
+        errors = relative_errors(torques, reference)
+        return Measured(model, x, states, reference, errors, relative_errors(plain, reference), last_digit)
+
+
+def judged(found: Measured) -> Array:
+    """(n,) the certificate.
+
+    Where an error exceeds WORST_ALLOWED: DerivationError if the robot's own numbers are the cause (they overflow, or a
+    joint's torque is a small difference of large contributions), else InternalError. DerivationError where a robot that
+    is sensitive to its last digits exceeds PROMISED.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        worst = np.maximum(found.errors, found.plain)
+        known = np.maximum(worst, found.last_digit)
+        if not np.all(worst <= WORST_ALLOWED):
+            raise _failure(found, worst)
+        if found.last_digit.any() and not np.all(known <= PROMISED):
+            raise _too_fine(found, known)
+    return known
+
+
+def _newton_euler(chain: Mechanism, x: Array, states: States) -> Array:
+    torques = newton_euler(
+        frames_of(chain), bodies_of(chain, x), drive_inertia_of(x), *states, base_acceleration(chain)
+    )
+    return np.stack([np.broadcast_to(torque, (SAMPLES,)) for torque in torques], axis=1)
+
+
+def _too_fine(found: Measured, known: Array) -> DerivationError:
+    """Which joint's torque is not known, or not found, to PROMISED, and what to do about it."""
+    chain, worst = found.model.mechanism, int(np.argmax(known))
+    joint, expected = chain.joints[worst], f"expected {PROMISED:g} at most"
+    unit = "N" if joint.type.length_order else "N m"
+    largest = np.abs(found.reference[:, worst]).max()
+    whose = (
+        f"'{chain.name}': joint '{joint.name}': its largest torque, {largest:.2g} {unit}, is beside loads "
+        f"{found.last_digit[worst] / LAST:.0e} times as large"
+    )
+    if found.last_digit[worst] > PROMISED:
+        return DerivationError(
+            f"{whose}: the last digit of the robot's numbers changes it by {known[worst]:.1e} of itself, {expected}",
+            f"check the units of masses, inertias and lengths of '{joint.name}' and what hangs on it; where they are "
+            "right, make this joint fixed, or end the chain before it with --tip",
         )
-        reference = np.stack([np.broadcast_to(torque, (SAMPLES,)) for torque in expected], axis=1)
-        errors = relative_errors(model.torques_for(theta, q, qd, qdd), reference)
-        if not np.all(errors <= WORST_ALLOWED):
-            raise _failure(chain, x, states, reference, errors)
-    return errors
+    base_alone = np.maximum(found.plain, found.last_digit).max()
+    if found.model.expansion is not None and base_alone <= PROMISED:
+        return DerivationError(
+            f"{whose}: E and P leave errors of {known[worst]:.1e} of it, {expected}",
+            f"derive with --no-expand: base parameters alone leave {base_alone:.1e}",
+        )
+    return DerivationError(
+        f"{whose}: double precision leaves errors of {known[worst]:.1e} of it, {expected}", SCALES
+    )
 
 
-def _failure(
-    chain: Mechanism, x: Array, states: States, reference: Array, errors: Array
-) -> DerivationError | InternalError:
+def _failure(found: Measured, errors: Array) -> DerivationError | InternalError:
     """Who is to blame for errors beyond WORST_ALLOWED: the robot's numbers or psdmc."""
-    largest = np.abs(reference).max(axis=0)
-    cancelled = _contributions(chain, x, states) / np.where(largest > 0, largest, 1.0)
+    chain, largest = found.model.mechanism, np.abs(found.reference).max(axis=0)
+    cancelled = _contributions(chain, found.x, found.states) / np.where(largest > 0, largest, 1.0)
     worst = int(np.argmax(np.where(np.isfinite(errors), errors, np.inf)))
     name = f"'{chain.name}': joint '{chain.joint_names[worst]}'"
     if not np.isfinite(cancelled).all():
@@ -73,6 +158,8 @@ def _failure(
             f"precision leaves errors of {errors[worst]:.2g} of it",
             SCALES,
         )
+    if np.any(found.last_digit > PROMISED):
+        return _too_fine(found, np.maximum(errors, found.last_digit))
     return InternalError(
         f"joint '{chain.joint_names[worst]}': the derived model is off Newton-Euler by "
         f"{errors[worst]:.2g} of its largest torque"

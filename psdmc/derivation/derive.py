@@ -10,8 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.derivation.certify import certificate
-from psdmc.derivation.expand import Progress, expand, precision_for
+from psdmc.derivation.certify import judged, measured
+from psdmc.derivation.expand import (
+    EXTENDED,
+    FINEST,
+    Precision,
+    Progress,
+    can_be_finest,
+    expand,
+    precision_for,
+)
 from psdmc.derivation.link_by_link import EFFECT
 from psdmc.derivation.memory import refuse_long
 from psdmc.derivation.reduce import PIVOT_TOLERANCE, Reduction
@@ -34,6 +42,9 @@ LARGEST_CHAIN = 200
 
 SIZES = (1e-12, 1e12)
 """m; a robot's longest step lies between these, or squares of its lengths leave double precision behind."""
+
+GOOD = 1e-13
+"""Where E and P leave larger errors, coefficients that count were taken for zeros: they are found again to FINEST."""
 
 LAST_DIGIT = 4e-16
 """The same where B was found in extended precision."""
@@ -69,18 +80,27 @@ def derive_model(
             f"'{chain.name}': no inertial parameter has any effect on any joint",
             "give masses and inertias, or assume fewer of them zero",
         )
-    expansion = _expanded(robot, reduction, tell, memory) if expand else None
     B = base_map(robot, reduction)
-    model = DynamicsModel(
-        expansion=expansion,
-        theta_b=base_parameters(B, chain),
-        B=B,
-        mechanism=chain,
-        certificate=np.zeros(len(chain)),
-        provenance=_plain(dict(provenance or {}) | {"tolerances": tolerances(robot, reduction)}),
-    )
+    theta_b = base_parameters(B, chain)
+
+    def made(precision: Precision) -> DynamicsModel:
+        used = {"tolerances": tolerances(precision, reduction)}
+        return DynamicsModel(
+            expansion=_expanded(robot, reduction, precision, tell, memory) if expand else None,
+            theta_b=theta_b,
+            B=B,
+            mechanism=chain,
+            certificate=np.zeros(len(chain)),
+            provenance=_plain(dict(provenance or {}) | used),
+        )
+
+    precision = precision_for(robot, reduction)
+    model = made(precision)
     tell("certificate")
-    return replace(model, certificate=certificate(model))
+    found = measured(model)
+    if expand and precision is EXTENDED and can_be_finest() and not np.all(found.errors <= GOOD):
+        found = measured(made(FINEST))
+    return replace(found.model, certificate=judged(found))
 
 
 _expanded = expand
@@ -111,9 +131,8 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
     return plain
 
 
-def tolerances(robot: Scaled, reduction: Reduction) -> dict[str, float]:
+def tolerances(precision: Precision, reduction: Reduction) -> dict[str, float]:
     """The numbers that decided."""
-    precision = precision_for(robot, reduction)
     return {
         "coefficient": precision.zero,
         "value_noise": precision.noise,

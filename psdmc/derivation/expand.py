@@ -61,10 +61,12 @@ FINEST = Precision(1e-18, 1e-19)
 1e-18 that are rounding are kept with them, which costs functions, not digits."""
 
 
-def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int | None = None) -> Expansion:
+def expand(
+    scaled: Scaled, reduction: Reduction, precision: Precision, progress: Progress, memory: int | None = None
+) -> Expansion:
     """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of
     what is free)."""
-    types, precision = scaled.types, precision_for(scaled, reduction)
+    types = scaled.types
     if precision is not IN_DOUBLE:
         scaled = extended(scaled)
     functions = Functions(types)
@@ -89,9 +91,14 @@ def expand(scaled: Scaled, reduction: Reduction, progress: Progress, memory: int
 
 def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
     """Double where every coefficient is either rounding or far from it."""
-    if is_of_many_scales(scaled) and np.finfo(np.longdouble).eps < FINEST.zero:
+    if is_of_many_scales(scaled) and can_be_finest():
         return FINEST
     return IN_DOUBLE if reduction.is_clear and not has_small_entries(scaled) else EXTENDED
+
+
+def can_be_finest() -> bool:
+    """Whether long doubles have the digits for FINEST here."""
+    return bool(np.finfo(np.longdouble).eps < FINEST.zero)
 
 
 def _mass_matrix(

@@ -93,7 +93,9 @@ def has_small_entries(robot: Scaled) -> bool:
 
 def is_of_many_scales(robot: Scaled) -> bool:
     """Whether the lengths from some joint outward are all small, and not all zero: a finger of millimetres on an arm of
-    metres."""
+    metres. Or all are small beside the metres that a joint of the robot slides."""
+    if robot.unit < MANY_SCALES and any(joint.length_order for joint in robot.types):
+        return True
     reach = [_length(place.translation) for place in robot.link_frames]
     for k, frame in reversed(list(enumerate(robot.frames))):
         if frame.parent >= 0:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from psdmc.derivation.extended import is_of_many_scales
+from psdmc.derivation.extended import has_small_entries, is_of_many_scales
 from psdmc.derivation.link_by_link import reduction_link_by_link
 from psdmc.derivation.reduce import Reduction, reduced
 from psdmc.derivation.units import Scaled
@@ -28,9 +28,10 @@ SAMPLED_JOINTS = 10
 
 
 def reduction_of(scaled: Scaled) -> Reduction:
-    """The base parameters: from sampled rows of doubles where these are few, of one scale, and no column is nearly
-    dependent, else link by link in extended precision."""
-    if len(scaled.types) <= SAMPLED_JOINTS and not is_of_many_scales(scaled):
+    """The base parameters: from sampled rows of doubles where these are few, of one scale, without small angles or
+    lengths, whose squares are no rounding, and no column is nearly dependent, else link by link in extended precision."""
+    is_plain = not is_of_many_scales(scaled) and not has_small_entries(scaled)
+    if is_plain and len(scaled.types) <= SAMPLED_JOINTS:
         reduction = sampled_reduction(scaled)
         if reduction.is_clear:
             return reduction

@@ -26,12 +26,25 @@ def test_a_random_robot(seed: int) -> None:
     assert failing(seed) == {}
 
 
-@pytest.mark.parametrize("seed", [453, 989, 317, 577, 2057])
+@pytest.mark.parametrize("seed", [453, 989, 4495, 577, 2057, 1927, 7157, 2327])
 def test_robots_that_the_campaign_found(seed: int) -> None:
-    """989: a column of size 1e-9 as a pivot, E and P off by 5e-11. Of many scales: 317, coefficients of 1e-15 left out,
-    4e-10; 577, base parameters by double precision, 3e-11; 2057, a heavy link's inertia in a light one's base parameter,
-    7e-10."""
-    assert failing(seed) == {}
+    """989: a column of size 1e-9 as a pivot, E and P off by 5e-11. 4495: a micrometre's square taken for rounding in B, mass
+    matrix 2e-11. Of many scales: 577, base parameters by double precision, 3e-11; 2057, a heavy link's inertia in a light
+    one's base parameter, 7e-10; 1927, the same as 4495, 7e-11; 7157, all lengths below a millimetre and metres to slide,
+    4e-9 in E and P; 2327, coefficients of 1e-15 left out of E and P, 1.5e-11."""
+    found = measured(seed, STATES, lowered=False)
+    assert found.refused == {}
+    assert failures(found.errors) == {}
+
+
+@pytest.mark.parametrize(("seed", "joint"), [(2127, "joint3"), (317, "joint4")])
+def test_robots_whose_last_digits_decide_are_refused(seed: int, joint: str) -> None:
+    """2127: psdmc reads 1.5707963267948966 as a right angle, Pinocchio as 6e-17 less: 2.5e-9 of a torque. 317: 4e-10 once;
+    another last digit of its numbers moves the torque by 5e-11."""
+    found = measured(seed, STATES, lowered=False)
+    assert found.errors == {}
+    assert f"joint '{joint}'" in found.refused["snap 0"]
+    assert "the last digit of the robot's numbers" in found.refused["snap 0"]
 
 
 def test_a_robot_beyond_the_declared_limits_is_refused_by_them() -> None:
