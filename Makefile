@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-lowest audit fuzz test-sanitize
+.PHONY: help venv demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-demo test-lowest audit fuzz test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -39,6 +39,11 @@ demo: $(READY) ## derive, emit, build, check and benchmark the bundled Denso VS-
 test: $(READY) ## run all tests
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal tests
 
+COVERED ?= tests
+coverage: $(READY) ## run all tests (COVERED='tests/program tests/model': these) and say which share of each file they run
+	@mkdir -p $(GENERATED)
+	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal --cov --cov-report=term --cov-report=html:$(GENERATED)/coverage $(COVERED)
+
 CAMPAIGN ?= --robots 10000
 campaign: $(READY) ## 10,000 random robots against Pinocchio and MuJoCo, an hour or more of two cores; CAMPAIGN='--robots 500' for less
 	@mkdir -p $(GENERATED)
@@ -46,6 +51,9 @@ campaign: $(READY) ## 10,000 random robots against Pinocchio and MuJoCo, an hour
 
 test-processes: $(READY) ## kill every command 50 times at random moments, and whatever else takes long
 	PSDMC_KILLS=50 $(RUN)/python -m pytest -q -rs tests/end_to_end/test_killed.py tests/end_to_end/test_full_disk.py
+
+test-demo: $(READY) ## the virtual Denso's whole campaign by the bounds of its test, three minutes; make test runs a short form
+	PSDMC_DEMO=whole $(RUN)/python -m pytest -q tests/calibration/test_demo.py
 
 LOWEST := .venv-lowest
 LOWEST_TESTS = $(FAST) tests/test_atomic.py tests/emit/test_package.py tests/emit/test_write.py tests/toolchain/test_call.py \
@@ -76,7 +84,7 @@ check: $(READY) ## format, lint, types and the fast tests: seconds
 	$(RUN)/ruff format --check .
 	$(RUN)/ruff check .
 	$(RUN)/mypy
-	$(RUN)/python -m pytest -m 'not slow' $(FAST)
+	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' $(FAST)
 
 golden: $(READY) ## rewrite the golden files; review their diff like code
 	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit tests/end_to_end/test_reference_robot.py

@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-UNTESTED = {"ruff", "mypy"}
-"""Tools of `make check`: no test imports them."""
+UNTESTED = {"ruff", "mypy", "pytest-cov"}
+"""Tools of `make check` and `make coverage`: no test imports them."""
 
 
 def lowest() -> dict[str, str]:

@@ -28,6 +28,9 @@ EXAMPLES = Path("examples")
 ROBOT = EXAMPLES / "robots" / "denso_wall.toml"
 PLANT = EXAMPLES / "plants" / "denso_virtual.toml"
 
+WHOLE = CampaignOptions(table="npz")
+"""Half an hour of the robot's time."""
+
 Variant = tuple[str, bool, bool]
 VARIANTS: tuple[Variant, ...] = (("ideal", True, False), ("sensors", False, False), ("harness", False, True))
 """Name, whether sensors are ideal, whether there is a cable harness."""
@@ -38,8 +41,12 @@ def run_demo(
     variants: tuple[str, ...] = ("sensors",),
     workers: int = 2,
     say: Callable[[str], None] = print,
+    plan: CampaignOptions = WHOLE,
 ) -> dict[str, Comparison]:
-    """Plan, simulate, calibrate and report each variant; returns how its result compares with the truth."""
+    """Plan, simulate, calibrate and report each variant; returns how its result compares with the truth.
+
+    plan  what the campaign consists of
+    """
     begin = time.monotonic()
 
     def step(text: str) -> None:
@@ -49,7 +56,7 @@ def run_demo(
     unknown = replace(model, theta_b=None)
     robot = compile_model(model, functions=["regressor"])
     step("searching an exciting motion")
-    runs, found = plan_campaign(model.mechanism, robot, model.l, CampaignOptions(table="npz"))
+    runs, found = plan_campaign(model.mechanism, robot, model.l, plan)
     step(
         f"condition {found.condition:.2f}, best random one {found.random_conditions[0]:.2f}: {found.gain:.2f} times"
     )

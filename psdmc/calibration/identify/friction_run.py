@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,16 @@ from psdmc.calibration.logs.low_pass import LowPass
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
+MOST_KEPT = 12
+"""Friction torques of one run that are held: those of a Jacobian and of the point that it belongs to."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRun:
-    """One joint's run, ready to be compared with predictions."""
+    """One joint's run, ready to be compared with predictions.
+
+    kept  friction torques simulated last, by the bytes of their seven unknowns
+    """
 
     time: Array
     period: float
@@ -33,14 +39,23 @@ class JointRun:
     every: NDArray[np.intp]
     fit: NDArray[np.intp]
     out: NDArray[np.intp]
+    kept: dict[bytes, Array] = field(default_factory=dict, repr=False)
 
     def rigid(self, inertia: float, offset: float, delay: float) -> Array:
         return self.delayed(self.gravity + inertia * self.qdd + offset, delay)
 
     def torque(self, p: Array) -> Array:
         """Motor torque for the unknowns (friction_fit.UNKNOWNS), before the low-pass."""
-        friction = friction_torque(lugre_from(p), self.qd, self.period)
-        return self.delayed(friction + self.gravity + p[7] * self.qdd + p[8], p[9])
+        return self.delayed(self.friction(p) + self.gravity + p[7] * self.qdd + p[8], p[9])
+
+    def friction(self, p: Array) -> Array:
+        """Friction torque alone, simulated once for equal parameters: the other unknowns leave it as it is."""
+        key = p[:7].tobytes()
+        if key not in self.kept:
+            if len(self.kept) >= MOST_KEPT:
+                self.kept.clear()
+            self.kept[key] = friction_torque(lugre_from(p), self.qd, self.period)
+        return self.kept[key]
 
     def delayed(self, torque: Array, delay: float) -> Array:
         """What is written at t is what happened at t + delay."""
