@@ -44,7 +44,7 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("packages")
     for robot in ROBOTS:
         emit_c(bundled_model(robot), root / robot)
-        _run(["make", "-C", str(root / robot), "CFLAGS=-O1", f"PREFIX={root}/prefix", "install"])
+        _run(["make", "-C", str(root / robot), "CFLAGS=-O0", f"PREFIX={root}/prefix", "install"])
     return root
 
 
@@ -63,7 +63,7 @@ def prefix(packages: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
                 "-B",
                 build,
                 "-DBUILD_TESTING=OFF",
-                "-DCMAKE_C_FLAGS_RELEASE=-O1",
+                "-DCMAKE_C_FLAGS_RELEASE=-O0",
             ]
         )
         _run(["cmake", "--build", build, "--parallel", "2"])

@@ -21,6 +21,14 @@ def arm(options: EmitOptions) -> PackageView:
     return arm_package(options=options, names=NAMES)
 
 
+def torques(options: EmitOptions) -> PackageView:
+    return arm_package(options=options, names=["inverse_dynamics"])
+
+
+def accelerations(options: EmitOptions) -> PackageView:
+    return arm_package(options=options, names=["forward_dynamics"])
+
+
 def odd(options: EmitOptions) -> PackageView:
     """Several outputs, some written straight into rows, an input longer than q, and pivots."""
     return odd_package(options.real, trig=options.trig)
@@ -61,7 +69,7 @@ FAULTS = {
         "src/rows.h",
         "(lane < count ? lane : count - 1) * n",
         "(lane < count ? lane : count) * n",
-        arm,
+        torques,
         ("guard pages, gcc -O3, SSE2", "ASan and UBSan, gcc -O0, widest vectors"),
     ),
     "writes beyond the last row": (
@@ -75,7 +83,7 @@ FAULTS = {
         "src/pivots.h",
         "    int bad = 0;",
         "    static int bad; bad = 0;",
-        arm,
+        accelerations,
         ("TSan, gcc -O1, widest vectors",),
     ),
     "spoils the row behind one that fails": (
@@ -86,6 +94,7 @@ FAULTS = {
         ("guard pages, gcc -O3, SSE2",),
     ),
 }
+"""File, right and wrong text, a package that has both, and the tools that must see it."""
 
 
 @pytest.mark.parametrize(("fault", "tool"), [(f, tool) for f, row in FAULTS.items() for tool in row[4]])

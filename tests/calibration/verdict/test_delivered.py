@@ -13,6 +13,7 @@ import pytest
 from shared_data import UR10_LOG
 from test_four_steps import with_logs
 from test_ur10 import model as ur10_model  # noqa: F401  a fixture
+from unoptimised import wrapper
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_campaign, calibrate_logs
 from psdmc.calibration.campaign_file import read_campaign
@@ -75,7 +76,17 @@ def require_delivered(record: Calibration, source, folder: Path, capsys: pytest.
 
 def require_package(record: Calibration, folder: Path) -> None:
     emit_c(record.model, folder / "c")
-    assert "forward_dynamics" in build_package(folder / "c")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CC", str(wrapper(folder)))
+        assert "forward_dynamics" in build_package(folder / "c")
+
+
+@pytest.fixture(scope="module")
+def ur10(ur10_model) -> tuple[Log, Calibration]:  # noqa: F811
+    if not UR10_LOG.exists():
+        pytest.skip("the UR10 log is not part of the project")
+    path = UR10_LOG / "exciting_trajectory.csv"
+    return read_log(path), calibrate(ur10_model, path, regressor=ChainRegressor(ur10_model))
 
 
 def test_one_log(arm, log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -97,21 +108,14 @@ def test_a_campaign(arm, campaign: Path, variant: str, tmp_path: Path, capsys: p
     require_package(record, tmp_path)
 
 
-@pytest.mark.skipif(not UR10_LOG.exists(), reason="the UR10 log is not part of the project")
-def test_the_ur10(ur10_model, tmp_path: Path, capsys: pytest.CaptureFixture[str]):  # noqa: F811
-    path = UR10_LOG / "exciting_trajectory.csv"
-
-    record = calibrate(ur10_model, path, regressor=ChainRegressor(ur10_model))
-
-    require_delivered(record, [read_log(path)], tmp_path, capsys)
+def test_the_ur10(ur10: tuple[Log, Calibration], tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    log, record = ur10
+    require_delivered(record, [log], tmp_path, capsys)
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not UR10_LOG.exists(), reason="the UR10 log is not part of the project")
-def test_the_ur10s_package_builds(ur10_model, tmp_path: Path):  # noqa: F811
-    path = UR10_LOG / "exciting_trajectory.csv"
-
-    require_package(calibrate(ur10_model, path, regressor=ChainRegressor(ur10_model)), tmp_path)
+def test_the_ur10s_package_builds(ur10: tuple[Log, Calibration], tmp_path: Path):
+    require_package(ur10[1], tmp_path)
 
 
 def test_a_model_that_was_not_calibrated_is_said(arm, log: Log):
