@@ -231,6 +231,7 @@ MACHINE = re.compile(
 """What only machines, and compilers that are told of one, are called by."""
 
 MAY_NAME_MACHINES = {
+    "adapters/casadi.c.jinja": "a comment: how to compile the file by hand",
     "report/bench_method.html.jinja": "how instructions are counted, for readers",
     "trig/preamble.jinja": "constraints of inline assembly: how GCC is told that a value is in a register",
 }

@@ -8,13 +8,18 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import psdmc
+from psdmc import compiler
 from psdmc.errors import InputError, ToolchainError
+from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.kernel import Kernel
+from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS, NATIVE
 from psdmc.target.presets import AARCH64, CORTEX_M4F, CORTEX_M7, SCALAR, X86_64_V3, preset
 from psdmc.target.target import Target
@@ -111,6 +116,23 @@ def test_targets_share_lowerings_where_their_costs_are_equal(
 
     assert made == [1, 1, 2, 3, 3]
     assert preset("x86-64-v4").costs == COSTS
+
+
+def test_lowering_is_given_the_targets_costs(
+    two_link: DynamicsModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
+    given: list[Costs] = []
+
+    def recorded(*arguments: Any, costs: Costs = COSTS) -> dict[str, Kernel]:
+        given.append(costs)
+        return lower(*arguments, costs=costs)
+
+    monkeypatch.setattr(compiler, "lower", recorded)
+    for name in ("native", "cortex-m4f"):
+        psdmc.emit_c(two_link, tmp_path / name, functions=["gravity"], target=name)
+
+    assert given == [COSTS, CORTEX_M4F.costs]
 
 
 @pytest.mark.parametrize("target", [SCALAR, X86_64_V3], ids=lambda target: target.name)
