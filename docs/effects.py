@@ -5,6 +5,7 @@ python docs/effects.py choices [ROBOT ...]    mul + add of inverse dynamics, cho
 python docs/effects.py passes [ROBOT ...]     operations per function with all passes, and with one left out
 python docs/effects.py orders [ROBOT ...]     longest dependency chain and values alive, with and without the last passes
 python docs/effects.py derivatives [ROBOT ...]  mul + add of derivatives by recursion and by differentiating programs
+python docs/effects.py directions [ROBOT ...]  mul + add of gradients, derivatives along directions, integrator steps
 
 ROBOT is one of `psdmc.bench.cases` (KR6, LBR7, Denso, UR5, Panda, "generic 6R" ...): its geometry standing on the floor,
 with generic physical inertias.
@@ -39,6 +40,7 @@ from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.pipeline import LAST, LONGEST, ROUND, Pass, optimize
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.trace import Tracer
+from psdmc.program.turned_pairs import TurnedPairs
 from psdmc.robot.mechanism import Mechanism
 from psdmc.target.native import COSTS
 
@@ -214,11 +216,52 @@ def derivatives(robot: str) -> Iterator[Row]:
     yield "forward dynamics", [cost(kernels[names[2]].single).total]
 
 
+DIRECTIONS = (
+    "inverse_dynamics_vjp",
+    "inverse_dynamics_vjp_parameters",
+    "inverse_dynamics_jvp",
+    "forward_dynamics_vjp",
+    "forward_dynamics_vjp_parameters",
+    "forward_dynamics_jvp",
+)
+REST = (
+    "inverse_dynamics",
+    "forward_dynamics",
+    "mass_matrix_inverse",
+    "gravity_derivatives",
+    "semi_implicit_euler",
+    "semi_implicit_euler_derivatives",
+    "rk4_step",
+)
+
+
+def directions(robot: str) -> Iterator[Row]:
+    """Gradients and directional derivatives: with sines and cosines differentiated, with turned vectors as each other's
+    slopes, and that without the value; then functions that lean on the same."""
+    model = model_of(robot)
+
+    def singles(names: Sequence[str]) -> dict[str, Program]:
+        found = lower(model, "factored", names, theta_variants=False)
+        return {name: found[name].single for name in names}
+
+    programs = singles(DIRECTIONS)
+    with patch.object(TurnedPairs, "of", lambda self, index: None):
+        plain = singles(DIRECTIONS)
+    for name in DIRECTIONS:
+        value = RECIPES[name].signature.outputs[0].name
+        whole = programs[name]
+        alone = Program(whole.body, tuple(out for out in whole.outputs if out[0].vector != value))
+        yield name, [cost(plain[name]).total, cost(whole).total, operations(alone)]
+    for name, program in singles(REST).items():
+        yield name, ["", cost(program).total]
+
+
 TABLES: dict[str, Callable[[str], Iterator[Row]]] = {
     "choices": choices,
     "passes": passes,
     "orders": orders,
     "derivatives": derivatives,
+    "directions": directions,
 }
 
 

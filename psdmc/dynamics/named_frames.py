@@ -59,6 +59,46 @@ def frame_drifts(
     return found
 
 
+def frame_velocity_slopes(
+    frames: Sequence[Frame],
+    named: Sequence[NamedFrame],
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    root: Root = AT_BASE,
+) -> list[list[list[Scalar]]]:
+    """6 x n per named frame: derivatives of its velocity J qd (linear, then angular) by q, along the base's axes.
+
+    Joint j moves along the twist (v, z) of its column and carries the rates that joints from it on add. With w the angular
+    velocity of the link before it, and (u, s) what joints from j on add to the frame's velocity, its motion changes the
+    frame's by (w x v + z x u, z x s): the whole turns, and the frame's origin moves in the field of the link before.
+    """
+    found = []
+    for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
+        columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * len(frames)
+        path = path_to(frames, each.joint)
+        twists = {
+            j: ((rows[0][j], rows[1][j], rows[2][j]), (rows[3][j], rows[4][j], rows[5][j])) for j in path
+        }
+        turning = [scale(twists[j][1], qd[j]) for j in path]
+        before = dict(zip(path, _running(turning), strict=True))
+        linear, angular = ZERO, ZERO
+        for j in reversed(path):
+            along, about = twists[j]
+            linear, angular = add(linear, scale(along, qd[j])), add(angular, scale(about, qd[j]))
+            moved = add(cross(before[j], along), cross(about, linear))
+            columns[j] = (*moved, *cross(about, angular))
+        found.append([[column_j[row] for column_j in columns] for row in range(6)])
+    return found
+
+
+def _running(parts: Sequence[Vector]) -> list[Vector]:
+    """The sum of all before each."""
+    sums: list[Vector] = [ZERO]
+    for part in parts[:-1]:
+        sums.append(add(sums[-1], part))
+    return sums
+
+
 def link_wrenches(
     named: Sequence[NamedFrame], wrenches: Sequence[Sequence[Scalar]], unit: float = 1.0
 ) -> dict[int, tuple[Vector, Vector]]:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.solve import factorize, solve
-from psdmc.program.signature import QD, QDD, TAU, Positive, Q, Quantity, Signature
+from psdmc.program.signature import QD, QDD, TAU, Q, Signature
+from psdmc.recipes.accelerations import PIVOTS, accelerations
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Polynomials, Recipe
-from psdmc.recipes.torques import torques
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -18,12 +16,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The mass matrix is factorized before the bias is found: its divisions wait for each other, the recursion fills
-    the time."""
-    factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
-    bias = torques(g, g.inputs["qd"], g.still, g.base)
-    load = [tau - h for tau, h in zip(g.inputs["tau"], bias, strict=True)]
-    return {"qdd": solve(factors, load), "pivot": factors.pivots}
+    qdd, factors = accelerations(g, g.inputs["tau"])
+    return {"qdd": qdd, "pivot": factors.pivots}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -43,12 +37,7 @@ RECIPE = Recipe(
         (Q, QD, TAU),
         (QDD,),
         theta=True,
-        positive=Positive(
-            Quantity("pivot", ("nv",)),
-            which="the joint whose pivot is not positive",
-            reason="the joint at which the mass matrix is not positive definite",
-            spoilt="accelerations",
-        ),
+        positive=PIVOTS,
     ),
     "forward dynamics",
     trace,

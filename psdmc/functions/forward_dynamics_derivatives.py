@@ -10,8 +10,8 @@ import numpy as np
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inverse, solve
-from psdmc.functions import forward_dynamics
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
+from psdmc.recipes.accelerations import PIVOTS
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -79,7 +79,7 @@ RECIPE = Recipe(
         (Q, QD, TAU),
         (QDD, *(Quantity(name, ("nv", "nv")) for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))),
         theta=True,
-        positive=forward_dynamics.RECIPE.signature.positive,
+        positive=PIVOTS,
     ),
     "derivatives of forward dynamics",
     trace,

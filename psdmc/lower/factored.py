@@ -6,6 +6,7 @@ One PROGRAM per generated function. What can be chosen freely is in an Arrangeme
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +22,7 @@ from psdmc.program.program import Program, Slot
 from psdmc.program.signature import Signature, Sizes
 from psdmc.program.trace import Number, Symbol, Tracer
 from psdmc.program.trace import Outputs as Recorded
-from psdmc.recipes.recipe import Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import ByTheta, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array, Mechanism
 
 
@@ -79,14 +80,28 @@ def _recorded(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, t
     values = _carrier_values(arrangement, robot.theta_b, tracer)
     bodies, drives = bodies_from_carriers(n, arrangement.carriers, values, unit)
     scaled = in_unit(arrangement.reframed, unit)
-    return _traced(recipe, robot, scaled, inputs, bodies, drives, arrangement.choices, unit)
+
+    def by_theta() -> ByTheta:
+        symbols = _carrier_values(arrangement, None, tracer)
+        return ByTheta(
+            tracer.symbols("theta_b", arrangement.transfer.shape[1]),
+            *bodies_from_carriers(n, arrangement.carriers, symbols, unit),
+        )
+
+    return _traced(recipe, robot, scaled, inputs, bodies, drives, arrangement.choices, unit, by_theta)
 
 
 def trace_geometry(recipe: Recipe, reframed: Reframed, robot: RobotConstants) -> Program:
     """The PROGRAM of one function that needs no theta_b."""
     tracer = Tracer()
     inputs = _inputs(recipe, robot, tracer)
-    return drop_unused(tracer.finish(_traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0)))
+    return drop_unused(
+        tracer.finish(_traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, _without_bodies))
+    )
+
+
+def _without_bodies() -> ByTheta:
+    return ByTheta([], (), ())
 
 
 def _traced(
@@ -98,6 +113,7 @@ def _traced(
     drives: tuple[Scalar, ...],
     choices: Choices,
     unit: float,
+    by_theta: Callable[[], ByTheta],
 ) -> Recorded:
     ingredients = Ingredients(
         frames=reframed.frames,
@@ -115,6 +131,7 @@ def _traced(
         lift=robot.representative,
         standard=robot.chain.parameters,
         inputs=inputs,
+        by_theta=by_theta,
     )
     return _stored(recipe.signature, recipe.trace(ingredients))
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 
 from psdmc.errors import InternalError
 
-WORDS = ("n", "nq", "nv", "l", "frames")
-"""Sizes that depend on the robot: joints, length of q, length of qd, base parameters, named frames."""
+WORDS = ("n", "nq", "nv", "nx", "l", "frames")
+"""Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +23,11 @@ class Sizes:
     nv: int
     l: int
     frames: int
+
+    @property
+    def nx(self) -> int:
+        """Length of the state (q, qd)."""
+        return self.nq + self.nv
 
     @staticmethod
     def of_chain(n: int, l: int, frames: int = 1) -> Sizes:

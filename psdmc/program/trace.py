@@ -69,6 +69,13 @@ class Tracer:
             self.constants[index] = value
         return index
 
+    def arguments(self, index: int) -> tuple[int, ...]:
+        """The indices of what a step's value is computed from."""
+        op, a, b = self.steps[index]
+        if b is not None:
+            return (a, b)
+        return () if op is _LOAD or op is _CONST else (a,)
+
     def finish(self, outputs: Outputs) -> Program:
         """The PROGRAM that stores the given values; a negative one costs a negation."""
         stored = self._stored(outputs)
@@ -188,6 +195,12 @@ class Symbol:
         sine = self.tracer.record((_SIN, self.index, None))
         cosine = self.tracer.record((_COS, self.index, None))
         return Symbol(self.tracer, sine, self.negative), Symbol(self.tracer, cosine)
+
+    @property
+    def slot(self) -> Slot | None:
+        """The input that this is; None where it is computed."""
+        op, slot, _ = self.tracer.steps[self.index]
+        return slot if op is _LOAD and not self.negative else None
 
     def constant_value(self) -> float | None:
         value = self.tracer.constants.get(self.index)

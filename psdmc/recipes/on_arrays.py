@@ -88,6 +88,12 @@ class RobotOnArrays:
         by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found[:3])
         return by_q, by_qd, by_qdd
 
+    def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
+        """(k, n)"""
+        bias = self.torques(q, qd, np.zeros_like(q), self.base)
+        found = np.linalg.solve(self.mass_matrix(q), (tau - bias)[..., None])[..., 0]
+        return np.asarray(found, dtype=np.float64)
+
     def mass_matrix(self, q: Array) -> Array:
         """(k, n, n)"""
         return matrix(mass_matrix(self.frames, self.bodies, self.drives, list(q.T)), len(q))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.frames import Frame
@@ -23,6 +23,14 @@ Outputs = Mapping[str, Any]
 
 Arrays = dict[str, Array]
 """Quantity's name -> (k, ...) values at k states, trailing axes as in the signature."""
+
+
+class ByTheta(NamedTuple):
+    """l base parameters as symbols, and the bodies and drives that stand for them."""
+
+    theta_b: list[Any]
+    bodies: tuple[Body, ...]
+    drives: tuple[Scalar, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,6 +53,8 @@ class Ingredients:
     lift         (11 n, l) theta_b to standard parameters about the link frames
     standard     (n, 11) the robot's own standard parameters about the link frames, NaN where unknown
     inputs       the function's inputs by name
+    by_theta     theta_b as symbols whether it is compiled in or not, for derivatives by it: what is linear in theta_b, as
+                 torques are, has derivatives in which it does not occur
     """
 
     frames: tuple[Frame, ...]
@@ -62,6 +72,7 @@ class Ingredients:
     lift: Array
     standard: Array
     inputs: Mapping[str, list[Any]]
+    by_theta: Callable[[], ByTheta]
 
     @property
     def root(self) -> tuple[Matrix, Vector]:
@@ -108,6 +119,8 @@ class Recipe:
     matters      fields of Choices that make a difference to it
     polynomials  what the expanded lowering makes it from; None: it does not
     times_theta  its outputs times theta_b are torques and are compared so: `pinocchio` gives these torques
+    gradient     its output that is a gradient by theta_b of a number linear in it, and is compared so: times theta_b, with
+                 what `pinocchio` gives of that number
     needs        what the model must have
     default      whether it is generated where no functions are named
     benched      whether `make bench` measures it
@@ -124,6 +137,7 @@ class Recipe:
     matters: tuple[str, ...] = Choices.__slots__
     polynomials: Polynomials | None = None
     times_theta: bool = False
+    gradient: str | None = None
     needs: Needs | None = None
     default: bool = False
     benched: bool = False

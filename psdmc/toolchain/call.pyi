@@ -22,6 +22,58 @@ class ForwardKinematics(NamedTuple):
     position: Array
     rotation: Array
 
+class InverseDynamicsVjp(NamedTuple):
+    tau: Array
+    grad_q: Array
+    grad_qd: Array
+    grad_qdd: Array
+
+class InverseDynamicsVjpParameters(NamedTuple):
+    tau: Array
+    grad_q: Array
+    grad_qd: Array
+    grad_qdd: Array
+    grad_theta_b: Array
+
+class ForwardDynamicsVjp(NamedTuple):
+    qdd: Array
+    grad_q: Array
+    grad_qd: Array
+    grad_tau: Array
+
+class ForwardDynamicsVjpParameters(NamedTuple):
+    qdd: Array
+    grad_q: Array
+    grad_qd: Array
+    grad_tau: Array
+    grad_theta_b: Array
+
+class InverseDynamicsJvp(NamedTuple):
+    tau: Array
+    dtau: Array
+
+class ForwardDynamicsJvp(NamedTuple):
+    qdd: Array
+    dqdd: Array
+
+class GravityDerivatives(NamedTuple):
+    g: Array
+    dg_dq: Array
+
+class SemiImplicitEuler(NamedTuple):
+    q_next: Array
+    qd_next: Array
+
+class SemiImplicitEulerDerivatives(NamedTuple):
+    q_next: Array
+    qd_next: Array
+    A: Array
+    B: Array
+
+class Rk4Step(NamedTuple):
+    q_next: Array
+    qd_next: Array
+
 class CompiledRobot(CompiledFunctions):
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None) -> Array: ...
     def inverse_dynamics_derivatives(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, theta_b: ArrayLike | None = None) -> InverseDynamicsDerivatives: ...
@@ -42,3 +94,15 @@ class CompiledRobot(CompiledFunctions):
     def momentum(self, q: ArrayLike, qd: ArrayLike) -> Array: ...
     def inverse_dynamics_with_wrenches(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, wrenches: ArrayLike, theta_b: ArrayLike | None = None) -> Array: ...
     def com_jacobian(self, q: ArrayLike) -> Array: ...
+    def inverse_dynamics_vjp(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, cotangent: ArrayLike, theta_b: ArrayLike | None = None) -> InverseDynamicsVjp: ...
+    def inverse_dynamics_vjp_parameters(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, cotangent: ArrayLike, theta_b: ArrayLike | None = None) -> InverseDynamicsVjpParameters: ...
+    def forward_dynamics_vjp(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, cotangent: ArrayLike, theta_b: ArrayLike | None = None) -> ForwardDynamicsVjp: ...
+    def forward_dynamics_vjp_parameters(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, cotangent: ArrayLike, theta_b: ArrayLike | None = None) -> ForwardDynamicsVjpParameters: ...
+    def inverse_dynamics_jvp(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, dq: ArrayLike, dqd: ArrayLike, dqdd: ArrayLike, theta_b: ArrayLike | None = None) -> InverseDynamicsJvp: ...
+    def forward_dynamics_jvp(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dq: ArrayLike, dqd: ArrayLike, dtau: ArrayLike, theta_b: ArrayLike | None = None) -> ForwardDynamicsJvp: ...
+    def mass_matrix_inverse(self, q: ArrayLike, theta_b: ArrayLike | None = None) -> Array: ...
+    def gravity_derivatives(self, q: ArrayLike, theta_b: ArrayLike | None = None) -> GravityDerivatives: ...
+    def frame_velocity_derivatives(self, q: ArrayLike, qd: ArrayLike) -> Array: ...
+    def semi_implicit_euler(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, theta_b: ArrayLike | None = None) -> SemiImplicitEuler: ...
+    def semi_implicit_euler_derivatives(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, theta_b: ArrayLike | None = None) -> SemiImplicitEulerDerivatives: ...
+    def rk4_step(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, theta_b: ArrayLike | None = None) -> Rk4Step: ...

@@ -67,6 +67,8 @@ def _error(
     expected, found = recipe.pinocchio(robot, given), recipe.reference(arrays, given)
     if recipe.times_theta:
         found = {name: values @ theta for name, values in found.items()}
+    if recipe.gradient is not None:
+        found |= {recipe.gradient: found[recipe.gradient] @ theta}
     largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in expected.items()}
     most = max(largest.values())
     return max(

@@ -1,0 +1,56 @@
+"""Forward dynamics and its derivative along a direction (forward mode)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.dynamics.solve import solve
+from psdmc.program.signature import QD, QDD, TAU, Q, Signature
+from psdmc.recipes.accelerations import PIVOTS, accelerations
+from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along, solved, torque_slopes
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    """d qdd = M^-1 (d tau - d tau_id), tau_id the torques that inverse dynamics asks for at the same acceleration."""
+    qdd, factors = accelerations(g, g.inputs["tau"])
+    load = [given - own for given, own in zip(g.inputs[DTAU.name], torque_slopes(g, qdd), strict=True)]
+    return {"qdd": qdd, "dqdd": solve(factors, load), "pivot": factors.pivots}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    by_q, by_qd, by_qdd = robot.torque_derivatives(given["q"], given["qd"], given["qdd"])
+    load = given[DTAU.name] - along(by_q, given[DQ.name]) - along(by_qd, given[DQD.name])
+    return {"qdd": given["qdd"], "dqdd": solved(by_qdd, load)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    qdd, *blocks = robot.forward_dynamics_derivatives(given["q"], given["qd"], given["tau"])
+    by_q, by_qd, by_tau = (along(b, given[d.name]) for b, d in zip(blocks, (DQ, DQD, DTAU), strict=True))
+    return {"qdd": qdd, "dqdd": by_q + by_qd + by_tau}
+
+
+RECIPE = Recipe(
+    Signature(
+        "forward_dynamics_jvp",
+        190,
+        "qdd, and its derivative along (dq, dqd, dtau)",
+        (Q, QD, TAU, DQ, DQD, DTAU),
+        (QDD, DQDD),
+        theta=True,
+        positive=PIVOTS,
+    ),
+    "forward dynamics along a direction",
+    trace,
+    reference,
+    "computeABADerivatives",
+    pinocchio,
+    shares="inverse_dynamics",
+    needs=Needs.POSITIVE_MASS,
+)

@@ -1,0 +1,77 @@
+"""Forward dynamics and the gradient of its weighted accelerations (reverse mode)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.dynamics.solve import solve
+from psdmc.program.signature import QD, QDD, TAU, Q, Signature
+from psdmc.recipes.accelerations import PIVOTS, accelerations
+from psdmc.recipes.directions import (
+    COTANGENT,
+    GRADIENT_Q,
+    GRADIENT_QD,
+    GRADIENT_TAU,
+    solved,
+    torque_gradients,
+    weighted,
+)
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    """d qdd = M^-1 (d tau - d tau_id), tau_id the torques that inverse dynamics asks for at the same acceleration: with
+    M weights = cotangent, the gradient is that of weights . (tau - tau_id)."""
+    qdd, factors = accelerations(g, g.inputs["tau"])
+    weights = solve(factors, g.inputs[COTANGENT.name])
+    by_q, by_qd = torque_gradients(g, qdd, weights)
+    return {
+        "qdd": qdd,
+        "grad_q": [-value for value in by_q],
+        "grad_qd": [-value for value in by_qd],
+        "grad_tau": weights,
+        "pivot": factors.pivots,
+    }
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    by_q, by_qd, by_qdd = robot.torque_derivatives(given["q"], given["qd"], given["qdd"])
+    weights = solved(by_qdd, given[COTANGENT.name])
+    return {
+        "qdd": given["qdd"],
+        "grad_q": -weighted(weights, by_q),
+        "grad_qd": -weighted(weights, by_qd),
+        "grad_tau": weights,
+    }
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    qdd, *blocks = robot.forward_dynamics_derivatives(given["q"], given["qd"], given["tau"])
+    by_q, by_qd, by_tau = (weighted(given[COTANGENT.name], block) for block in blocks)
+    return {"qdd": qdd, "grad_q": by_q, "grad_qd": by_qd, "grad_tau": by_tau}
+
+
+RECIPE = Recipe(
+    Signature(
+        "forward_dynamics_vjp",
+        184,
+        "qdd, and the gradient of cotangent . qdd by q, qd and tau",
+        (Q, QD, TAU, COTANGENT),
+        (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
+        theta=True,
+        positive=PIVOTS,
+    ),
+    "gradient of forward dynamics",
+    trace,
+    reference,
+    "computeABADerivatives",
+    pinocchio,
+    shares="inverse_dynamics",
+    needs=Needs.POSITIVE_MASS,
+)

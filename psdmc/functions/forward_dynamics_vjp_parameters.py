@@ -1,0 +1,60 @@
+"""Forward dynamics and the gradient of its weighted accelerations, by theta_b too (reverse mode)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.functions import forward_dynamics_vjp
+from psdmc.program.signature import Signature
+from psdmc.recipes.base_regressor import rows_on_arrays
+from psdmc.recipes.directions import GRADIENT_THETA, parameter_gradient, weighted
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+STATE = forward_dynamics_vjp.RECIPE
+"""The same without theta_b."""
+
+
+def trace(g: Ingredients) -> Outputs:
+    found = dict(STATE.trace(g))
+    pivots = found.pop("pivot")
+    by_theta = parameter_gradient(g, found["qdd"], found["grad_tau"])
+    return {**found, GRADIENT_THETA.name: [-value for value in by_theta], "pivot": pivots}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    found = STATE.reference(robot, given)
+    rows = rows_on_arrays(robot, given["q"], given["qd"], given["qdd"])
+    return found | {GRADIENT_THETA.name: -weighted(found["grad_tau"], rows)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """The gradient by theta_b, times theta_b, is - weights . tau, the weights being the gradient by tau."""
+    found = STATE.pinocchio(robot, given)
+    return found | {GRADIENT_THETA.name: -(found["grad_tau"] * given["tau"]).sum(axis=-1)}
+
+
+RECIPE = Recipe(
+    Signature(
+        "forward_dynamics_vjp_parameters",
+        186,
+        "qdd, and the gradient of cotangent . qdd by q, qd, tau and theta_b",
+        STATE.signature.inputs,
+        (*STATE.signature.outputs, GRADIENT_THETA),
+        theta=True,
+        positive=STATE.signature.positive,
+    ),
+    "gradient of forward dynamics, by parameters too",
+    trace,
+    reference,
+    STATE.against,
+    pinocchio,
+    shares="inverse_dynamics",
+    gradient=GRADIENT_THETA.name,
+    needs=Needs.POSITIVE_MASS,
+)

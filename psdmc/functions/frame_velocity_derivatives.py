@@ -1,0 +1,62 @@
+"""Derivatives of the named frames' velocities by joint positions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.named_frames import frame_velocity_slopes
+from psdmc.program.signature import QD, Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"dv_dq": frame_velocity_slopes(g.frames, g.named, g.inputs["q"], g.inputs["qd"], g.root)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, qd = given["q"], given["qd"]
+    slopes = frame_velocity_slopes(robot.frames, robot.chain.frames, list(q.T), list(qd.T))
+    return {"dv_dq": entries(slopes, len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """Pinocchio's derivatives along the frame's own axes, turned into the base's; what turning the axes changes is added."""
+    import pinocchio as pin
+
+    def slopes(model: Any, data: Any, q: Array, qd: Array) -> Array:
+        pin.computeForwardKinematicsDerivatives(model, data, q, qd, np.zeros(model.nv))
+        found = []
+        for frame in robot.frame_ids:
+            rotation = pin.updateFramePlacement(model, data, frame).rotation
+            local = pin.getFrameVelocityDerivatives(model, data, frame, pin.LOCAL)
+            by_q, columns = (np.einsum("ij,kjl->kil", rotation, np.reshape(x, (2, 3, -1))) for x in local)
+            turned = np.cross(columns[1].T[None], (columns @ qd)[:, None]).transpose(0, 2, 1)
+            found.append((by_q + turned).reshape(6, -1))
+        return np.array(found)
+
+    return {"dv_dq": robot.each(slopes, given["q"], given["qd"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "frame_velocity_derivatives",
+        196,
+        "d (J qd) / d q: derivatives of every named frame's linear then angular velocity, base frame; those by qd are J",
+        (Q, QD),
+        (Quantity("dv_dq", ("frames", "6", "nv")),),
+        theta=False,
+    ),
+    "derivatives of frame velocities",
+    trace,
+    reference,
+    "getFrameVelocityDerivatives",
+    pinocchio,
+)

@@ -1,0 +1,59 @@
+"""Gravity's torques and their derivatives by joint positions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    """At rest: d g / d q is symmetric, the second derivatives of potential energy, so that the lower triangle is enough."""
+    still = g.still
+    found = inverse_dynamics_derivatives(
+        g.frames, g.bodies, g.drives, g.inputs["q"], still, still, g.base, g.choices
+    )
+    n = len(still)
+    slopes = [[found.by_q[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+    return {"g": found.gravity, "dg_dq": slopes}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    rest = np.zeros_like(given["q"])
+    by_q, _, _ = robot.torque_derivatives(given["q"], rest, rest)
+    return {"g": robot.torques(given["q"], rest, rest, robot.base), "dg_dq": by_q}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    slopes = robot.each(pin.computeGeneralizedGravityDerivatives, given["q"])
+    return {"g": robot.gravity(given["q"]), "dg_dq": slopes}
+
+
+RECIPE = Recipe(
+    Signature(
+        "gravity_derivatives",
+        194,
+        "g(q) and d g / d q; row i: derivatives of g[i]",
+        (Q,),
+        (Quantity("g", ("nv",)), Quantity("dg_dq", ("nv", "nv"))),
+        theta=True,
+    ),
+    "derivatives of gravity",
+    trace,
+    reference,
+    "computeGeneralizedGravityDerivatives",
+    pinocchio,
+    shares="inverse_dynamics",
+)

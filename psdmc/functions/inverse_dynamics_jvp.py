@@ -1,0 +1,63 @@
+"""Inverse dynamics and its derivative along a direction (forward mode)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.program.signature import QD, QDD, TAU, Q, Signature
+from psdmc.program.slopes import slopes
+from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.torques import torques
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+DIRECTIONS = (DQ, DQD, DQDD)
+
+
+def trace(g: Ingredients) -> Outputs:
+    q, qd, qdd = (g.inputs[name] for name in ("q", "qd", "qdd"))
+    tau = torques(g, qd, qdd, g.base)
+    tangent = [value for direction in DIRECTIONS for value in g.inputs[direction.name]]
+    return {"tau": tau, "dtau": slopes(tau, [*q, *qd, *qdd], tangent)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, qd, qdd = (given[name] for name in ("q", "qd", "qdd"))
+    return {
+        "tau": robot.torques(q, qd, qdd, robot.base),
+        "dtau": _along(robot.torque_derivatives(q, qd, qdd), given),
+    }
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    states = [given[name] for name in ("q", "qd", "qdd")]
+    blocks = robot.inverse_dynamics_derivatives(*states)
+    return {"tau": robot.inverse_dynamics(*states), "dtau": _along(blocks, given)}
+
+
+def _along(blocks: tuple[Array, ...], given: Mapping[str, Array]) -> Array:
+    by_q, by_qd, by_qdd = (along(block, given[d.name]) for block, d in zip(blocks, DIRECTIONS, strict=True))
+    return by_q + by_qd + by_qdd
+
+
+RECIPE = Recipe(
+    Signature(
+        "inverse_dynamics_jvp",
+        188,
+        "tau, and its derivative along (dq, dqd, dqdd)",
+        (Q, QD, QDD, *DIRECTIONS),
+        (TAU, DTAU),
+        theta=True,
+    ),
+    "inverse dynamics along a direction",
+    trace,
+    reference,
+    "rnea, computeRNEADerivatives",
+    pinocchio,
+    shares="inverse_dynamics",
+)

@@ -1,0 +1,55 @@
+"""Inverse dynamics and the gradient of its weighted torques, by theta_b too (reverse mode)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.functions import inverse_dynamics_vjp
+from psdmc.program.signature import Signature
+from psdmc.recipes.base_regressor import rows_on_arrays
+from psdmc.recipes.directions import COTANGENT, GRADIENT_THETA, parameter_gradient, weighted
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+STATE = inverse_dynamics_vjp.RECIPE
+"""The same without theta_b."""
+
+
+def trace(g: Ingredients) -> Outputs:
+    by_theta = parameter_gradient(g, g.inputs["qdd"], g.inputs[COTANGENT.name])
+    return {**STATE.trace(g), GRADIENT_THETA.name: by_theta}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    rows = rows_on_arrays(robot, given["q"], given["qd"], given["qdd"])
+    return STATE.reference(robot, given) | {GRADIENT_THETA.name: weighted(given[COTANGENT.name], rows)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    """The gradient by theta_b, times theta_b, is the weighted torques' sum."""
+    found = STATE.pinocchio(robot, given)
+    return found | {GRADIENT_THETA.name: (given[COTANGENT.name] * found["tau"]).sum(axis=-1)}
+
+
+RECIPE = Recipe(
+    Signature(
+        "inverse_dynamics_vjp_parameters",
+        182,
+        "tau, and the gradient of cotangent . tau by q, qd, qdd and theta_b",
+        STATE.signature.inputs,
+        (*STATE.signature.outputs, GRADIENT_THETA),
+        theta=True,
+    ),
+    "gradient of inverse dynamics, by parameters too",
+    trace,
+    reference,
+    STATE.against,
+    pinocchio,
+    shares="inverse_dynamics",
+    gradient=GRADIENT_THETA.name,
+)

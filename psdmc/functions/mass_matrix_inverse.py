@@ -1,0 +1,56 @@
+"""The inverse of the mass matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.solve import factorize, inverse
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.accelerations import PIVOTS
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
+    return {"Minv": inverse(factors), "pivot": factors.pivots}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return {"Minv": np.linalg.inv(robot.mass_matrix(given["q"])).astype(np.float64)}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    upper = np.triu(robot.each(pin.computeMinverse, given["q"]))
+    return {"Minv": upper + np.swapaxes(np.triu(upper, 1), -1, -2)}
+
+
+RECIPE = Recipe(
+    Signature(
+        "mass_matrix_inverse",
+        192,
+        "M(q)^-1, both triangles",
+        (Q,),
+        (Quantity("Minv", ("nv", "nv")),),
+        theta=True,
+        positive=PIVOTS,
+    ),
+    "inverse of the mass matrix",
+    trace,
+    reference,
+    "computeMinverse",
+    pinocchio,
+    starts="inverse_dynamics",
+    matters=("fold_double_angle",),
+    needs=Needs.POSITIVE_MASS,
+)

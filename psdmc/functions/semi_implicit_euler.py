@@ -1,0 +1,57 @@
+"""One step of semi-implicit Euler."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.program.signature import QD, TAU, Q, Signature
+from psdmc.recipes.accelerations import PIVOTS, accelerations
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    (dt,) = g.inputs[DT.name]
+    qdd, factors = accelerations(g, g.inputs["tau"])
+    rates = stepped(g.inputs["qd"], qdd, dt)
+    return {"q_next": stepped(g.inputs["q"], rates, dt), "qd_next": rates, "pivot": factors.pivots}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return _next(given, given["qdd"])
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return _next(given, robot.forward_dynamics(given["q"], given["qd"], given["tau"]))
+
+
+def _next(given: Mapping[str, Array], qdd: Array) -> Arrays:
+    dt = step_on_arrays(given)
+    rates = given["qd"] + dt * qdd
+    return {"q_next": given["q"] + dt * rates, "qd_next": rates}
+
+
+RECIPE = Recipe(
+    Signature(
+        "semi_implicit_euler",
+        200,
+        "the state after dt seconds: qd_next = qd + dt qdd, q_next = q + dt qd_next",
+        (Q, QD, TAU, DT),
+        (Q_NEXT, QD_NEXT),
+        theta=True,
+        positive=PIVOTS,
+    ),
+    "step of semi-implicit Euler",
+    trace,
+    reference,
+    "aba",
+    pinocchio,
+    starts="inverse_dynamics",
+    needs=Needs.POSITIVE_MASS,
+)

@@ -1,0 +1,75 @@
+"""One step of semi-implicit Euler and its Jacobians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
+from psdmc.program.signature import Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.steps import (
+    DT,
+    A,
+    B,
+    semi_implicit,
+    semi_implicit_on_arrays,
+    step_on_arrays,
+    stepped,
+)
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+STEP = semi_implicit_euler.RECIPE
+ACCELERATIONS = forward_dynamics_derivatives.RECIPE
+
+
+def trace(g: Ingredients) -> Outputs:
+    (dt,) = g.inputs[DT.name]
+    found = ACCELERATIONS.trace(g)
+    rates = stepped(g.inputs["qd"], found["qdd"], dt)
+    by_state, by_torque = semi_implicit(found["dqdd_dq"], found["dqdd_dqd"], found["dqdd_dtau"], dt)
+    return {
+        "q_next": stepped(g.inputs["q"], rates, dt),
+        "qd_next": rates,
+        "A": by_state,
+        "B": by_torque,
+        "pivot": found["pivot"],
+    }
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return STEP.reference(robot, given) | _jacobians(ACCELERATIONS.reference(robot, given), given)
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    return STEP.pinocchio(robot, given) | _jacobians(ACCELERATIONS.pinocchio(robot, given), given)
+
+
+def _jacobians(found: Arrays, given: Mapping[str, Array]) -> Arrays:
+    by_q, by_qd, by_tau = (found[name] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))
+    by_state, by_torque = semi_implicit_on_arrays(by_q, by_qd, by_tau, step_on_arrays(given))
+    return {"A": by_state, "B": by_torque}
+
+
+RECIPE = Recipe(
+    Signature(
+        "semi_implicit_euler_derivatives",
+        202,
+        "the state after dt seconds, and its derivatives A by (q, qd) and B by tau; rows: q_next, then qd_next",
+        STEP.signature.inputs,
+        (*STEP.signature.outputs, A, B),
+        theta=True,
+        positive=STEP.signature.positive,
+    ),
+    "Jacobians of a step of semi-implicit Euler",
+    trace,
+    reference,
+    "aba, computeABADerivatives",
+    pinocchio,
+    shares="inverse_dynamics",
+    needs=Needs.POSITIVE_MASS,
+)

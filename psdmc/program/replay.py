@@ -1,0 +1,55 @@
+"""A PROGRAM recorded again on symbols: in front of what shall be computed with its values, or on other inputs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from psdmc.errors import InternalError
+from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.trace import Number, Symbol, Tracer
+
+Value = Symbol | Number
+
+
+def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> list[Value]:
+    """What the PROGRAM puts out, in its order, with these values for its inputs; what is not given stays an input."""
+    values: list[Value] = []
+    for instr in program.body:
+        if instr.slot is not None:
+            found = given.get(instr.slot)
+            values.append(tracer.symbol(instr.slot) if found is None else found)
+        else:
+            values.append(_value(instr, values))
+    return [values[index] for _, index in program.outputs]
+
+
+def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequence[Value]) -> list[Value]:
+    """Recorded values with others in place of some inputs that they are computed from."""
+    tracer = inputs[0].tracer
+    slots = [slot for symbol in inputs if (slot := symbol.slot) is not None]
+    if len(slots) < len(inputs):
+        raise InternalError("only inputs can be replaced")
+    program = drop_unused(tracer.finish([(Slot("value", i), value) for i, value in enumerate(values)]))
+    return replayed(program, tracer, dict(zip(slots, given, strict=True)))
+
+
+def _value(instr: Instr, values: Sequence[Value]) -> Value:
+    if instr.value is not None:
+        return instr.value
+    a = values[instr.args[0]]
+    if instr.op in (Op.SIN, Op.COS):
+        return _sincos(a)[0 if instr.op is Op.SIN else 1]
+    if instr.op is Op.NEG:
+        return -a
+    b = values[instr.args[1]]
+    if instr.op is Op.ADD:
+        return a + b
+    if instr.op is Op.SUB:
+        return a - b
+    return a * b if instr.op is Op.MUL else a / b
+
+
+def _sincos(angle: Value) -> tuple[Value, Value]:
+    return angle.sincos() if isinstance(angle, Symbol) else (math.sin(angle), math.cos(angle))

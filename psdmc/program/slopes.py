@@ -1,0 +1,118 @@
+"""Derivatives of recorded values, recorded beside them: along tangents (forward mode) and as gradients (reverse mode).
+
+Griewank, Walther 2008, chapters 3 (modes) and 4 (what each costs). Derivatives are by inputs (`Tracer.symbols`): constants
+along a product become one, so that a product of a computed value may no longer show it. To differentiate at computed values,
+trace with inputs and put the values in their place afterwards (replay.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from psdmc.errors import InternalError
+from psdmc.program.program import Op
+from psdmc.program.trace import Number, Symbol, Tracer
+from psdmc.program.turned_pairs import TurnedPairs
+
+Value = Symbol | Number
+
+
+def slopes(of: Sequence[Value], by: Sequence[Symbol], along: Sequence[Value]) -> list[Value]:
+    """The derivative of each value along a tangent: sum over j of (d of[i] / d by[j]) along[j]."""
+    sources = _Sources.of(of, by)
+    if sources is None:
+        return [0.0] * len(of)
+    moved = {symbol.index: tangent for symbol, tangent in zip(by, along, strict=True)}
+    for index in range(len(sources.needed)):
+        if sources.needed[index] and index not in sources.held:
+            total: Value = 0.0
+            for argument, partial in sources.partials(index):
+                tangent = moved.get(argument, 0.0)
+                if not _is_zero(tangent):
+                    total = total + partial * tangent
+            moved[index] = total
+    return [_signed(value, moved[value.index]) if isinstance(value, Symbol) else 0.0 for value in of]
+
+
+def gradients(
+    of: Sequence[Value], weights: Sequence[Value], by: Sequence[Sequence[Symbol]]
+) -> list[list[Value]]:
+    """The derivative of sum(weights[i] of[i]) by every value, vector by vector."""
+    sources = _Sources.of(of, [symbol for vector in by for symbol in vector])
+    if sources is None:
+        return [[0.0] * len(vector) for vector in by]
+    bars: list[Value] = [0.0] * len(sources.needed)
+    for value, weight in zip(of, weights, strict=True):
+        if isinstance(value, Symbol):
+            bars[value.index] = bars[value.index] + _signed(value, weight)
+    for index in reversed(range(len(bars))):
+        if index not in sources.held and not _is_zero(bars[index]):
+            for argument, partial in sources.partials(index):
+                bars[argument] = bars[argument] + partial * bars[index]
+    return [[_at(bars, symbol.index) for symbol in vector] for vector in by]
+
+
+class _Sources:
+    """What some values are computed from, back to those that are held for inputs.
+
+    needed  for each of the tracer's values, up to the last that matters, whether they need it
+    """
+
+    def __init__(self, tracer: Tracer, roots: Sequence[int], held: Mapping[int, None]) -> None:
+        self.tracer, self.held = tracer, held
+        self.needed = [False] * (max(roots) + 1)
+        for root in roots:
+            self.needed[root] = True
+        for index in reversed(range(len(self.needed))):
+            if self.needed[index] and index not in held:
+                for argument in tracer.arguments(index):
+                    self.needed[argument] = True
+        self._pairs = TurnedPairs(tracer, self.needed)
+
+    @staticmethod
+    def of(values: Sequence[Value], by: Sequence[Symbol]) -> _Sources | None:
+        """None where all values are numbers; InternalError where `by` are not all inputs."""
+        if any(symbol.slot is None for symbol in by):
+            raise InternalError("derivatives are by inputs")
+        symbols = [value for value in values if isinstance(value, Symbol)]
+        if not symbols:
+            return None
+        held = dict.fromkeys(symbol.index for symbol in by)
+        return _Sources(symbols[0].tracer, [symbol.index for symbol in symbols], held)
+
+    def partials(self, index: int) -> Iterator[tuple[int, Value]]:
+        """(argument, derivative of value `index` by it) for each argument; the same argument may come twice."""
+        turned = self._pairs.of(index)
+        if turned is not None:
+            yield turned.angle, turned.slope
+            yield from turned.parts
+            return
+        op, a, b = self.tracer.steps[index]
+        if op in (Op.ADD, Op.SUB):
+            yield from ((a, 1.0), (b, 1.0 if op is Op.ADD else -1.0))
+        elif op is Op.MUL:
+            yield from ((a, self._value(b)), (b, self._value(a)))
+        elif op is Op.DIV:
+            reciprocal = 1.0 / self._value(b)
+            yield from ((a, reciprocal), (b, -(self._value(index) * reciprocal)))
+        elif op is Op.NEG:
+            yield a, -1.0
+        elif op is Op.SIN:
+            yield a, self._value(a).sincos()[1]
+        elif op is Op.COS:
+            yield a, -self._value(a).sincos()[0]
+
+    def _value(self, index: int) -> Symbol:
+        return Symbol(self.tracer, index)
+
+
+def _signed(symbol: Symbol, value: Value) -> Value:
+    return -value if symbol.negative else value
+
+
+def _at(values: Sequence[Value], index: int) -> Value:
+    return values[index] if index < len(values) else 0.0
+
+
+def _is_zero(value: Value) -> bool:
+    return not isinstance(value, Symbol) and value == 0

@@ -1,0 +1,30 @@
+"""Forward dynamics on a trace's ingredients: what several functions are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.solve import Factors, factorize, solve
+from psdmc.program.signature import Positive, Quantity
+from psdmc.recipes.recipe import Ingredients
+from psdmc.recipes.torques import torques
+
+PIVOTS = Positive(
+    Quantity("pivot", ("nv",)),
+    which="the joint whose pivot is not positive",
+    reason="the joint at which the mass matrix is not positive definite",
+    spoilt="accelerations",
+)
+"""What M(q) must have to be inverted."""
+
+
+def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Factors]:
+    """n accelerations M^-1 (tau - h), and the factors of M.
+
+    The mass matrix is factorized before the bias is found: its divisions wait for each other, the recursion fills the time.
+    """
+    factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
+    bias = torques(g, g.inputs["qd"], g.still, g.base)
+    return solve(factors, [given - h for given, h in zip(tau, bias, strict=True)]), factors

@@ -1,0 +1,80 @@
+"""Derivatives along a direction: tangents of inputs, cotangents of outputs, and torques differentiated by both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from psdmc.dynamics.scalar import Scalar
+from psdmc.program.replay import substituted
+from psdmc.program.signature import Quantity
+from psdmc.program.slopes import gradients, slopes
+from psdmc.recipes.recipe import Ingredients
+from psdmc.recipes.torques import torques
+from psdmc.robot.mechanism import Array
+
+COTANGENT = Quantity("cotangent", ("nv",))
+"""Weights of the outputs."""
+
+DQ, DQD, DQDD = (Quantity("dq", ("nv",)), Quantity("dqd", ("nv",)), Quantity("dqdd", ("nv",)))
+"""Directions of q, qd and qdd."""
+
+DTAU = Quantity("dtau", ("nv",))
+"""Direction of tau."""
+
+GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
+    Quantity(f"grad_{name}", ("nv",)) for name in ("q", "qd", "qdd", "tau")
+)
+GRADIENT_THETA = Quantity("grad_theta_b", ("l",))
+"""Derivatives of the weighted sum of outputs by each input."""
+
+_FREE = "free_qdd"
+"""A vector that no function has: accelerations while torques are differentiated."""
+
+
+def torque_gradients(
+    g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Gradients of the weighted torques by q and by qd, at fixed computed accelerations."""
+    q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g)
+    by_q, by_qd = gradients(torques(g, qd, free, g.base), weights, (q, qd))
+    found = substituted([*by_q, *by_qd], free, qdd)
+    return found[: len(q)], found[len(q) :]
+
+
+def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]) -> list[Scalar]:
+    """l derivatives of the weighted torques by theta_b, at fixed accelerations: Y^T weights, Y their regressor."""
+    theta_b, bodies, drives = g.by_theta()
+    loose, free = replace(g, bodies=bodies, drives=drives), _free(g)
+    (found,) = gradients(torques(loose, g.inputs["qd"], free, g.base), weights, (theta_b,))
+    return substituted(found, free, qdd)
+
+
+def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
+    """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations."""
+    q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g)
+    along = [*g.inputs[DQ.name], *g.inputs[DQD.name]]
+    return substituted(slopes(torques(g, qd, free, g.base), [*q, *qd], along), free, qdd)
+
+
+def _free(g: Ingredients) -> list[Scalar]:
+    """Accelerations as inputs: a derivative at fixed ones must not see what they are computed from."""
+    found: list[Scalar] = g.inputs["q"][0].tracer.symbols(_FREE, len(g.frames))
+    return found
+
+
+def solved(matrices: Array, right: Array) -> Array:
+    """(k, n) matrix^-1 right, state by state."""
+    return np.linalg.solve(matrices, right[..., None])[..., 0].astype(np.float64)
+
+
+def weighted(weights: Array, matrices: Array) -> Array:
+    """(k, n) weights^T matrix, state by state."""
+    return np.asarray(np.einsum("ki,kij->kj", weights, matrices))
+
+
+def along(matrices: Array, direction: Array) -> Array:
+    """(k, n) matrix direction, state by state."""
+    return np.asarray(np.einsum("kij,kj->ki", matrices, direction))
