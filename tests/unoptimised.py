@@ -11,13 +11,15 @@ from pathlib import Path
 import pytest
 
 from psdmc.emit.package import PackageView
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
 from psdmc.toolchain import compile as toolchain
 from psdmc.toolchain.compiler_command import Compiler, find_compiler
 
 
-def unoptimised_compiler() -> Compiler:
+def unoptimised_compiler(target: Target = NATIVE) -> Compiler:
     """The compiler at hand with its flags, the last of which undoes -O3; instructions stay this machine's."""
-    found = find_compiler()
+    found = find_compiler(target)
     return replace(found, flags=(*found.flags, "-O0"))
 
 

@@ -62,7 +62,7 @@ def test_compiled_without_optimisation(
     seed: int, kinds: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):
     unoptimised = replace(find_compiler(), flags=("-O0", "-fPIC"))
-    monkeypatch.setattr(toolchain, "find_compiler", lambda: unoptimised)
+    monkeypatch.setattr(toolchain, "find_compiler", lambda target: unoptimised)
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
     robot = drawn(seed, kinds)
     questions = Questions(robot, STATES)

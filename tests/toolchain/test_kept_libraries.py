@@ -73,7 +73,7 @@ def test_another_compiler_makes_one(own_cache: Path, monkeypatch: pytest.MonkeyP
     found = kept_libraries.find_compiler()
 
     def update() -> None:
-        monkeypatch.setattr(kept_libraries, "find_compiler", lambda: replace(found, version="newer"))
+        monkeypatch.setattr(kept_libraries, "find_compiler", lambda target: replace(found, version="newer"))
 
     assert calls(then=update) == 2
 
