@@ -57,7 +57,13 @@ def test_its_program_and_its_c(name: str):
     robot = subject(name)
     questions = Questions(robot)
 
-    kernels = lowered_once((robot.model.content_hash, "auto", *DEFAULT), lambda: lower(robot.model))
+    parts = (
+        robot.model.content_hash,
+        "auto",
+        repr(EmitOptions().target.costs),
+        *DEFAULT,
+    )  # as psdmc.compile's
+    kernels = lowered_once(parts, lambda: lower(robot.model))
 
     found = errors(questions, program_answers(kernels, robot.model, questions))
     found |= errors(questions, compiled_answers(compiled(name, robot.model, kernels), robot.model, questions))
