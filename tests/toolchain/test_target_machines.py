@@ -12,16 +12,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from c_warnings import EXTRA, STRICT
+from direct import write_sources
+from traced import arm_package
 
 import psdmc
 from psdmc import compiler
+from psdmc.emit.options import EmitOptions
 from psdmc.errors import InputError, ToolchainError
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS, NATIVE
-from psdmc.target.presets import AARCH64, CORTEX_M4F, CORTEX_M7, SCALAR, X86_64_V3, preset
+from psdmc.target.presets import AARCH64, CORTEX_M4F, CORTEX_M7, PRESETS, SCALAR, X86_64_V3, preset
 from psdmc.target.target import Target
 from psdmc.toolchain import compile, compiler_command
 from psdmc.toolchain.build_package import build_package
@@ -183,6 +187,29 @@ def test_a_package_builds_and_tests_itself_on_the_machine_at_hand(
     commands = run("make", "-C", tmp_path / "arm", "BUILD=by_make", "check")
     assert "0 failed" in commands
     assert (" ".join(target.flags) in commands) == (target == X86_64_V3 and X86)
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("name", [name for name in PRESETS if name != "native"])
+def test_no_targets_c_is_warned_of(name: str, compiler: str, tmp_path: Path) -> None:
+    """Without the target's flags: its vectors, too, are right for every machine."""
+    need(compiler)
+    target = preset(name)
+    options = EmitOptions(target.real, target.trig, target)
+    package = arm_package(options=options, names=["inverse_dynamics", "forward_dynamics", "regressor"])
+    write_sources(package, tmp_path)
+    for source in package.sources:
+        run(
+            compiler,
+            *STRICT,
+            *EXTRA,
+            "-O1",
+            f"-I{tmp_path}/include",
+            "-c",
+            tmp_path / source,
+            "-o",
+            tmp_path / "x.o",
+        )
 
 
 @pytest.mark.parametrize("robot", ["two_link", "kr6"])
