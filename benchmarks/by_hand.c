@@ -6,9 +6,10 @@
 
 #include <kr6/kr6.h>
 
-enum { N = kr6_DOF, STATES = 65536, PASSES = 15, BLOCK = 4096, LARGEST = kr6_DOF * kr6_BASE_PARAMETERS, RING = 128 };
+enum { N = kr6_DOF, STATES = 65536, PASSES = 15, BLOCK = 4096, SOME = 256, LARGEST = kr6_DOF * kr6_BASE_PARAMETERS, SQUARE = N * N, RING = 128 };
 
 static _Alignas(64) double q[STATES * N], qd[STATES * N], x[STATES * N], out[RING * LARGEST];
+static _Alignas(64) double by_q[SOME * SQUARE], by_qd[SOME * SQUARE], by_x[SOME * SQUARE], found[SOME * N];
 
 static double seconds(void)
 {
@@ -63,5 +64,18 @@ int main(void)
     TIME("forward_dynamics rows", BLOCK, kr6_forward_dynamics_batch(BLOCK, q + i * N, qd + i * N, x + i * N, to));
     TIME("inverse_dynamics lanes", BLOCK, kr6_inverse_dynamics_batch_soa(BLOCK, q + i * N, qd + i * N, x + i * N, to));
     TIME("forward_dynamics lanes", BLOCK, kr6_forward_dynamics_batch_soa(BLOCK, q + i * N, qd + i * N, x + i * N, to));
-    return check == 0.0;
+    /* One state: outputs go round, as above. Many: so few a call that outputs stay in L2. */
+    TIME("inverse derivatives", 1, (to = by_q + i % RING * SQUARE,
+         kr6_inverse_dynamics_derivatives(q + i * N, qd + i * N, x + i * N, to, by_qd + (to - by_q), by_x + (to - by_q))));
+    TIME("forward derivatives", 1, (to = by_q + i % RING * SQUARE,
+         kr6_forward_dynamics_derivatives(q + i * N, qd + i * N, x + i * N, found, to, by_qd + (to - by_q), by_x + (to - by_q))));
+    TIME("inverse derivatives rows", SOME, (to = out,
+         kr6_inverse_dynamics_derivatives_batch(SOME, q + i * N, qd + i * N, x + i * N, by_q, by_qd, by_x)));
+    TIME("forward derivatives rows", SOME, (to = out,
+         kr6_forward_dynamics_derivatives_batch(SOME, q + i * N, qd + i * N, x + i * N, found, by_q, by_qd, by_x)));
+    TIME("inverse derivatives lanes", SOME, (to = out,
+         kr6_inverse_dynamics_derivatives_batch_soa(SOME, q + i * N, qd + i * N, x + i * N, by_q, by_qd, by_x)));
+    TIME("forward derivatives lanes", SOME, (to = out,
+         kr6_forward_dynamics_derivatives_batch_soa(SOME, q + i * N, qd + i * N, x + i * N, found, by_q, by_qd, by_x)));
+    return check + by_q[7] + by_qd[7] + by_x[7] + found[1] == 0.0;
 }

@@ -7,9 +7,11 @@
 #include <vector>
 
 #include <pinocchio/multibody.hpp>
+#include <pinocchio/algorithm/aba-derivatives.hpp>
 #include <pinocchio/algorithm/aba.hpp>
 #include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/regressor.hpp>
+#include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
 constexpr int joints = 6, states = 65536, passes = 7;
@@ -58,5 +60,13 @@ int main() {
   report("mass_matrix (world)", [&](int i) { check += crba(model, data, q[i], Convention::WORLD)(0, 0); });
   report("mass_matrix (local)", [&](int i) { check += crba(model, data, q[i], Convention::LOCAL)(0, 0); });
   report("regressor", [&](int i) { check += computeJointTorqueRegressor(model, data, q[i], qd[i], x[i])(0, 9); });
+  report("inverse derivatives", [&](int i) {
+    computeRNEADerivatives(model, data, q[i], qd[i], x[i]);
+    check += data.dtau_dq(0, 1);
+  });
+  report("forward derivatives", [&](int i) {
+    computeABADerivatives(model, data, q[i], qd[i], x[i]);
+    check += data.ddq_dq(0, 1);
+  });
   return check == 0;
 }

@@ -88,9 +88,14 @@ def _kernel(
     if batch == single:
         return Kernel(function, theta, one, shared, lowering)
     lanes = ordered(shortened(batch), costs)[1]
-    if shared == one and score(one) <= costs.worth_two_bodies * score(lanes):
+    if shared == one and not _is_worth_two_bodies(score(one), score(lanes), theta, costs):
         lanes = shared
     return Kernel(function, theta, one, lanes, lowering)
+
+
+def _is_worth_two_bodies(shared: float, own: float, theta: bool, costs: Costs) -> bool:
+    """Whether lanes get a body of their own that costs `own`, where the one for one state costs `shared`."""
+    return shared > costs.worth_two_bodies * own and not (theta and own > costs.longest_of_two)
 
 
 class _Lowered:

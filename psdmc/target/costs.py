@@ -36,6 +36,7 @@ class Costs:
     spills_wait         whether a spilled value delays the code (one instruction after the other); other machines hide it
     crowded             lanes take the order for one state unless it keeps this much more alive
     worth_two_bodies    lanes get a body of their own where it saves them this much
+    longest_of_two      additions; with parameters at run time a longer one is not written twice: it is tens of kilobytes
     """
 
     latency: Latency
@@ -49,6 +50,7 @@ class Costs:
     spills_wait: bool
     crowded: float
     worth_two_bodies: float
+    longest_of_two: float
 
     @property
     def has_vectors(self) -> bool:
