@@ -20,7 +20,14 @@ from psdmc.toolchain.compiler_command import find_compiler
 casadi = pytest.importorskip("casadi")
 sys.path.insert(0, str(ROBOTS.parent / "trajectory_optimisation"))
 
-FUNCTIONS = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "forward_kinematics", "kinetic_energy"]
+FUNCTIONS = [
+    "inverse_dynamics",
+    "forward_dynamics",
+    "gravity",
+    "mass_matrix",
+    "forward_kinematics",
+    "kinetic_energy",
+]
 External = Callable[[str], "casadi.Function"]
 
 
@@ -87,6 +94,9 @@ def test_jacobians_are_pinocchios(scara: External, seed: int) -> None:
     forward = scara("forward_dynamics").jacobian()(*given, 0)
     for block, expected in zip(forward, robot.forward_dynamics_derivatives(*rows)[1:], strict=True):
         close(block, expected[0])
+    rest = 0 * given[0]
+    by_q = robot.inverse_dynamics_derivatives(rows[0], rest[None], rest[None])[0]
+    close(scara("gravity").jacobian()(given[0], 0), by_q[0])
 
 
 def test_entries_that_are_always_zero_are_no_nonzeros(scara: External) -> None:
@@ -109,6 +119,20 @@ def test_graphs_differentiate_through_it(scara: External) -> None:
     many = [np.column_stack(column) for column in zip(*map(state, range(50)), strict=True)]
     one_by_one = np.column_stack([np.array(f(*state(k))) for k in range(50)])
     assert np.array_equal(np.array(f.map(50, "thread", 2)(*many)), one_by_one)
+
+
+def test_reverse_mode_takes_the_gradient_function_where_it_is_emitted(tmp_path: Path) -> None:
+    f = external("scara", tmp_path / "scara", ["forward_dynamics", "forward_dynamics_vjp"])(
+        "forward_dynamics"
+    )
+    q, qd, x = state(4)
+    at = [casadi.MX.sym(name, 4) for name in ("q", "qd", "tau")]
+    slopes = [casadi.gradient(casadi.dot(casadi.DM([1, -2, 3, 0.5]), f(*at)), one) for one in at]
+    found = casadi.Function("slopes", at, slopes)
+    assert f.reverse(1).class_name() == "External"  # not made by CasADi from the Jacobian
+    blocks = pinocchio_of("scara").forward_dynamics_derivatives(q[None], qd[None], x[None])[1:]
+    for gradient, block in zip(found(q, qd, x), blocks, strict=True):
+        close(gradient, block[0].T @ [1, -2, 3, 0.5])
 
 
 def test_missing_inputs_are_zero_and_unwanted_outputs_are_not_written(scara: External) -> None:

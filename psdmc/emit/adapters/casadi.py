@@ -16,8 +16,9 @@ from psdmc.emit.render import render
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 
-DERIVATIVES = "_derivatives"
-"""Behind a function's name: the function that puts out d output / d input as d<output>_d<input>."""
+DERIVATIVES, GRADIENT = "_derivatives", "_vjp"
+"""Behind a function's name: the function that puts out d output / d input as d<output>_d<input>, and that which reads a
+cotangent last and puts out grad_<input>."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,7 @@ class External:
     """One external function.
 
     name     that CasADi looks for
-    inputs   all of them; the first `read` are handed to
+    inputs   all of them; those with the numbers `read` are handed to
     called   the emitted function, whose outputs start at
     starts   these places of
     work     as many reals
@@ -53,7 +54,7 @@ class External:
     inputs: tuple[Argument, ...]
     outputs: tuple[Argument, ...]
     called: str
-    read: int
+    read: tuple[int, ...]
     starts: tuple[int, ...]
     work: int
     fails: bool
@@ -78,7 +79,17 @@ class CasadiView:
 
 def needed(functions: Sequence[str]) -> list[str]:
     """Functions that give derivatives of these."""
-    return [name + DERIVATIVES for name in functions if name + DERIVATIVES in RECIPES]
+    return [name + DERIVATIVES for name in functions if _has_blocks(name)]
+
+
+def _has_blocks(name: str) -> bool:
+    """Whether a function gives all derivatives of this one."""
+    other = RECIPES.get(name + DERIVATIVES)
+    if other is None:
+        return False
+    own = RECIPES[name].signature
+    names = [output.name for output in other.signature.outputs]
+    return all(f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
 
 
 def source(robot: str, real: str, kernels: Sequence[KernelView]) -> str:
@@ -146,17 +157,30 @@ def _numbers(shape: Sequence[int], zero: frozenset[int]) -> tuple[int, ...]:
 def _externals(
     kernel: KernelView, kernels: Mapping[str, KernelView], patterns: _Patterns
 ) -> Iterable[External]:
-    """A function, and its Jacobian where the package has one."""
+    """A function, its Jacobian and its reverse mode where the package has them."""
     outputs = {output.name: output for output in kernel.outputs}
     own = [(name, name, patterns.of(output.shape)) for name, output in outputs.items()]
-    yield _external(kernel.name, kernel, _given(kernel, patterns), own, kernel)
+    yield _external("", kernel, _given(kernel, patterns), own, kernel)
     other = kernels.get(kernel.name + DERIVATIVES)
     blocks = {} if other is None else {output.name: output for output in other.outputs}
     named = {f"jac_{o}_{i.name}": f"d{o}_d{i.name}" for o in outputs for i in kernel.inputs}
     if other is not None and all(block in blocks for block in named.values()):
         unread = tuple(Argument(f"out_{o.name}", patterns.unread(o.shape)) for o in outputs.values())
         shown = [(name, block, _block(blocks[block], patterns)) for name, block in named.items()]
-        yield _external(f"jac_{kernel.name}", kernel, (*_given(kernel, patterns), *unread), shown, other)
+        yield _external("jac_", kernel, (*_given(kernel, patterns), *unread), shown, other)
+    gradient = kernels.get(kernel.name + GRADIENT)
+    if gradient is not None and len(outputs) == 1:
+        yield _reverse(kernel, gradient, patterns)
+
+
+def _reverse(kernel: KernelView, gradient: KernelView, patterns: _Patterns) -> External:
+    """One cotangent to the gradients by all inputs; those are added nowhere: CasADi does."""
+    (output,) = kernel.outputs
+    unread = Argument(f"out_{output.name}", patterns.unread(output.shape))
+    seed = Argument(f"adj_{output.name}", patterns.of(output.shape))
+    sizes = {one.name: one.shape for one in gradient.outputs}
+    shown = [(f"adj_{i.name}", f"grad_{i.name}", patterns.of(sizes[f"grad_{i.name}"])) for i in kernel.inputs]
+    return _external("adj1_", kernel, (*_given(kernel, patterns), unread, seed), shown, gradient)
 
 
 def _given(kernel: KernelView, patterns: _Patterns) -> tuple[Argument, ...]:
@@ -170,24 +194,22 @@ def _block(output: OutputView, patterns: _Patterns) -> str:
 
 
 def _external(
-    name: str,
+    prefix: str,
     kernel: KernelView,
     inputs: tuple[Argument, ...],
     shown: Sequence[tuple[str, str, str]],
     called: KernelView,
 ) -> External:
-    """shown: name for CasADi, name among the called kernel's outputs, pattern."""
+    """prefix: of CasADi's name; shown: name for CasADi, name among the called kernel's outputs, pattern."""
     starts = _starts(called.outputs)
-    robot_function = called.prototypes["single"].symbol
-    prefix = robot_function.removesuffix(called.name)
-    own = name.removeprefix("jac_")
-    full = f"jac_{prefix}{own}" if name != own else f"{prefix}{own}"
+    count = len(kernel.inputs)
+    last = (len(inputs) - 1,) if len(called.inputs) > count else ()
     return External(
-        name=full,
+        name=prefix + kernel.prototypes["single"].symbol,
         inputs=inputs,
         outputs=tuple(Argument(label, pattern, starts[output]) for label, output, pattern in shown),
-        called=robot_function,
-        read=len(kernel.inputs),
+        called=called.prototypes["single"].symbol,
+        read=(*range(count), *last),
         starts=tuple(starts.values()),
         work=sum(output.size for output in called.outputs),
         fails=called.positive is not None,
