@@ -87,7 +87,7 @@ FAULTS = {
         ("TSan, gcc -O1, widest vectors",),
     ),
     "spoils the row behind one that fails": (
-        "src/spoil.h",
+        "src/pivots.h",
         "spoil(width, rows + lane * width)",
         "spoil(width, rows + (lane + 1) * width)",
         odd,
