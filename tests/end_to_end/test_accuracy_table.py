@@ -28,9 +28,9 @@ from psdmc.toolchain.kept_kernels import lowered_once
 FEW = 100
 """States at which generic robots' other functions are evaluated from E and P: theirs are the largest."""
 
-UNOPTIMISED = ("generic 6R", "generic 7R", "denso_floor", "scara_zeros", "two_link", "UR10")
-"""Robots whose C is compiled without optimisation: of the others' structure (another base, other zeros, other lengths), or
-oblique, whose C is long."""
+UNOPTIMISED = ("denso_floor", "scara_zeros", "two_link", "UR10")
+"""Robots whose C is compiled without optimisation: others have their structure (another base, other zeros, other
+lengths)."""
 
 
 def told(label: str, found: dict[str, float]) -> dict[str, float]:
