@@ -36,9 +36,9 @@ def disagreement(runner: Runner, states: States) -> float:
 
 
 def relative_error(found: Array, expected: Array) -> float:
-    """Infinite where anything is not a number."""
+    """Infinite where anything is not a number; absolute where all that is expected is zero."""
     largest = np.max(np.abs(expected), axis=0)
-    error = np.abs(found - expected) / np.maximum(largest, SMALL * np.max(largest))
+    error = np.abs(found - expected) / np.maximum(largest, SMALL * np.max(largest) or 1.0)
     return float(np.max(error)) if np.isfinite(error).all() else float("inf")
 
 

@@ -64,6 +64,12 @@ def test_what_is_no_number_is_infinitely_wrong(bad):
     assert relative_error(np.array([[bad, 1.0]]), np.array([[1.0, 1.0]])) == np.inf
 
 
+def test_a_block_that_is_zero_throughout_is_no_division_by_zero():
+    """A SCARA's gravity has no slopes."""
+    assert relative_error(np.zeros((3, 4)), np.zeros((3, 4))) == 0.0
+    assert relative_error(np.full((3, 4), 1e-3), np.zeros((3, 4))) == 1e-3
+
+
 def test_an_output_that_is_always_zero_is_compared_on_the_others_scale():
     expected = np.array([[0.0, 100.0]])
 
