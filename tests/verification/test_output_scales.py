@@ -16,6 +16,7 @@ def error_of(found: dict[str, float], expected: dict[str, float]) -> float:
         pinocchio=lambda robot, given: {name: np.array(value) for name, value in expected.items()},
         reference=lambda robot, given: {name: np.array(value) for name, value in found.items()},
         times_theta=False,
+        gradient=None,
     )
     return _error(recipe, None, None, {}, np.zeros(0), 1e-9)
 
