@@ -57,6 +57,19 @@ def turned(body: Body, turn: Turn | None, double: Turn | None = None) -> Body:
     return Body(body.mass, turn.inward(body.moment), (xx - moved, yy + moved, zz, xy, xz, yz))
 
 
+def spun(body: Body, turn: Turn | None) -> Body:
+    """The same as `turned`, its products nested: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes c t - xy. Four
+    operations fewer, of which one must wait for another."""
+    if turn is None:
+        return body
+    xx, yy, zz, xy, xz, yz = body.second
+    slope = turn.sine * (xx - yy) + turn.cosine * (xy + xy)
+    moved = turn.sine * slope
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    second = (xx - moved, yy + moved, zz, turn.cosine * slope - xy, xz, yz)
+    return Body(body.mass, turn.inward(body.moment), second)
+
+
 def in_previous(frame: Frame, body: Body) -> Body:
     """A body about a frame before its turn, along the axes of its parent's (origin unmoved)."""
     if frame.is_parallel:

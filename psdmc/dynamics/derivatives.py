@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from psdmc.dynamics.body import Body, turned
+from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.frames import BASE, Frame, Turn, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.joint_wrenches import torque_row, wrenches_of_motion
@@ -126,8 +126,9 @@ def _composites(
 def _leaf(frame: Frame, body: Body, q: Scalar, turn: Turn | None, step: Step, choices: Choices) -> Body:
     """A body that carries no other, in its joint's orientation."""
     angle = joint_angle(frame, q)
-    body = turned(body, turn, (angle + angle).turn() if choices.fold_double_angle else None)
-    return turned(body, step.turn) if step.joins else body
+    double = (angle + angle).turn() if choices.fold_double_angle else None
+    body = spun(body, turn) if double is None else turned(body, turn, double)
+    return spun(body, step.turn) if step.joins else body
 
 
 def _fill_row(

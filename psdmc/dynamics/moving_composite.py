@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
+from psdmc.dynamics.body import Body, in_previous, joined, shifted, spun
 from psdmc.dynamics.frames import Frame, Turn, to_previous
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, scale, transpose
 from psdmc.robot.joints import JointType
@@ -75,18 +75,16 @@ def before_turn(composite: Composite, turn: Turn | None) -> Composite:
     if turn is None:
         return composite
     force, moment = (turn.inward(v) for v in composite.wrench)
-    return Composite(turned(composite.body, turn), _turned(composite.momenta, turn), (force, moment))
+    return Composite(spun(composite.body, turn), _turned(composite.momenta, turn), (force, moment))
 
 
 def _turned(momenta: Momenta, turn: Turn) -> Momenta:
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = momenta.second
-    square, product = turn.sine * turn.sine, turn.sine * turn.cosine
-    difference, total = xx - yy, xy + yx
-    moved = square * difference + product * total
-    crossed = product * difference - square * total
+    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
+    moved, crossed = turn.sine * slope, turn.cosine * slope
     xz, yz, _ = turn.inward((xz, yz, 0.0))
     zx, zy, _ = turn.inward((zx, zy, 0.0))
-    second = ((xx - moved, xy + crossed, xz), (yx + crossed, yy + moved, yz), (zx, zy, zz))
+    second = ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
     return Momenta(second, turn.inward(momenta.first))
 
 
