@@ -255,8 +255,9 @@ def _vector(quantity: Quantity, sizes: Sizes) -> VectorView:
 
 
 def _shape(function: Signature, sizes: Sizes) -> str:
-    told = [q for q in function.inputs if len(q.axes) != 1] + list(function.outputs)
-    return "; ".join(f"{q.name} is {_lengths(sizes.shape(q.axes))}" for q in told)
+    numbers = [f"{q.name} is a number" for q in function.inputs if not q.axes]
+    told = [q for q in function.inputs if len(q.axes) > 1] + list(function.outputs)
+    return "; ".join([*numbers, *(f"{q.name} is {_lengths(sizes.shape(q.axes))}" for q in told)])
 
 
 def _lengths(shape: tuple[int, ...]) -> str:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from against_pinocchio import INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 
+from psdmc.emit.package import package_files
+
 
 @pytest.mark.parametrize(("robot", "real"), SEVERAL)
 def test_it_is_pinocchios(robot: str, real: str) -> None:
@@ -25,6 +27,11 @@ def test_the_step_may_be_one_number_for_all_states() -> None:
         found, own.robot.semi_implicit_euler(*states, np.full(len(states[0]), 0.002)), strict=True
     ):
         assert np.array_equal(one, other)
+
+
+def test_the_header_says_that_the_step_is_a_number() -> None:
+    header = package_files(bench("sliding").package)["include/robot/robot.h"]
+    assert "q_next = q + dt qd_next; dt is a number; q_next is 4; qd_next is 4 */" in header
 
 
 def test_energy_without_torques_stays_but_for_the_steps_length() -> None:
