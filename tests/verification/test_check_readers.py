@@ -29,6 +29,7 @@ OF_THE_TIP = (
     "forward kinematics",
     "frame Jacobian",
     "frame drift",
+    "derivatives of frame velocities",
     "inverse dynamics with wrenches",
 )
 """Functions that a frame's place matters to."""
