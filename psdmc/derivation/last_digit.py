@@ -90,12 +90,15 @@ def _numbers(
 
 
 def _changed(numbers: Numbers, rng: np.random.Generator) -> Numbers:
-    """Every number by STEP up or down. Zeros stay, but those of rotations: they are cosines of right angles."""
+    """Every number by STEP up or down. Zeros stay, but those of rotations: they are cosines of right angles. Where nothing is
+    turned nothing was rounded: such frames stay parallel."""
 
     def scaled(values: Long) -> Long:
         return np.asarray(values * (1.0 + STEP * rng.choice([-1.0, 1.0], values.shape)))
 
     def turned(rotation: Long) -> Long:
+        if np.array_equal(rotation, np.eye(3)):
+            return rotation
         a, b, c = STEP * rng.choice([-1.0, 1.0], 3)
         return np.asarray(rotation + times(np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]]), rotation))
 
