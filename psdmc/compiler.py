@@ -148,7 +148,9 @@ def compile(
 ) -> CompiledRobot:
     """The model's functions, compiled for this machine and callable on NumPy arrays; cached by content.
 
-    Options as those of `emit_c`. InputError for a target that has no functions for many states, which Python calls;
+    functions  by name, and no others; None: the default set at once, any other when it is first called
+
+    Other options as those of `emit_c`. InputError for a target that has no functions for many states, which Python calls;
     ToolchainError for one that the compiler or this machine's CPU is not.
     """
     options = _options(lowering, real, trig, target)
@@ -165,7 +167,11 @@ def compile(
         return package
 
     parts = (model.content_hash, lowering, options.real, options.trig, *wanted(functions))
-    return CompiledRobot(*compiled_once(parts, make, machine))
+
+    def more(function: str) -> CompiledRobot:
+        return compile(model, lowering, [function], real, trig, progress, target)
+
+    return CompiledRobot(*compiled_once(parts, make, machine), more if functions is None else None)
 
 
 def _package(

@@ -90,8 +90,8 @@ def _numbers(
 
 
 def _changed(numbers: Numbers, rng: np.random.Generator) -> Numbers:
-    """Every number by STEP up or down. Zeros stay, but those of rotations: they are cosines of right angles. Where nothing is
-    turned nothing was rounded: such frames stay parallel."""
+    """Every number by STEP up or down. Zeros stay, but those of rotations: they are cosines of right angles. A frame that is
+    not turned at all stays parallel: nothing was rounded."""
 
     def scaled(values: Long) -> Long:
         return np.asarray(values * (1.0 + STEP * rng.choice([-1.0, 1.0], values.shape)))

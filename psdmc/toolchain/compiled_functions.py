@@ -23,9 +23,15 @@ Array = NDArray[Any]
 
 
 class CompiledFunctions:
-    """The library of a compiled package, called by a function's signature."""
+    """The library of a compiled package, called by a function's signature.
 
-    def __init__(self, interface: Interface, library: Path) -> None:
+    more  compiles one function that the package does not have, by name, when it is first called; None: such a call is an
+          error
+    """
+
+    def __init__(
+        self, interface: Interface, library: Path, more: Callable[[str], CompiledFunctions] | None = None
+    ) -> None:
         self._ffi = cffi.FFI()
         self._ffi.cdef(interface.cdef)
         self._library = _opened(self._ffi, library, interface.robot)
@@ -37,6 +43,8 @@ class CompiledFunctions:
         self.joint_names = interface.joint_names
         self.frame_names = interface.frame_names
         self.library = library
+        self._more = more
+        self._others: list[CompiledFunctions] = []  # whose libraries stay open as long as this one's
 
     def call(self, function: Signature, inputs: Sequence[ArrayLike], theta_b: ArrayLike | None = None) -> Any:
         """The output, or a named tuple of the outputs, of a function at these states."""
@@ -51,11 +59,16 @@ class CompiledFunctions:
         return outs[0] if len(outs) == 1 else results(function)(*outs)
 
     def _kernel(self, name: str) -> _Kernel:
-        try:
-            return self._kernels[name]
-        except KeyError:
+        found = self._kernels.get(name)
+        if found is None and self._more is not None:
+            other = self._more(name.removesuffix("_theta"))
+            self._others.append(other)
+            self._kernels = other._kernels | self._kernels
+            found = self._kernels.get(name)
+        if found is None:
             compiled = ", ".join(self._kernels)
-            raise InputError(f"{self._robot}: {name} was not compiled", f"compiled are {compiled}") from None
+            raise InputError(f"{self._robot}: {name} was not compiled", f"compiled are {compiled}")
+        return found
 
     def _states(self, name: str, quantity: Quantity, values: ArrayLike) -> Array:
         array = np.asarray(values, self._dtype)
