@@ -59,4 +59,5 @@ RECIPE = Recipe(
     reference,
     "getFrameVelocityDerivatives",
     pinocchio,
+    beside="frame_jacobian",
 )

@@ -121,6 +121,7 @@ class Recipe:
     times_theta  its outputs times theta_b are torques and are compared so: `pinocchio` gives these torques
     gradient     its output that is a gradient by theta_b of a number linear in it, and is compared so: times theta_b, with
                  what `pinocchio` gives of that number
+    beside       name of the function whose values this one's are differences of: what is rounding beside them is rounding
     needs        what the model must have
     default      whether it is generated where no functions are named
     benched      whether `make bench` measures it
@@ -138,6 +139,7 @@ class Recipe:
     polynomials: Polynomials | None = None
     times_theta: bool = False
     gradient: str | None = None
+    beside: str | None = None
     needs: Needs | None = None
     default: bool = False
     benched: bool = False

@@ -70,11 +70,19 @@ def _error(
     if recipe.gradient is not None:
         found |= {recipe.gradient: found[recipe.gradient] @ theta}
     largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in expected.items()}
-    most = max(largest.values())
+    most = max(*largest.values(), _most_beside(recipe, robot, given))
     return max(
         float(np.abs(found[name] - values).max(initial=0.0)) / max(_scale(largest[name], most), least)
         for name, values in expected.items()
     )
+
+
+def _most_beside(recipe: Recipe, robot: Reference, given: Mapping[str, Array]) -> float:
+    """The largest value of the function that this one stands beside; zero where there is none."""
+    if recipe.beside is None:
+        return 0.0
+    values = RECIPES[recipe.beside].pinocchio(robot, given).values()
+    return max(float(np.abs(value).max(initial=0.0)) for value in values)
 
 
 def _scale(largest: float, most: float) -> float:

@@ -17,6 +17,7 @@ def error_of(found: dict[str, float], expected: dict[str, float]) -> float:
         reference=lambda robot, given: {name: np.array(value) for name, value in found.items()},
         times_theta=False,
         gradient=None,
+        beside=None,
     )
     return _error(recipe, None, None, {}, np.zeros(0), 1e-9)
 
