@@ -67,4 +67,5 @@ RECIPE = Recipe(
     "jacobianCenterOfMass",
     pinocchio,
     needs=Needs.STANDARD,
+    beside="jacobian",
 )

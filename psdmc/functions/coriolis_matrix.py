@@ -57,4 +57,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     default=True,
+    beside="mass_matrix",
 )

@@ -56,4 +56,5 @@ RECIPE = Recipe(
     "computeGeneralizedGravityDerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    beside="inverse_dynamics",
 )

@@ -53,4 +53,5 @@ RECIPE = Recipe(
     reference,
     "getFrameClassicalAcceleration",
     pinocchio,
+    beside="frame_jacobian",
 )

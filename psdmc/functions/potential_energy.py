@@ -53,4 +53,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     matters=(),
+    beside="kinetic_energy",
 )

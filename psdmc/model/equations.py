@@ -23,6 +23,9 @@ RECOGNITION = 1e-9
 DIGITS = 6
 """Significant digits of the coefficients that have no name."""
 
+SHORTEST = 1e-100
+"""m; shorter ones have no name in equations: their squares would leave the range of doubles."""
+
 _UNITS = ("kg", "kg m", "kg m^2")
 _LENGTH_ORDER = (0, 1, 1, 1, 2, 2, 2, 2, 2, 2)
 
@@ -107,7 +110,7 @@ def _unit(index: int, chain: Mechanism) -> str:
 
 def _known_numbers(lengths: dict[str, float]) -> Iterator[_Known]:
     """Named coefficients, simplest first; `before` and `after` go around the parameter's name."""
-    items = list(lengths.items())
+    items = [(name, value) for name, value in lengths.items() if abs(value) > SHORTEST]
     for name, value in items:
         yield _Known(value, 1, f"{name} ", "")
         yield _Known(1.0 / value, -1, "", f"/{name}")

@@ -19,7 +19,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.load import LoadedRobot, load_robot_text
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
 from psdmc.robot.reference import Reference, pinocchio_version, reference
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
@@ -103,12 +103,7 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     theta_b). InputError where the source is another robot.
     """
     loaded = source_of(model) if source is None else source
-    if loaded.mechanism.joint_names != model.mechanism.joint_names:
-        raise InputError(
-            f"{loaded.source_name} has joints {', '.join(loaded.mechanism.joint_names)}, the model has "
-            + ", ".join(model.joint_names),
-            "give the file, base and tip that the model was derived from",
-        )
+    _require_same_robot(model, loaded)
     theta, parameters = _parameters(model, loaded)
     written = reference(loaded, snapped=False, parameters=parameters)
     snapped = bool(loaded.snap_report)
@@ -120,6 +115,23 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     if snapped:
         rows += (_snapping(model, theta, written, angles),)
     return (*rows, _against_mujoco(model, loaded, angles))
+
+
+def _require_same_robot(model: DynamicsModel, loaded: LoadedRobot) -> None:
+    found, expected = loaded.mechanism, model.mechanism
+    for what, there, here in (
+        ("joints", found.joint_names, expected.joint_names),
+        ("links", _links(found), _links(expected)),
+    ):
+        if there != here:
+            raise InputError(
+                f"{loaded.source_name} has {what} {', '.join(there)}, the model has {', '.join(here)}",
+                "give the file, base and tip that the model was derived from",
+            )
+
+
+def _links(mechanism: Mechanism) -> tuple[str, ...]:
+    return tuple(joint.link_name for joint in mechanism.joints)
 
 
 def readers(rows: Sequence[CheckRow]) -> str:

@@ -25,8 +25,8 @@ which gravity acts along no joint has no potential energy but rounding."""
 ROUNDING = 1e-12
 """An output below this share of its function's largest one is rounding: the accelerations of a single joint do not depend
 on its rate."""
-ROUNDED = 1e-6
-"""Share of its function's largest output on whose scale such an output is compared."""
+ROUNDED = 1e-4
+"""Share of that largest one on whose scale such an output is compared: to 1e-10 of it, 1e-14 of the largest."""
 
 
 def function_errors(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from bundled import bundled_model
+from bundled import bundled_model, bundled_robot
 from random_chains import random_chain
 
 from psdmc.derivation.derive import derive_model
-from psdmc.model.equations import dh_lengths, standard_name
+from psdmc.model.equations import base_parameters, dh_lengths, standard_name
 
 
 def equations(name: str) -> list[str]:
@@ -89,3 +91,12 @@ def test_the_drive_inertia_of_a_sliding_joint_is_a_mass() -> None:
 
 def test_standard_names() -> None:
     assert [standard_name(index) for index in (0, 12, 15, 32)] == ["m1", "mx2", "Ixx2", "Im3"]
+
+
+def test_lengths_whose_squares_are_no_doubles_have_no_name() -> None:
+    """A forged model file: 1e-200 m."""
+    chain = bundled_robot("two_link").chain
+    short = replace(chain.joints[0].link_frame, translation=np.array([1e-200, 0.0, -0.3]))
+    found = replace(chain, joints=(replace(chain.joints[0], link_frame=short), *chain.joints[1:]))
+    l = 11 * len(chain)
+    base_parameters(found, np.eye(l), range(l), None)

@@ -109,6 +109,38 @@ def test_another_robot_is_refused() -> None:
         check_model(bundled_model("scara"), bundled_robot("kr6"))
 
 
+def test_a_source_with_other_links_is_refused() -> None:
+    """A forged model file: its chain's links are not those of the text that it holds."""
+    model = bundled_model("scara")
+    renamed = replace(model.mechanism.joints[0], link_name="nowhere")
+    forged = replace(model, mechanism=replace(model.mechanism, joints=(renamed, *model.mechanism.joints[1:])))
+    with pytest.raises(InputError, match=r"has links .*, the model has nowhere"):
+        check_model(forged)
+
+
+OUTPUTS_OF_ROUNDING = {
+    "the Coriolis matrix of one joint": """
+convention = "modified"
+[[joint]]
+alpha = "-90 deg"
+a = 0.1
+link = { mass = 1.3, com = [0.1, 0.2, 0.3], inertia_com = { xx = 0.2, yy = 0.3, zz = 0.4, xy = 0.01, xz = 0.0, yz = 0.0 } }
+""",
+    "the drift of a tip on an oblique axis": """<robot name="pendulum"><link name="base"/><link name="arm"><inertial>
+<origin xyz="0.1 0 0.02" rpy="0.2 0 0"/><mass value="1.5"/>
+<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="0" iyz="0"/></inertial></link>
+<joint name="pivot" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="1e-3 1 0"/></joint></robot>""",
+}
+
+
+@pytest.mark.parametrize("what", OUTPUTS_OF_ROUNDING)
+def test_what_is_zero_but_for_rounding_passes(what: str) -> None:
+    text = OUTPUTS_OF_ROUNDING[what]
+    loaded = load_robot_text(text, "urdf" if text.startswith("<") else "dh")
+    rows = check_model(derive_model(loaded.mechanism, provenance=provenance(loaded)))
+    assert [row.name for row in rows if not row.passed] == []
+
+
 def test_a_model_without_source_is_refused() -> None:
     with pytest.raises(InputError, match="holds no source"):
         check_model(derive_model(random_chain(0, "R")))

