@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -44,17 +45,29 @@ def test_a_single_job_can_have_a_process_of_its_own():
     assert process != os.getpid()
 
 
-def test_ctrl_c_while_processes_start_is_heard_behind():
-    reached = []
+@pytest.mark.parametrize("threads", [0, 3])
+def test_ctrl_c_while_processes_start_is_heard_behind(threads: int):
+    """Whichever thread of this process takes it."""
+    reached, end = [], threading.Event()
+    others = [threading.Thread(target=end.wait) for _ in range(threads)]
+    for other in others:
+        other.start()
 
     def starts() -> None:
         with processes._deaf_to_interrupts():
             os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
             reached.append("the end of the block")
 
-    with pytest.raises(KeyboardInterrupt):
-        starts()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            starts()
+    finally:
+        end.set()
+        for other in others:
+            other.join()
     assert reached
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 HANGING = """
