@@ -236,6 +236,7 @@ TAKEN = {
         "WIDTH",
         "real",
         "lanes",
+        "angles",
     ),
     *("theta_b", "count", "block", "blocks", "lane", "first", "rows", "failed", "bad"),
 }

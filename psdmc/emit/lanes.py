@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.store_groups import GROUP
@@ -28,6 +28,14 @@ class VectorWidth:
     lanes: int
     unit: VectorUnit
     integer: str
+
+    @property
+    def angles(self) -> VectorWidth:
+        """The vectors that take one state's angles where these are the widest."""
+        narrower = self.unit.narrower
+        if narrower is None:
+            return self
+        return replace(self, lanes=self.lanes * narrower.unit.bytes // self.unit.bytes, unit=narrower.unit)
 
     @property
     def stages(self) -> tuple[TransposeStage, ...]:

@@ -98,11 +98,10 @@ class PackageView:
 
     @property
     def trig_vectors(self) -> tuple[VectorTrig, ...]:
-        """The inline sincos for each vector width that internal.h may choose."""
-        return tuple(
-            vector_trig(self.robot, self.real, width.unit, self.options.far, vec="lanes", ivec="lane_bits")
-            for width in self.widths
-        )
+        """The inline sincos for each vector width that vectors.h may choose, for lanes or for one state's angles."""
+        units = dict.fromkeys(width.unit for width in self.widths)
+        units |= dict.fromkeys(width.angles.unit for width in self.widths)
+        return tuple(vector_trig(self.robot, self.real, unit, self.options.far) for unit in units)
 
     @property
     def widths(self) -> tuple[VectorWidth, ...]:

@@ -28,16 +28,30 @@ class SignMask:
 
 
 @dataclass(frozen=True, slots=True)
+class Narrower:
+    """Registers for the sines of one state, where wide ones slow the scalar code around them.
+
+    unit    the narrower registers
+    unless  C condition: processors that wide ones do not slow
+    """
+
+    unit: VectorUnit
+    unless: str
+
+
+@dataclass(frozen=True, slots=True)
 class VectorUnit:
     """Registers of `bytes`.
 
     macro      which compilers predefine where there are such registers; a target's narrowest unit needs none
     sign_mask  None: signs are gathered lane by lane
+    narrower   for sines within scalar code; None: this unit
     """
 
     bytes: int
     macro: str = ""
     sign_mask: SignMask | None = None
+    narrower: Narrower | None = None
 
     def __post_init__(self) -> None:
         if self.bytes not in (16, 32, 64):
@@ -54,7 +68,10 @@ AVX512 = VectorUnit(
     64,
     "__AVX512F__",
     SignMask("__AVX512DQ__", "__builtin_ia32_cvtq2mask512", "__builtin_ia32_cvtd2mask512", "integer"),
+    Narrower(AVX, unless="defined(__znver3__) || defined(__znver4__) || defined(__znver5__)"),
 )
+"""Intel's cores close one of their two ports for scalar arithmetic while instructions of 64 bytes wait; AMD's do not.
+Compilers that do not know an AMD processor with AVX-512 yet take it for Zen 3."""
 NEON = VectorUnit(16, "__ARM_NEON")
 
 WIDEST_FIRST = (AVX512, AVX, SSE2)

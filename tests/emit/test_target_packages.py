@@ -60,6 +60,14 @@ def test_each_width_is_in_the_package_of_its_machine_alone() -> None:
     assert widths["scalar"] == widths["cortex-m4f"] == widths["cortex-m7"] == set()
 
 
+@pytest.mark.parametrize(("name", "narrower"), [("native", True), ("x86-64-v4", True), ("x86-64-v3", False)])
+def test_one_states_angles_may_have_narrower_vectors_than_lanes(name: str, narrower: bool) -> None:
+    made = files(preset(name))
+    assert ("#define ANGLE_WIDTH 4\n" in made["src/vectors.h"]) == narrower
+    assert "#define ANGLE_WIDTH WIDTH\n" in made["src/vectors.h"]
+    assert "pendulum_sincos_near_f64x4(" in made["src/sincos.h"]
+
+
 @pytest.mark.parametrize("name", ["scalar", "cortex-m4f", "cortex-m7"])
 def test_without_vectors_no_vector_code_is_left(name: str) -> None:
     sources = "".join(text for path, text in files(preset(name)).items() if path.startswith("src/"))

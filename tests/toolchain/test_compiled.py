@@ -16,12 +16,14 @@ KERNELS = arm_kernels()
 TOLERANCE = {"float64": 1e-12, "float32": 2e-4}
 VECTOR_FLAGS = {
     "widest": ["-march=native"],
+    "widest on AMD": ["-march=native", "-D__znver3__"],
     "avx2": ["-mavx2", "-mfma"],
     "sse2": [],
     "plain": ["-Dtest_arm_NO_VECTORS"],
 }
 BUILDS = [
     ("float64", "inline", "widest"),
+    ("float64", "inline", "widest on AMD"),
     ("float64", "inline", "avx2"),
     ("float64", "inline", "sse2"),
     ("float64", "inline", "plain"),

@@ -13,12 +13,22 @@
 #define WIDTH 2
 #endif
 
-/* lanes: one real per lane. lanes_at: the same at any address of a real. LANES_FROM(count, at): up to WIDTH reals,
-   the rest zero, as an initialiser: filled lane by lane, a vector would pass through memory and stall. */
+/* ANGLE_WIDTH: reals in a vector of one state's angles, narrower where wide ones slow the scalar code around them. */
+#if WIDTH == 8 && !(defined(__znver3__) || defined(__znver4__) || defined(__znver5__))
+#define ANGLE_WIDTH 4
+#else
+#define ANGLE_WIDTH WIDTH
+#endif
+
+/* lanes: one real per lane. lanes_at: the same at any address of a real. angles: several of one state's.
+   LANES_FROM(count, at), ANGLES_FROM: up to as many reals as the vector has, the rest zero, as an initialiser: filled
+   one by one, a vector would pass through memory and stall. */
 #if WIDTH > 1
 typedef real lanes __attribute__((vector_size(WIDTH * sizeof(real))));
 typedef real lanes_at __attribute__((vector_size(WIDTH * sizeof(real)), aligned(sizeof(real)), may_alias));
 typedef long long lane_bits __attribute__((vector_size(WIDTH * sizeof(real))));
+typedef real angles __attribute__((vector_size(ANGLE_WIDTH * sizeof(real))));
+typedef long long angle_bits __attribute__((vector_size(ANGLE_WIDTH * sizeof(real))));
 #define ALIGNED __attribute__((aligned(64)))
 #define UNROLL _Pragma("GCC unroll 16")
 #if defined(__clang__) || __GNUC__ >= 12
@@ -33,8 +43,8 @@ typedef real lanes_at;
 #define LANES_FROM(count, at) ((at)[0])
 #endif
 
-#if WIDTH == 8
-#define LANES_FROM(count, at) { \
+#if WIDTH == 8 || ANGLE_WIDTH == 8
+#define FROM_8(count, at) { \
     0 < (count) ? (at)[0] : 0, \
     1 < (count) ? (at)[1] : 0, \
     2 < (count) ? (at)[2] : 0, \
@@ -43,7 +53,41 @@ typedef real lanes_at;
     5 < (count) ? (at)[5] : 0, \
     6 < (count) ? (at)[6] : 0, \
     7 < (count) ? (at)[7] : 0 }
+#endif
+#if WIDTH == 8
+#define LANES_FROM FROM_8
+#endif
+#if ANGLE_WIDTH == 8
+#define ANGLES_FROM FROM_8
+#endif
 
+#if WIDTH == 4 || ANGLE_WIDTH == 4
+#define FROM_4(count, at) { \
+    0 < (count) ? (at)[0] : 0, \
+    1 < (count) ? (at)[1] : 0, \
+    2 < (count) ? (at)[2] : 0, \
+    3 < (count) ? (at)[3] : 0 }
+#endif
+#if WIDTH == 4
+#define LANES_FROM FROM_4
+#endif
+#if ANGLE_WIDTH == 4
+#define ANGLES_FROM FROM_4
+#endif
+
+#if WIDTH == 2 || ANGLE_WIDTH == 2
+#define FROM_2(count, at) { \
+    0 < (count) ? (at)[0] : 0, \
+    1 < (count) ? (at)[1] : 0 }
+#endif
+#if WIDTH == 2
+#define LANES_FROM FROM_2
+#endif
+#if ANGLE_WIDTH == 2
+#define ANGLES_FROM FROM_2
+#endif
+
+#if WIDTH == 8
 /* WIDTH vectors of WIDTH lanes: vector i, lane k becomes vector k, lane i. transpose_pieces: the same in each square
    of 4 vectors and as many neighbouring lanes. */
 static inline void transpose(lanes *vector)
@@ -96,12 +140,6 @@ static inline void transpose_pieces(lanes *vector)
 #endif
 
 #if WIDTH == 4
-#define LANES_FROM(count, at) { \
-    0 < (count) ? (at)[0] : 0, \
-    1 < (count) ? (at)[1] : 0, \
-    2 < (count) ? (at)[2] : 0, \
-    3 < (count) ? (at)[3] : 0 }
-
 /* WIDTH vectors of WIDTH lanes: vector i, lane k becomes vector k, lane i. transpose_pieces: the same in each square
    of 4 vectors and as many neighbouring lanes. */
 static inline void transpose(lanes *vector)
@@ -146,10 +184,6 @@ static inline void transpose_pieces(lanes *vector)
 #endif
 
 #if WIDTH == 2
-#define LANES_FROM(count, at) { \
-    0 < (count) ? (at)[0] : 0, \
-    1 < (count) ? (at)[1] : 0 }
-
 /* WIDTH vectors of WIDTH lanes: vector i, lane k becomes vector k, lane i. transpose_pieces: the same in each square
    of 2 vectors and as many neighbouring lanes. */
 static inline void transpose(lanes *vector)
