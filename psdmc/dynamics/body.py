@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.frames import Frame, Turn, to_previous
-from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, multiply, transpose
+from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, rotated_tensor
 
 
 class Body(NamedTuple):
@@ -84,7 +84,7 @@ def in_previous(frame: Frame, body: Body) -> Body:
         xy, xz, _ = Turn(sine, cosine).inward((xy, xz, 0.0))
         return Body(body.mass, moment, (xx, yy - moved, zz + moved, xy, xz, yz))
     second: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    s = multiply(multiply(frame.rotation, second), transpose(frame.rotation))
+    s = rotated_tensor(frame.inward_rows, second)
     return Body(body.mass, moment, (s[0][0], s[1][1], s[2][2], s[0][1], s[0][2], s[1][2]))
 
 

@@ -9,10 +9,10 @@ and cosine exactly and cost nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from psdmc.dynamics.scalar import Matrix, Scalar, Vector, sincos, transform, transpose
+from psdmc.dynamics.scalar import Fixed, Matrix, Scalar, Vector, fixed, rotated, sincos, transpose
 from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import BASE as BASE
 from psdmc.robot.mechanism import Mechanism, Placement
@@ -29,6 +29,9 @@ class Frame:
     translation  m, origin of this frame at q = 0 in the parent's
     offset       rad, turn about z at q = 0, beside
     quarters     whole quarter turns, 0 to 3
+
+    Made of these: whether its axis has the direction of the joint's that it hangs on (`is_parallel`), and the rotation and
+    its transpose without their zeros (`inward_rows`, `outward_rows`).
     """
 
     joint: JointType
@@ -37,11 +40,14 @@ class Frame:
     translation: Vector
     offset: float = 0.0
     quarters: int = 0
+    is_parallel: bool = field(init=False, compare=False)
+    inward_rows: Fixed = field(init=False, compare=False)
+    outward_rows: Fixed = field(init=False, compare=False)
 
-    @property
-    def is_parallel(self) -> bool:
-        """Whether its axis has the direction of the joint's that it hangs on."""
-        return self.rotation == IDENTITY
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "is_parallel", self.rotation == IDENTITY)
+        object.__setattr__(self, "inward_rows", fixed(self.rotation))
+        object.__setattr__(self, "outward_rows", fixed(transpose(self.rotation)))
 
 
 class Angle(NamedTuple):
@@ -160,8 +166,8 @@ def joint_offset(frame: Frame, q: Scalar) -> Vector:
 
 def to_previous(frame: Frame, v: Vector) -> Vector:
     """Constant part of the rotation, from a frame (before its turn) into its parent's."""
-    return v if frame.is_parallel else transform(frame.rotation, v)
+    return v if frame.is_parallel else rotated(frame.inward_rows, v)
 
 
 def from_previous(frame: Frame, v: Vector) -> Vector:
-    return v if frame.is_parallel else transform(transpose(frame.rotation), v)
+    return v if frame.is_parallel else rotated(frame.outward_rows, v)

@@ -35,7 +35,7 @@ from psdmc.dynamics.frames import (
     leaves,
     outward,
 )
-from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, multiply, transform, transpose
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, rotated_tensor, transform, transpose
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +157,7 @@ def _turned_field(frame: Frame, spin: Spin) -> Spin:
     """A spin of the parent's frame in this one before its turn."""
     if frame.is_parallel:
         return spin
-    outward_rows = transpose(frame.rotation)
-    field = multiply(multiply(outward_rows, spin.field), frame.rotation)
+    field = rotated_tensor(frame.outward_rows, spin.field)
     return Spin(field, _permuted_differences(frame.rotation, spin, field))
 
 

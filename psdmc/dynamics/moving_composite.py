@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, in_previous, joined, shifted, spun
 from psdmc.dynamics.frames import Frame, Turn, to_previous
-from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, scale, transpose
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, rotated_tensor, scale
 from psdmc.robot.joints import JointType
 
 
@@ -64,7 +64,7 @@ def along_parent(frame: Frame, composite: Composite) -> Composite:
     if frame.is_parallel:
         return composite
     second, first = composite.momenta
-    second = multiply(multiply(frame.rotation, second), transpose(frame.rotation))
+    second = rotated_tensor(frame.inward_rows, second)
     force, moment = (to_previous(frame, v) for v in composite.wrench)
     body = in_previous(frame, composite.body)
     return Composite(body, Momenta(second, to_previous(frame, first)), (force, moment))

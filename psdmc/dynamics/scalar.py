@@ -19,6 +19,12 @@ Matrix = tuple[Vector, Vector, Vector]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 
+Terms = tuple[tuple[int, float], ...]
+"""A row of constants without its zeros: each with its place."""
+
+Fixed = tuple[Terms, Terms, Terms]
+"""A constant 3 x 3 matrix row by row: in most of a robot's rotations all but three entries are zero."""
+
 
 def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
     """(sin, cos) of an angle in rad; symbols bring their own."""
@@ -61,3 +67,32 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
     columns = transpose(b)
     product = tuple(tuple(dot(row, column) for column in columns) for row in a)
     return product  # type: ignore[return-value]
+
+
+def fixed(rows: Matrix) -> Fixed:
+    """A matrix of plain floats without its zeros."""
+    first, second, third = (tuple((k, x) for k, x in enumerate(row) if x != 0.0) for row in rows)
+    return first, second, third
+
+
+def rotated(rows: Fixed, v: Vector) -> Vector:
+    """rows @ v"""
+    return (_total(rows[0], v), _total(rows[1], v), _total(rows[2], v))
+
+
+def rotated_tensor(rows: Fixed, tensor: Matrix) -> Matrix:
+    """rows @ tensor @ rows^T"""
+    columns = transpose(tensor)
+    once: list[Vector] = [
+        (_total(row, columns[0]), _total(row, columns[1]), _total(row, columns[2])) for row in rows
+    ]
+    return (rotated(rows, once[0]), rotated(rows, once[1]), rotated(rows, once[2]))
+
+
+def _total(terms: Terms, values: Vector) -> Scalar:
+    """The sum of constants times values, in the order of their places."""
+    total: Scalar = None
+    for k, factor in terms:
+        part = values[k] if factor == 1.0 else values[k] * factor
+        total = part if total is None else total + part
+    return 0.0 if total is None else total

@@ -274,7 +274,7 @@ def _is_fair(space: CarrierSpace, samples: Long, target: Long, units: tuple[Arra
     chain's unit."""
     start = list(space.lightest([WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]))
     transfer = space.transfer(start)
-    missed = np.abs(times(samples[:, start], transfer) - target).max(initial=0.0)
+    missed = np.abs(_combined(samples[:, start], transfer) - target).max(initial=0.0)
     carriers, parameters = units
     growth = np.abs(transfer * parameters / carriers[start, None]).max(initial=0.0)
     return bool(growth <= FAIR_GROWTH and missed <= MISS * space.whole.max(initial=0.0))
@@ -326,7 +326,7 @@ def _sampled_columns(reframed: Reframed) -> Long:
         for column, value in row.items():
             standard[i, :, column] = value
     back = np.round(np.linalg.inv(pseudo_map()))  # zeros and ones
-    return np.asarray(times(standard.reshape(-1, 11), back).reshape(n * STATES, 11 * n))
+    return _combined(standard.reshape(-1, PARAMETERS_PER_LINK), back).reshape(n * STATES, -1)
 
 
 def bodies_from_carriers(

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.motion import PLAIN, Choices
 from psdmc.dynamics.scalar import Scalar, Vector
@@ -155,15 +157,16 @@ def _flat(values: Any) -> list[Symbol | Number]:
 
 
 def _carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:
+    transfer = arrangement.transfer
     if theta_b is not None:
-        return [math.fsum(row * theta_b) for row in arrangement.transfer]
-    theta = tracer.symbols("theta_b", arrangement.transfer.shape[1])
-    values: list[Scalar] = []
-    for row in arrangement.transfer.tolist():
-        total: Scalar = 0.0
-        for factor, symbol in zip(row, theta, strict=True):
-            total = total + symbol * factor
-        values.append(total)
+        return [math.fsum(row) for row in (transfer * theta_b).tolist()]
+    theta = tracer.symbols("theta_b", transfer.shape[1])
+    values: list[Scalar] = [0.0] * len(transfer)
+    rows, columns = np.nonzero(transfer)
+    for row, column, factor in zip(
+        rows.tolist(), columns.tolist(), transfer[rows, columns].tolist(), strict=True
+    ):
+        values[row] = values[row] + theta[column] * factor
     return values
 
 

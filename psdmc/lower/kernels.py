@@ -10,7 +10,8 @@ from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, RECIPES
 from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.factored import Arrangement, trace_geometry
-from psdmc.lower.search import Scoring, Search, Spaces, for_lanes, for_one_state
+from psdmc.lower.geometry import Geometry
+from psdmc.lower.search import Scoring, Search, for_lanes, for_one_state
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
@@ -104,7 +105,7 @@ class _Lowered:
     def __init__(self, model: DynamicsModel, lowering: Lowering, costs: Costs) -> None:
         self.model, self.lowering, self.costs = model, lowering, costs
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
-        self._spaces: Spaces = {}
+        self.geometry = Geometry(model.mechanism, model.representative)
         self._searches: dict[bool, Search] = {}
         self._arrangements: dict[tuple[str, bool], Arrangement] = {}
         self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
@@ -135,13 +136,13 @@ class _Lowered:
         return self._traced[recipe.name, theta]
 
     def _traces(self, recipe: Recipe, theta: bool) -> Iterator[Program]:
-        search = self._search(theta)
+        search, geometry = self._search(theta), self.geometry
         if recipe.signature.theta:
             arranged = RECIPES[recipe.shares] if recipe.shares else recipe
             yield from search.rearrangements(recipe, self._arrangement(arranged, theta))
             return
-        for feet in search.feet():
-            yield trace_geometry(recipe, search.space(feet)[0], search.robot)
+        for feet in geometry.feet:
+            yield trace_geometry(recipe, geometry.reframed(feet), search.robot)
 
     def _arrangement(self, recipe: Recipe, theta: bool) -> Arrangement:
         key = recipe.name, theta
@@ -157,7 +158,7 @@ class _Lowered:
                 self.model.mechanism,
                 self.model.representative,
                 baked,
-                spaces=self._spaces,
+                geometry=self.geometry,
                 costs=self.costs,
             )
         return self._searches[theta]

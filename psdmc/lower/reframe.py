@@ -19,7 +19,7 @@ import numpy as np
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector
 from psdmc.dynamics.scalar import Matrix, Vector
 from psdmc.robot.mechanism import BASE, Array, Mechanism, NamedFrame, Placement
-from psdmc.robot.small import length, times
+from psdmc.robot.small import cross, length, times
 
 Foot = Literal["previous", "next"]
 
@@ -175,7 +175,7 @@ def _decimal(lengths: Array, scale: float) -> Array:
 
 
 def _parallel(a: Array, b: Array) -> bool:
-    return float(np.linalg.norm(np.cross(a, b))) < NEARLY_PARALLEL
+    return float(np.linalg.norm(cross(a, b))) < NEARLY_PARALLEL
 
 
 def _origins(
@@ -209,9 +209,9 @@ def _foot(point: Array, axis: Array, other_point: Array, other_axis: Array) -> A
     """Point of the line (point, axis) nearest to the other line; None where they are nearly parallel."""
     if _parallel(axis, other_axis):
         return None
-    normal = np.cross(axis, other_axis)
+    normal = cross(axis, other_axis)
     square = times(normal, normal)
-    along = times(np.cross(other_point - point, other_axis), normal) / square
+    along = times(cross(other_point - point, other_axis), normal) / square
     return np.asarray(point + along * axis)
 
 
@@ -232,7 +232,7 @@ def _orientations(
             x_before = min(before[0].T, key=lambda x: abs(float(times(x, axes[i]))))
         if i:
             x_before = _across(x_before, axes[i])
-        before.append(np.column_stack([x_before, np.cross(axes[i], x_before), axes[i]]))
+        before.append(np.column_stack([x_before, cross(axes[i], x_before), axes[i]]))
         x_after = None
         if child is not None:
             x_after = _normal(axes[i], axes[child], origins[child] - origins[i])
@@ -240,7 +240,7 @@ def _orientations(
             x_after = x_before if _has_direction_only(chain, i) else placed[i].rotation[:, 0]
         elif times(x_after, x_before) < -EXACT:
             x_after = -x_after
-        after.append(np.column_stack([x_after, np.cross(axes[i], x_after), axes[i]]))
+        after.append(np.column_stack([x_after, cross(axes[i], x_after), axes[i]]))
     return before, after
 
 
@@ -268,7 +268,7 @@ def _perpendicular(vector: Array, axis: Array) -> Array:
 def _normal(axis: Array, following: Array, step: Array) -> Array | None:
     """Direction of the common normal of two axes; None where every perpendicular would do. Nearly parallel axes take
     the step from one origin to the next instead."""
-    normal = np.cross(axis, following)
+    normal = cross(axis, following)
     if _parallel(axis, following):
         normal = _perpendicular(step, axis)
         if np.linalg.norm(normal) < EXACT:

@@ -15,9 +15,10 @@ from itertools import product
 import numpy as np
 
 from psdmc.dynamics.motion import Choices
-from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace, carrier_space
+from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS
 from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
-from psdmc.lower.reframe import Foot, Reframed, reframe
+from psdmc.lower.geometry import Geometry
+from psdmc.lower.reframe import Foot
 from psdmc.program.cost import Cost, cost
 from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
@@ -79,12 +80,8 @@ def distinct(recipe: Recipe, choices: Sequence[Choices]) -> tuple[Choices, ...]:
     return tuple(each for each in choices if each in kinds.values())
 
 
-Spaces = dict[tuple[Foot, ...], tuple[Reframed, CarrierSpace]]
-"""A model's geometry by where frames sit, and what can carry the model there."""
-
-
 class Search:
-    """The descent for one model; geometry is shared between functions, and through `spaces` between searches."""
+    """The descent for one model; `geometry` is shared between functions and searches."""
 
     def __init__(
         self,
@@ -92,15 +89,14 @@ class Search:
         representative: Array,
         theta_b: Array | None,
         budget: int = BUDGET,
-        spaces: Spaces | None = None,
+        geometry: Geometry | None = None,
         costs: Costs = COSTS,
     ) -> None:
         sizes = Sizes.of_chain(len(chain), representative.shape[1], len(chain.frames))
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
-        self.chain, self.representative, self.budget = chain, representative, budget
+        self.geometry = Geometry(chain, representative) if geometry is None else geometry
+        self.budget = budget
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
-        self._spaces: Spaces = {} if spaces is None else spaces
-        self._frames: dict[tuple[Foot, ...], Reframed] = {}
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function; `start` is one found for another, whose geometry stays."""
@@ -108,8 +104,8 @@ class Search:
         if start is not None:
             descent.consider(replace(start, choices=choices) for choices in distinct(recipe, CHOICES))
         else:
-            for candidate in self.feet():
-                descent.consider(self.starts(candidate))
+            for feet in self.geometry.feet:
+                descent.consider(self.starts(feet))
             descent.consider(self._units(descent.arrangement))
         while descent.consider(self._exchanges(descent.arrangement)):
             pass
@@ -129,28 +125,9 @@ class Search:
         for best in sorted({each.index(min(each)) for each in weights}):
             yield trace_dynamics(recipe, tried[best], self.robot)
 
-    def feet(self) -> Iterator[tuple[Foot, ...]]:
-        """Those of `all_feet` that give different frames: parallel and crossing axes have the same foot either way."""
-        seen: list[Reframed] = []
-        for feet in all_feet(self.chain):
-            reframed = self._reframed(feet)
-            if not any(reframed.is_same(other) for other in seen):
-                seen.append(reframed)
-                yield feet
-
-    def _reframed(self, feet: tuple[Foot, ...]) -> Reframed:
-        if feet not in self._frames:
-            self._frames[feet] = reframe(self.chain, feet)
-        return self._frames[feet]
-
-    def space(self, feet: tuple[Foot, ...]) -> tuple[Reframed, CarrierSpace]:
-        if feet not in self._spaces:
-            reframed = self._reframed(feet)
-            self._spaces[feet] = reframed, carrier_space(reframed, self.representative)
-        return self._spaces[feet]
-
     def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
-        reframed, space = self.space(feet)
+        reframed = self.geometry.reframed(feet)
+        space = self.geometry.space(reframed)
         weights = [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
         carriers = space.lightest(weights)
         transfer = space.transfer(carriers)
@@ -168,7 +145,7 @@ class Search:
             yield replace(found, unit=unit)
 
     def _exchanges(self, found: Arrangement) -> Iterator[Arrangement]:
-        space = next(space for reframed, space in self._spaces.values() if reframed is found.reframed)
+        space = self.geometry.space(found.reframed)
         for leaving, entering in space.exchanges(found.carriers):
             carriers = tuple(sorted({*found.carriers, entering} - {leaving}))
             transfer = space.transfer(carriers)
@@ -201,11 +178,3 @@ class _Descent:
             if score < self._score:
                 self.arrangement, self._score, improved = candidate, score, True
         return improved
-
-
-def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
-    """Where frames may sit: all on the normal to the axis before, then one at a time on the next, then all of them. A leaf
-    has no next."""
-    n, leaves = len(chain), chain.leaves
-    for moved in [(), *((i,) for i in range(n) if i not in leaves), tuple(range(n))]:
-        yield tuple("next" if i in moved else "previous" for i in range(n))

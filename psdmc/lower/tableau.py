@@ -30,20 +30,19 @@ class Tableau:
 
     @staticmethod
     def of(columns: Long, basis: Sequence[int]) -> Tableau:
-        """By Gauss-Jordan elimination with row pivots; the basis's columns must be independent."""
+        """By Gauss-Jordan elimination with row pivots; the basis's columns must be independent.
+
+        The other columns are needed in the pivots' rows only: what the basis's ask of those is done to them afterwards.
+        """
         others = np.setdiff1d(np.arange(columns.shape[1]), basis)
-        rest = columns[:, [*basis, *others]]
-        rows: list[int] = []
-        for k in range(len(basis)):
-            free = np.abs(rest[:, k])
-            free[rows] = -1.0
-            row = int(np.argmax(free))
-            rows.append(row)
-            behind = rest[row, k + 1 :] / rest[row, k]
-            rest[:, k + 1 :] -= rest[:, k, None] * behind
-            rest[row, k + 1 :] = behind
+        rows, factors = _row_pivots(columns[:, list(basis)])
+        rest = columns[np.ix_(rows, others)]
+        for k, factor in enumerate(factors[rows].T):
+            behind = rest[k] / factor[k]
+            rest -= factor[:, None] * behind
+            rest[k] = behind
         entries = np.zeros((len(basis), columns.shape[1]), columns.dtype)
-        entries[:, others] = rest[rows, len(basis) :]
+        entries[:, others] = rest
         entries[range(len(basis)), list(basis)] = 1.0
         return Tableau(tuple(basis), entries)
 
@@ -60,6 +59,21 @@ class Tableau:
             now[i] = j
         order = [now.index(j) for j in basis]
         return Tableau(tuple(basis), entries[order])
+
+
+def _row_pivots(rest: Long) -> tuple[list[int], Long]:
+    """The row that each of r independent columns takes for its pivot, and as columns what every row has of them then.
+    Turns `rest` (rows, r) in place."""
+    rows: list[int] = []
+    for k in range(rest.shape[1]):
+        free = np.abs(rest[:, k])
+        free[rows] = -1.0
+        row = int(np.argmax(free))
+        rows.append(row)
+        behind = rest[row, k + 1 :] / rest[row, k]
+        rest[:, k + 1 :] -= rest[:, k, None] * behind
+        rest[row, k + 1 :] = behind
+    return rows, rest
 
 
 def _pivot(entries: Long, row: int, column: int) -> None:

@@ -1,0 +1,49 @@
+"""A model's frames by where they sit on their axes, and what can carry the model there: found once, for all searches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+
+from psdmc.lower.carriers import CarrierSpace, carrier_space
+from psdmc.lower.reframe import Foot, Reframed, reframe
+from psdmc.robot.mechanism import Array, Mechanism
+
+
+class Geometry:
+    """What does not depend on the function that is lowered, nor on whether theta_b is compiled in."""
+
+    def __init__(self, chain: Mechanism, representative: Array) -> None:
+        self.chain, self.representative = chain, representative
+        self._reframed: dict[tuple[Foot, ...], Reframed] = {}
+        self._spaces: dict[Reframed, CarrierSpace] = {}
+
+    @cached_property
+    def feet(self) -> tuple[tuple[Foot, ...], ...]:
+        """Those of `all_feet` that give different frames: parallel and crossing axes have the same foot either way."""
+        seen: dict[tuple[Foot, ...], Reframed] = {}
+        for feet in all_feet(self.chain):
+            reframed = self.reframed(feet)
+            if not any(reframed.is_same(other) for other in seen.values()):
+                seen[feet] = reframed
+        return tuple(seen)
+
+    def reframed(self, feet: tuple[Foot, ...]) -> Reframed:
+        """The frames with their origins on these feet."""
+        if feet not in self._reframed:
+            self._reframed[feet] = reframe(self.chain, feet)
+        return self._reframed[feet]
+
+    def space(self, reframed: Reframed) -> CarrierSpace:
+        """What can carry the model in frames that are given here."""
+        if reframed not in self._spaces:
+            self._spaces[reframed] = carrier_space(reframed, self.representative)
+        return self._spaces[reframed]
+
+
+def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
+    """Where frames may sit: all on the normal to the axis before, then one at a time on the next, then all of them. A leaf
+    has no next."""
+    n, leaves = len(chain), chain.leaves
+    for moved in [(), *((i,) for i in range(n) if i not in leaves), tuple(range(n))]:
+        yield tuple("next" if i in moved else "previous" for i in range(n))
