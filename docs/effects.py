@@ -73,7 +73,10 @@ def choices(robot: str) -> Iterator[Row]:
     first = next(search.starts((PREVIOUS,) * len(chain)))
     compound, fold = Choices(compound=True), Choices(compound=True, fold=True)
     yield "the file's frames, every parameter", [operations(in_file_frames(chain))]
-    yield "frames re-framed to modified DH", [operations(in_frames(chain, plain.frames, plain.base, plain))]
+    yield (
+        "frames re-framed to modified DH",
+        [operations(in_frames(chain, plain.frames, plain.base_acceleration, plain))],
+    )
     yield "parameters on sparse carriers", [best(iter([first]))]
     yield "compound turns of parallel axes", [best(iter([replace(first, choices=compound)]))]
     yield "last body seen from before its turn", [best(iter([replace(first, choices=fold)]))]

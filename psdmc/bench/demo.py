@@ -63,7 +63,7 @@ def _lines(model: DynamicsModel, errors: dict[str, float], result: BenchResult) 
     case, machine = result.cases[0], result.machine
     p = "not expanded" if model.p is None else str(model.p)
     yield ""
-    yield f"{model.mechanism.name}: {model.n} joints, p = {p} functions, l = {model.l} base parameters"
+    yield f"{model.mechanism.name}: {model.n} joints, p = {p} monomials, l = {model.l} base parameters"
     yield f"{machine.processor}, {machine.compiler}, {machine.flags}"
     yield ""
     yield (

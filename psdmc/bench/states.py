@@ -77,7 +77,7 @@ class States:
     @cached_property
     def tau(self) -> Array:
         """(count, n) torques at these states."""
-        return self._robot.torques(self.q, self.qd, self.qdd, self._robot.base)
+        return self._robot.torques(self.q, self.qd, self.qdd, self._robot.base_acceleration)
 
     @cached_property
     def _robot(self) -> RobotOnArrays:

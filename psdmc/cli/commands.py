@@ -28,7 +28,7 @@ app = typer.Typer(
 
 CHECK_FAILED_STATUS = 5
 LARGEST_EXPANDED = 2000
-"""`show --cost` prints the expanded lowering too up to this many functions; beyond, it takes minutes."""
+"""`show --cost` prints the expanded lowering too up to this many monomials; beyond, it takes minutes."""
 
 ROBOT_SUFFIXES = (".urdf", ".xml", ".toml")
 """Of files that `show` reads as a robot; all others are models."""
@@ -133,7 +133,7 @@ def show(
     model: Annotated[
         Path, typer.Argument(metavar="MODEL", help="model file (.npz), or a robot file (.urdf, .toml)")
     ],
-    terms: Annotated[bool, typer.Option("--terms", help="list the functions y")] = False,
+    terms: Annotated[bool, typer.Option("--terms", help="list the monomials y")] = False,
     cost: Annotated[bool, typer.Option("--cost", help="operations per function and lowering")] = False,
 ) -> None:
     """Print a model: joints, sizes, base parameters with equations, values and units, certificate. Of a robot file: all of

@@ -64,9 +64,9 @@ def print_model(model: DynamicsModel) -> None:
 
 def _sizes(found: Summary) -> str:
     if found.sizes is None or found.p is None:
-        return f"l = {found.l} base parameters; functions not expanded (--no-expand)"
+        return f"l = {found.l} base parameters; monomials not expanded (--no-expand)"
     parts = ", ".join(f"{count} {kind}" for kind, count in found.sizes._asdict().items())
-    return f"p = {found.p} functions ({parts}), l = {found.l} base parameters, {found.entries} entries of P"
+    return f"p = {found.p} monomials ({parts}), l = {found.l} base parameters, {found.entries} entries of P"
 
 
 def _joints(joints: Sequence[Joint], errors: Sequence[float]) -> Table:
@@ -122,7 +122,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def print_terms(model: DynamicsModel) -> None:
-    """Every function of y, one a line."""
+    """Print every monomial y, one a line."""
     for index, text in enumerate(term_texts(model), start=1):
         print(f"y{index} = {text}")
 

@@ -133,11 +133,11 @@ def _too_fine(found: Measured, known: Array) -> DerivationError:
             f"check the units of masses, inertias and lengths of '{joint.name}' and what hangs on it; where they are "
             "right, make this joint fixed, or end the chain before it with --tip",
         )
-    base_alone = np.maximum(found.plain, found.last_digit).max()
-    if found.model.expansion is not None and base_alone <= PROMISED:
+    without = np.maximum(found.plain, found.last_digit).max()
+    if found.model.expansion is not None and without <= PROMISED:
         return DerivationError(
             f"{whose}: E and P leave errors of {known[worst]:.1e} of it, {expected}",
-            f"derive with --no-expand: base parameters alone leave {base_alone:.1e}",
+            f"derive with --no-expand: base parameters alone leave {without:.1e}",
         )
     return DerivationError(
         f"{whose}: double precision leaves errors of {known[worst]:.1e} of it, {expected}", SCALES

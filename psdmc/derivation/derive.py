@@ -80,7 +80,7 @@ def derive_model(
             f"'{chain.name}': no inertial parameter has any effect on any joint",
             "give masses and inertias, or assume fewer of them zero",
         )
-    B = base_map(robot, reduction)
+    B = base_parameter_map(robot, reduction)
     theta_b = base_parameters(B, chain)
 
     def made(precision: Precision) -> DynamicsModel:
@@ -145,7 +145,7 @@ def _equation_noise(reduction: Reduction) -> float:
     return EQUATION_NOISE if reduction.is_clear else LAST_DIGIT
 
 
-def base_map(robot: Scaled, reduction: Reduction) -> Array:
+def base_parameter_map(robot: Scaled, reduction: Reduction) -> Array:
     """B (l, 11 n) in SI: base parameters from standard parameters, which the span's leading rows are."""
     units = parameter_units(robot.types, robot.unit)[robot.leads]
     echelon = reduction.echelon * units[reduction.pivots][:, None] / units

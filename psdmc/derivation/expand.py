@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from psdmc.derivation.extended import extended, has_small_entries, is_of_many_scales
-from psdmc.derivation.functions import Functions
 from psdmc.derivation.gravity import gravity_terms
 from psdmc.derivation.inertia import mass_matrix_terms
 from psdmc.derivation.memory import (
     available_memory,
     grid_bytes,
-    largest_function_count,
+    largest_monomial_count,
     refuse_beyond,
     refuse_long,
     velocity_bytes,
 )
+from psdmc.derivation.monomials import Monomials
 from psdmc.derivation.reduce import Reduction
 from psdmc.derivation.rounding import merged
 from psdmc.derivation.terms import Terms, joined, times_matrix
-from psdmc.derivation.units import Scaled, function_units, parameter_units, torque_units
+from psdmc.derivation.units import Scaled, monomial_units, parameter_units, torque_units
 from psdmc.derivation.velocity import acceleration_terms, velocity_terms
 from psdmc.dynamics.kinematics import carried_by
 from psdmc.dynamics.scalar import Vector
@@ -58,7 +58,7 @@ EXTENDED = Precision(1e-15, 1e-16)
 
 FINEST = Precision(1e-18, 1e-19)
 """For robots of many scales: the coefficients of a joint whose lengths are 1e-5 of the robot's are 1e-10 of others. Some of
-1e-18 that are rounding are kept with them, which costs functions, not digits."""
+1e-18 that are rounding are kept with them, which costs monomials, not digits."""
 
 
 def expand(
@@ -69,24 +69,24 @@ def expand(
     types = scaled.types
     if precision is not IN_DOUBLE:
         scaled = extended(scaled)
-    functions = Functions(types)
+    monomials = Monomials(types)
     available = available_memory() if memory is None else memory
-    refuse_beyond(grid_bytes(types), available, largest_function_count(types), len(types))
+    refuse_beyond(grid_bytes(types), available, largest_monomial_count(types), len(types))
     progress("mass matrix")
     chosen = scaled.span[:, reduction.pivots]
-    mass = _mass_matrix(scaled, chosen, functions, precision.zero)
+    mass = _mass_matrix(scaled, chosen, monomials, precision.zero)
     progress("gravity")
-    gravity = _gravity(scaled, chosen, functions, precision.zero)
+    gravity = _gravity(scaled, chosen, monomials, precision.zero)
     progress("velocity terms")
     carried = carried_by(scaled.frames)
-    count, needed = velocity_bytes(mass, functions, carried)
+    count, needed = velocity_bytes(mass, monomials, carried)
     refuse_long(count, types)
-    refuse_beyond(needed, available, min(count, largest_function_count(types)), len(types))
-    velocity = velocity_terms(mass, functions, carried, precision.zero)
+    refuse_beyond(needed, available, min(count, largest_monomial_count(types)), len(types))
+    velocity = velocity_terms(mass, monomials, carried, precision.zero)
     progress("reduction matrices")
-    terms = joined([gravity, acceleration_terms(mass, functions), velocity])
+    terms = joined([gravity, acceleration_terms(mass, monomials), velocity])
     units = parameter_units(types, scaled.unit)[scaled.leads[reduction.pivots]]
-    return Expansion.of(*assembled(terms, functions, units, scaled.unit, precision.noise))
+    return Expansion.of(*assembled(terms, monomials, units, scaled.unit, precision.noise))
 
 
 def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
@@ -102,44 +102,44 @@ def can_be_finest() -> bool:
 
 
 def _mass_matrix(
-    scaled: Scaled, chosen: Array, functions: Functions, zero: float
+    scaled: Scaled, chosen: Array, monomials: Monomials, zero: float
 ) -> dict[tuple[int, int], Terms]:
     """In the chosen columns of the span; row 0 throughout."""
-    found = mass_matrix_terms(scaled.frames, scaled.link_frames, functions, zero)
+    found = mass_matrix_terms(scaled.frames, scaled.link_frames, monomials, zero)
     return {
         pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, zero)
         for pair, terms in found.items()
     }
 
 
-def _gravity(scaled: Scaled, chosen: Array, functions: Functions, zero: float) -> Terms:
+def _gravity(scaled: Scaled, chosen: Array, monomials: Monomials, zero: float) -> Terms:
     up: Vector = scaled.up
-    terms = gravity_terms(scaled.frames, scaled.link_frames, up, functions, zero)
+    terms = gravity_terms(scaled.frames, scaled.link_frames, up, monomials, zero)
     return times_matrix(terms, chosen, zero)
 
 
 def assembled(
     terms: Terms,
-    functions: Functions,
+    monomials: Monomials,
     units: Sequence[float] | Array,
     unit: float,
     value_noise: float = VALUE_NOISE,
 ) -> tuple[NDArray[np.uint8], tuple[sparse.csr_array, ...]]:
-    """E and P in SI from torque terms (function: key, column: base parameter) in the robot's unit of length.
+    """E and P in SI from torque terms (monomial: key, column: base parameter) in the robot's unit of length.
 
     units        (l,) one unit of each base parameter in SI
     value_noise  uncertainty of a coefficient of size one, relative for larger ones
     """
-    keys, place = np.unique(terms.function, return_inverse=True)
-    exponents = functions.exponents(keys)
-    types = functions.types
+    keys, place = np.unique(terms.monomial, return_inverse=True)
+    exponents = monomials.exponents(keys)
+    types = monomials.types
     shape = (len(keys), len(units))
     to_si = torque_units(types, unit)[terms.row]
-    to_si /= function_units(exponents, types, unit)[place] * np.asarray(units)[terms.column]
+    to_si /= monomial_units(exponents, types, unit)[place] * np.asarray(units)[terms.column]
     noise = value_noise * np.maximum(1.0, np.abs(terms.value)) * to_si
     values = merged((terms.value * to_si).astype(np.float64), noise.astype(np.float64))
     matrices = []
-    for joint in range(functions.n):
+    for joint in range(monomials.n):
         own = np.flatnonzero(terms.row == joint)
         matrix = sparse.csr_array((values[own], (place[own], terms.column[own])), shape=shape)
         matrix.sort_indices()

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from psdmc.derivation.expand import COEFFICIENT_TOLERANCE, assembled
-from psdmc.derivation.functions import Functions
 from psdmc.derivation.interpolate import along_axes, interpolation, nodes, quadratic_sizes
-from psdmc.derivation.memory import available_memory, largest_function_count, refuse_beyond
+from psdmc.derivation.memory import available_memory, largest_monomial_count, refuse_beyond
+from psdmc.derivation.monomials import Monomials
 from psdmc.derivation.reduce import Reduction, reduced, row_space
 from psdmc.derivation.terms import Terms, joined, restricted
 from psdmc.errors import InputError
@@ -37,9 +37,9 @@ PROBES = 32
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledModel:
-    """A torque function as functions times constants: tau[i] = y(state) @ P[i] @ B @ X.
+    """A torque function as monomials times constants: tau[i] = y(state) @ P[i] @ B @ X.
 
-    E            (5n, p) uint8   as in DynamicsModel; functions without rates carry gravity_scale
+    E            (5n, p) uint8   as in DynamicsModel; monomials without rates carry gravity_scale
     P            n x (p, l)      reduction matrices
     B            (l, k)          base parameters from the function's own parameters
     parameters   k               their names
@@ -88,18 +88,18 @@ def derive_from_callable(
     fit.
     """
     types = _types(kinds)
-    functions = Functions(types)
+    monomials = Monomials(types)
     names = tuple(parameter_names)
     cells = int(np.prod(quadratic_sizes(types), dtype=np.int64))
-    needed = cells * functions.n * len(names) * 8 * 6
+    needed = cells * monomials.n * len(names) * 8 * 6
     refuse_beyond(
-        needed, available_memory() if memory is None else memory, largest_function_count(types), functions.n
+        needed, available_memory() if memory is None else memory, largest_monomial_count(types), monomials.n
     )
-    sample = _Sampler(f, functions, len(names), vectorised, length)
+    sample = _Sampler(f, monomials, len(names), vectorised, length)
     terms = joined(list(_all_terms(sample)))
     reduction = reduced(row_space([terms], len(names)))
     pivots = restricted(terms, reduction.pivots)
-    E, P = assembled(pivots, functions, np.ones(len(reduction.pivots)), 1.0)
+    E, P = assembled(pivots, monomials, np.ones(len(reduction.pivots)), 1.0)
     return _certified(E, P, reduction, names, sample)
 
 
@@ -113,15 +113,15 @@ def _types(kinds: Sequence[str]) -> tuple[JointType, ...]:
 @dataclass(frozen=True, slots=True)
 class _Sampler:
     f: TorqueFunction
-    functions: Functions
+    monomials: Monomials
     parameters: int
     vectorised: bool
     length: float
 
     def grid(self) -> Array:
         """(cells, n) tensor grid of joint positions, the first joint slowest."""
-        axes = [nodes(joint) * self.length**joint.length_order for joint in self.functions.types]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, self.functions.n)
+        axes = [nodes(joint) * self.length**joint.length_order for joint in self.monomials.types]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, self.monomials.n)
 
     def torques(self, q: Array, qd: Array, qdd: Array, X: Array, gravity_scale: float) -> Array:
         """(m, n) from (m, n) states, whether or not f is vectorised."""
@@ -150,35 +150,35 @@ class _Sampler:
 
     def terms(self, values: Array, rate: int) -> Terms:
         """Torque terms from per-parameter values on the grid."""
-        types = self.functions.types
+        types = self.monomials.types
         joints, sizes = range(len(types)), quadratic_sizes(types)
         batch = values.reshape(-1, values.shape[-1])
         flat = along_axes([interpolation(joint) for joint in types], np.ascontiguousarray(batch.T))
         found: Array = flat.reshape(values.shape)
         largest = np.abs(found).max(initial=0.0)
         column, row, place = np.nonzero(np.abs(found) > COEFFICIENT_TOLERANCE * max(1.0, largest))
-        codes = self.functions.tensor_codes(joints, sizes)[place] + rate * self.functions.codes
+        codes = self.monomials.tensor_codes(joints, sizes)[place] + rate * self.monomials.codes
         in_metres = np.ones(found.shape[-1])
         for j, joint in enumerate(types):
-            digits = self.functions.digit(self.functions.tensor_codes(joints, sizes), j)
+            digits = self.monomials.digit(self.monomials.tensor_codes(joints, sizes), j)
             in_metres /= self.length ** (joint.length_order * digits)
         return Terms(row, codes, column, found[column, row, place] * in_metres[place])
 
 
 def _all_terms(sample: _Sampler) -> Iterator[Terms]:
     """Gravity, then accelerations, squares of rates, products of rates."""
-    n, functions = sample.functions.n, sample.functions
+    n, monomials = sample.monomials.n, sample.monomials
     rest, units = np.zeros(n), np.eye(n)
     yield sample.terms(sample.per_parameter(rest, rest, 1.0), 0)
     for j in range(n):
-        yield sample.terms(sample.per_parameter(rest, units[j], 0.0), functions.acceleration_rate(j))
+        yield sample.terms(sample.per_parameter(rest, units[j], 0.0), monomials.acceleration_rate(j))
     squares = [sample.per_parameter(units[j], rest, 0.0) for j in range(n)]
     for j in range(n):
-        yield sample.terms(squares[j], functions.velocity_rate(j, j))
+        yield sample.terms(squares[j], monomials.velocity_rate(j, j))
     for j in range(n):
         for k in range(j + 1, n):
             both = sample.per_parameter(units[j] + units[k], rest, 0.0)
-            yield sample.terms(both - squares[j] - squares[k], functions.velocity_rate(j, k))
+            yield sample.terms(both - squares[j] - squares[k], monomials.velocity_rate(j, k))
 
 
 def _certified(

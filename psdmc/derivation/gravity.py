@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.derivation.functions import Functions
 from psdmc.derivation.inertia import Moving, coefficients, column, expanded, moving
 from psdmc.derivation.interpolate import linear_sizes
+from psdmc.derivation.monomials import Monomials
 from psdmc.derivation.terms import Array, Terms, joined, summed
 from psdmc.derivation.velocity import derivative
 from psdmc.dynamics.frames import BASE, Frame
@@ -22,7 +22,7 @@ def gravity_terms(
     frames: Sequence[Frame],
     link_frames: Sequence[Placed],
     up: Vector,
-    functions: Functions,
+    monomials: Monomials,
     tolerance: float,
 ) -> Terms:
     """Torque terms per unit of |g|; `up` is the unit vector against gravity in the base frame.
@@ -40,10 +40,10 @@ def gravity_terms(
         before = at_base if frame.parent == BASE else found[frame.parent]
         found.append(_carried(moving(frame), *before))
         path = path_to(frames, k)
-        potential = _link_potential(link_frames[k], *found[k], path, functions, tolerance)
+        potential = _link_potential(link_frames[k], *found[k], path, monomials, tolerance)
         for i in path:
-            slope = derivative(potential, functions, i)
-            parts.append(Terms(np.full_like(slope.row, i), slope.function, slope.column, slope.value))
+            slope = derivative(potential, monomials, i)
+            parts.append(Terms(np.full_like(slope.row, i), slope.monomial, slope.column, slope.value))
     return summed(joined(parts), tolerance)
 
 
@@ -59,7 +59,7 @@ def _link_potential(
     direction: Vector,
     height: Array,
     path: Sequence[int],
-    functions: Functions,
+    monomials: Monomials,
     tolerance: float,
 ) -> Terms:
     x, y, z = place.translation.tolist()
@@ -67,6 +67,6 @@ def _link_potential(
     values = np.stack([height + dot(direction, (x, y, z)), *about_link])
     parameter, position = np.nonzero(np.abs(values) > tolerance)
     k = path[-1]
-    codes = functions.tensor_codes(path, linear_sizes(functions.types[j] for j in path))
+    codes = monomials.tensor_codes(path, linear_sizes(monomials.types[j] for j in path))
     columns = PARAMETERS_PER_LINK * k + parameter
     return Terms(np.full(len(columns), k), codes[position], columns, values[parameter, position])

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.derivation.functions import Functions
 from psdmc.derivation.interpolate import (
     along_axes,
     evaluation,
@@ -23,6 +22,7 @@ from psdmc.derivation.interpolate import (
     linear_sizes,
     quadratic_sizes,
 )
+from psdmc.derivation.monomials import Monomials
 from psdmc.derivation.terms import Terms, joined
 from psdmc.dynamics.frames import BASE, Frame, joint_angle, joint_offset
 from psdmc.dynamics.kinematics import path_to
@@ -62,7 +62,7 @@ def moving(frame: Frame) -> Moving:
 
 
 def formal_coordinate(basis: Basis) -> Scalar:
-    """A coordinate at as many formal points as there are functions of degree one: at the first all of these but the
+    """A coordinate at as many formal points as there are factors of degree one: at the first all of these but the
     constant are zero, at each other one of them is one, so that their coefficients follow by exact differences."""
     q, sine, cosine = np.array(basis.exponents[: basis.linear], dtype=np.float64).T
     return FormalAngle(sine, cosine) if basis.has_sincos else q
@@ -107,7 +107,7 @@ def _as_arrays(v: Vector) -> Vector:
 
 
 def mass_matrix_terms(
-    frames: Sequence[Frame], link_frames: Sequence[Placed], functions: Functions, tolerance: float
+    frames: Sequence[Frame], link_frames: Sequence[Placed], monomials: Monomials, tolerance: float
 ) -> dict[tuple[int, int], Terms]:
     """M_ij, i on the path to j, as terms in codes and standard parameters (11 per link); `row` is the link. Other
     entries with i < j are zero.
@@ -123,7 +123,7 @@ def mass_matrix_terms(
         before = [] if frame.parent == BASE else twists[frame.parent]
         twists.append([carried_twist(joint, twist) for twist in before] + [constant_twist(frame)])
         seen = [np.stack([*v, *w]) for v, w in (twist_in(link_frames[k], twist) for twist in twists[k])]
-        for i, j, found in _link_terms(seen, paths[k], functions, tolerance):
+        for i, j, found in _link_terms(seen, paths[k], monomials, tolerance):
             parts[i, j].append(found)
         parts[k, k].append(_drive_term(k))
     return {pair: joined(found) for pair, found in parts.items()}
@@ -136,11 +136,11 @@ def _drive_term(k: int) -> Terms:
 
 
 def _link_terms(
-    twists: Sequence[Array], path: Sequence[int], functions: Functions, tolerance: float
+    twists: Sequence[Array], path: Sequence[int], monomials: Monomials, tolerance: float
 ) -> Iterator[tuple[int, int, Terms]]:
     """The parts of M_ij that the ten parameters of the link at the path's end make; twists[a] is (6, coefficients), of
     joint path[a]."""
-    types, k = [functions.types[joint] for joint in path], path[-1]
+    types, k = [monomials.types[joint] for joint in path], path[-1]
     for b in range(len(path)):
         inner = types[b + 1 :]
         second = _at_nodes(twists[b], inner)
@@ -150,7 +150,7 @@ def _link_terms(
             found = _interpolated(products, inner)
             sizes = linear_sizes(types[a + 1 : b + 1]) + quadratic_sizes(inner)
             parameter, place = np.nonzero(np.abs(found) > tolerance)
-            codes = functions.tensor_codes(path[a + 1 :], sizes)[place]
+            codes = monomials.tensor_codes(path[a + 1 :], sizes)[place]
             columns = PARAMETERS_PER_LINK * k + parameter
             terms = Terms(np.full(len(codes), k), codes, columns, found[parameter, place])
             yield path[a], path[b], terms

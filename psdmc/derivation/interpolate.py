@@ -1,7 +1,7 @@
 """Products of polynomials in the joint variables: evaluate on a tensor grid, multiply, interpolate axis by
 axis.
 
-A joint type's basis (robot/joints/basis.py) says which functions of q its polynomials of degree one are sums
+A joint type's basis (robot/joints/basis.py) says which factors its polynomials of degree one are sums
 of, and which their products: {1, s, c} and {1, s, c, s c, c^2} (s = sin q, c = cos q), or {1, q} and {1, q, q^2}. The
 search space is the tensor product over the joints, so what PSDM-2021 solves as one dense system is a Kronecker
 product: one small inverse along each axis.
@@ -25,12 +25,12 @@ DOUBLE = np.dtype(np.float64)
 
 
 def linear_sizes(joints: Iterable[JointType]) -> list[int]:
-    """How many functions of degree one at most each joint has."""
+    """Number of factors of degree one at most, for each joint."""
     return [joint.basis.linear for joint in joints]
 
 
 def quadratic_sizes(joints: Iterable[JointType]) -> list[int]:
-    """How many functions of degree two at most each joint has."""
+    """Number of factors of degree two at most, for each joint."""
     return [joint.basis.size for joint in joints]
 
 
@@ -40,7 +40,7 @@ def nodes(joint: JointType) -> Array:
 
 
 def quadratic_basis(joint: JointType, q: Array) -> Array:
-    """(len(q), size) basis functions of degree two at each q."""
+    """(len(q), size) values of the joint's factors at each q."""
     rows = (q, np.sin(q), np.cos(q))
     return np.stack([_product(powers, rows) for powers in joint.basis.exponents], axis=-1)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.derivation.functions import Functions
 from psdmc.derivation.interpolate import linear_sizes, quadratic_sizes
+from psdmc.derivation.monomials import Monomials
 from psdmc.derivation.terms import Terms
 from psdmc.derivation.velocity import slope_count
 from psdmc.errors import DerivationError
@@ -38,7 +38,7 @@ HEADROOM = 0.75
 """Part of the free memory that an expansion may plan for: the estimate is one, and others run on the machine, too."""
 
 
-def largest_function_count(types: Sequence[JointType]) -> int:
+def largest_monomial_count(types: Sequence[JointType]) -> int:
     """The p of a chain of these joints with axes in general position; no such chain has more.
 
     M_0j has degree one in q_1 ... q_j and two in what follows; every rate product qd_j qd_k (k >= j) has at
@@ -65,22 +65,22 @@ def grid_bytes(types: Sequence[JointType]) -> int:
 
 
 def velocity_bytes(
-    mass_matrix: Mapping[tuple[int, int], Terms], functions: Functions, carried: Sequence[Sequence[int]]
+    mass_matrix: Mapping[tuple[int, int], Terms], monomials: Monomials, carried: Sequence[Sequence[int]]
 ) -> tuple[int, int]:
     """(terms, bytes) of the velocity terms before equal ones are summed; `carried` as in velocity_terms."""
     count = 0
     for (a, b), terms in mass_matrix.items():
-        slopes = sum(slope_count(terms, functions, d) for d in carried[a])
+        slopes = sum(slope_count(terms, monomials, d) for d in carried[a])
         count += slopes * (2 if a == b else 3)
     return count, count * BYTES_PER_TERM
 
 
-def refuse_beyond(needed: int, available: int, functions: int, n: int) -> None:
+def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
     """DerivationError naming p and the memory where more is needed than there is."""
     if needed <= available:
         return
     raise DerivationError(
-        f"expanding this {n}-joint robot takes up to {functions:,} functions and about "
+        f"expanding this {n}-joint robot takes up to {monomials:,} monomials and about "
         f"{needed / 2**30:.1f} GiB of memory, but no more than {available / 2**30:.1f} GiB should be taken here",
         "derive with --no-expand: " + WITHOUT,
     )

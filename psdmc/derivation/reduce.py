@@ -56,7 +56,7 @@ class Reduction:
 
 
 def row_space(blocks: Iterable[Terms], columns: int) -> Array:
-    """(k, k) triangular factor R of all rows (row, function) of the blocks: R^T R = A^T A, found by blocked
+    """(k, k) triangular factor R of all rows (row, monomial) of the blocks: R^T R = A^T A, found by blocked
     QR."""
     factor: Array = np.zeros((0, columns))
     for block in blocks:
@@ -74,7 +74,7 @@ def triangular(rows: Array) -> Array:
 def _dense_rows(terms: Terms, columns: int) -> Iterable[Array]:
     if not len(terms.value):
         return
-    key = terms.row * (int(terms.function.max()) + 1) + terms.function
+    key = terms.row * (int(terms.monomial.max()) + 1) + terms.monomial
     _, place = np.unique(key, return_inverse=True)
     order = np.argsort(place, kind="stable")
     place, column, value = place[order], terms.column[order], terms.value[order]

@@ -1,4 +1,4 @@
-"""Sparse lists of terms: which function multiplies which parameter in which joint's torque, and by how
+"""Sparse lists of terms: which monomial multiplies which parameter in which joint's torque, and by how
 much."""
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ Integers = NDArray[np.int64]
 
 
 class Terms(NamedTuple):
-    """value * function * parameter, one entry each; all four of one length.
+    """value * monomial * parameter, one entry each; all four of one length.
 
     row       joint, or row of whatever is listed
-    function  code or key (functions.py)
+    monomial  code or key (monomials.py)
     column    parameter
     value
     """
 
     row: Integers
-    function: Integers
+    monomial: Integers
     column: Integers
     value: Array
 
@@ -40,36 +40,36 @@ def joined(parts: Sequence[Terms]) -> Terms:
         return no_terms()
     return Terms(
         np.concatenate([part.row for part in parts]),
-        np.concatenate([part.function for part in parts]),
+        np.concatenate([part.monomial for part in parts]),
         np.concatenate([part.column for part in parts]),
         np.concatenate([part.value for part in parts]),
     )
 
 
 def selected(terms: Terms, chosen: NDArray[np.bool_] | Integers) -> Terms:
-    row, function, column, value = terms
-    return Terms(row[chosen], function[chosen], column[chosen], value[chosen])
+    row, monomial, column, value = terms
+    return Terms(row[chosen], monomial[chosen], column[chosen], value[chosen])
 
 
 def summed(terms: Terms, tolerance: float) -> Terms:
-    """Sorted by row, function and column, each once; sums within the tolerance of zero left out."""
+    """Sorted by row, monomial and column, each once; sums within the tolerance of zero left out."""
     if not len(terms.value):
         return terms
     columns = int(terms.column.max()) + 1
-    functions = int(terms.function.max()) + 1
-    key = (terms.row * functions + terms.function) * columns + terms.column
+    monomials = int(terms.monomial.max()) + 1
+    key = (terms.row * monomials + terms.monomial) * columns + terms.column
     order = np.argsort(key, kind="stable")
     key = key[order]
     starts = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
     values = np.add.reduceat(terms.value[order], starts)
     kept = np.abs(values) > tolerance
     rest, column = np.divmod(key[starts[kept]], columns)
-    row, function = np.divmod(rest, functions)
-    return Terms(row, function, column, values[kept])
+    row, monomial = np.divmod(rest, monomials)
+    return Terms(row, monomial, column, values[kept])
 
 
 def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
-    """The same functions on other parameters: columns replaced by their combinations in `matrix` (old,
+    """The same monomials on other parameters: columns replaced by their combinations in `matrix` (old,
     new)."""
     right = sparse.csr_array(matrix)
     counts = np.diff(right.indptr)[terms.column]
@@ -78,7 +78,7 @@ def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
     place = right.indptr[terms.column][source] + within
     spread = Terms(
         terms.row[source],
-        terms.function[source],
+        terms.monomial[source],
         right.indices[place].astype(np.int64),
         terms.value[source] * right.data[place],
     )

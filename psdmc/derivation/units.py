@@ -59,8 +59,8 @@ def torque_units(types: Sequence[JointType], unit: float) -> Array:
     return np.array([unit**joint.effort_order for joint in types])
 
 
-def function_units(exponents: NDArray[np.uint8], types: Sequence[JointType], unit: float) -> Array:
-    """(p,) one unit of each function of E in SI; functions without rates carry |g|."""
+def monomial_units(exponents: NDArray[np.uint8], types: Sequence[JointType], unit: float) -> Array:
+    """(p,) one unit of each monomial of E in SI; monomials without rates carry |g|."""
     n = len(types)
     orders = np.array([joint.length_order for joint in types])
     blocks = exponents.reshape(5, n, -1).astype(np.int64)

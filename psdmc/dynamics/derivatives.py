@@ -61,7 +61,7 @@ def inverse_dynamics_derivatives(
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
-    base: Vector,
+    base_acceleration: Vector,
     choices: Choices = PLAIN,
 ) -> Derivatives:
     """Derivatives of the joint torques by q, qd and qdd; arguments as those of `inverse_dynamics`.
@@ -69,11 +69,11 @@ def inverse_dynamics_derivatives(
     Exact zeros where neither joint carries the other.
     """
     n = len(frames)
-    forward = sweep_outward(frames, q, qd, None, qdd, base, choices)
+    forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
     axes: list[Axis] = []
     steps: list[Step] = []
     for i in range(n):
-        axis, step = axis_and_step(i, frames, qd, qdd, base, forward, choices, axes)
+        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, choices, axes)
         axes.append(axis)
         steps.append(step)
     by_q, by_qd, by_qdd = ([[0.0] * n for _ in range(n)] for _ in range(3))

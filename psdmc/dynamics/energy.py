@@ -28,14 +28,15 @@ def kinetic_energy(
 
 
 def potential_energy(
-    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base: Vector
+    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base_acceleration: Vector
 ) -> Scalar:
-    """J, zero at q = 0; `base` is minus gravity, m/s^2 in the base frame.
+    """J, zero at q = 0; `base_acceleration` is minus gravity, m/s^2 in the base frame.
 
     The energy at q = 0 shows in no torque: bodies that have the torques of the real ones give the same differences.
     """
     rest = [0.0] * len(frames)
-    return dot(base, first_moment(frames, bodies, q)) - dot(base, first_moment(frames, bodies, rest))
+    moved, resting = first_moment(frames, bodies, q), first_moment(frames, bodies, rest)
+    return dot(base_acceleration, moved) - dot(base_acceleration, resting)
 
 
 def first_moment(frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]) -> Vector:

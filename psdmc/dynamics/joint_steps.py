@@ -98,7 +98,7 @@ def axis_and_step(
     frames: Sequence[Frame],
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
-    base: Vector,
+    base_acceleration: Vector,
     forward: Forward,
     choices: Choices,
     axes: Sequence[Axis],
@@ -106,7 +106,7 @@ def axis_and_step(
     """A joint's axis, and its step to its parent."""
     frame, offset, parent = frames[i], forward.states[i].offset, frames[i].parent
     if parent == BASE:
-        up = from_previous(frame, base)
+        up = from_previous(frame, base_acceleration)
         axis = _axis(ZERO, ZERO, up, up)
         return axis, Step(frame, False, offset, ZERO, None)
     turn, (acceleration, spin) = forward.compound_turns[parent], forward.motions[parent]

@@ -199,14 +199,14 @@ def sweep_outward(
     qd: Sequence[Scalar],
     qd_r: Sequence[Scalar] | None,
     qdd_r: Sequence[Scalar],
-    base: Vector,
+    base_acceleration: Vector,
     choices: Choices = PLAIN,
 ) -> Forward:
-    """Motions of all bodies; `base` is the base's acceleration, minus gravity (m/s^2, base frame).
+    """Motions of all bodies; `base_acceleration` includes gravity: the base's own, minus gravity (m/s^2, base frame).
 
     qd_r   reference rates; None: there is one velocity, qd
     """
-    at_base = _resting(base, qd_r is not None)
+    at_base = _resting(base_acceleration, qd_r is not None)
     folded = tuple(
         choices.fold and is_leaf and frame.parent != BASE
         for is_leaf, frame in zip(leaves(frames), frames, strict=True)
@@ -225,11 +225,11 @@ def sweep_outward(
     )
 
 
-def _resting(base: Vector, two_velocities: bool) -> _Moved:
+def _resting(base_acceleration: Vector, two_velocities: bool) -> _Moved:
     """The base: it accelerates, and does not turn."""
     rates = Rates(ZERO, ZERO, ZERO if two_velocities else None)
     group = _Group(rates, _no_turning(rates), NO_TURN, None)
-    return _Moved(JointState(None, ZERO), LinkMotion(base, spin_of(rates)), rates, group)
+    return _Moved(JointState(None, ZERO), LinkMotion(base_acceleration, spin_of(rates)), rates, group)
 
 
 def _no_turning(rates: Rates) -> JointRates:

@@ -40,7 +40,7 @@ def inverse_dynamics(
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
-    base: Vector,
+    base_acceleration: Vector,
     choices: Choices = PLAIN,
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
@@ -51,7 +51,7 @@ def inverse_dynamics(
 
     Luh, Walker, Paul 1980, with the body's wrench written on its pseudo-inertia.
     """
-    forward = sweep_outward(frames, q, qd, qd_r, qdd, base, choices)
+    forward = sweep_outward(frames, q, qd, qd_r, qdd, base_acceleration, choices)
     seen = [
         _folded_body(frame, body, value, state.turn, choices) if is_folded else body
         for frame, body, value, state, is_folded in zip(

@@ -49,7 +49,7 @@ def regressor(
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
     qdd_r: Sequence[Scalar],
-    base: Vector,
+    base_acceleration: Vector,
     qd_r: Sequence[Scalar] | None = None,
 ) -> tuple[dict[int, Scalar], ...]:
     """Y with torque[i] = sum over parameters p of Y[i][p] x[p]; entries that are zero for every state are left out.
@@ -59,7 +59,7 @@ def regressor(
     qd_r         with it, the Slotine-Li regressor of M qdd_r + C qd_r + g; else qd
     """
     n = len(frames)
-    forward = sweep_outward(frames, q, qd, qd_r, qdd_r, base, PLAIN)
+    forward = sweep_outward(frames, q, qd, qd_r, qdd_r, base_acceleration, PLAIN)
     rows: tuple[dict[int, Scalar], ...] = tuple({} for _ in range(n))
     twists: list[dict[int, Twist]] = []
     for k, frame in enumerate(frames):

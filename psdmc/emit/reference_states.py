@@ -81,7 +81,7 @@ def reference_states(
     recipes = [recipe for name, recipe in RECIPES.items() if name in functions]
     expected: dict[str, Array] = {}
     for suffix, robot in robots.items():
-        tau = robot.torques(given["q"], given["qd"], given["qdd"], robot.base)
+        tau = robot.torques(given["q"], given["qd"], given["qdd"], robot.base_acceleration)
         given[f"{TAU.name}{suffix}"] = tau
         own = [recipe for recipe in recipes if recipe.signature.theta]
         expected |= _values(own, robot, given | {TAU.name: tau}, suffix, solvable)

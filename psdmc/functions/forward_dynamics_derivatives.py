@@ -44,7 +44,9 @@ def trace(g: Ingredients) -> Outputs:
 
 def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
     q, qd = g.inputs["q"], g.inputs["qd"]
-    return inverse_dynamics_derivatives(g.frames, g.bodies, g.drives, q, qd, qdd, g.base, g.choices)
+    return inverse_dynamics_derivatives(
+        g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices
+    )
 
 
 def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 def trace(g: Ingredients) -> Outputs:
     still = g.still
-    return {"g": torques(g, still, still, g.base)}
+    return {"g": torques(g, still, still, g.base_acceleration)}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     rest = np.zeros_like(given["q"])
-    return {"g": robot.torques(given["q"], rest, rest, robot.base)}
+    return {"g": robot.torques(given["q"], rest, rest, robot.base_acceleration)}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

@@ -21,7 +21,7 @@ def trace(g: Ingredients) -> Outputs:
     """At rest: d g / d q is symmetric, the second derivatives of potential energy, so that the lower triangle is enough."""
     still = g.still
     found = inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, g.inputs["q"], still, still, g.base, g.choices
+        g.frames, g.bodies, g.drives, g.inputs["q"], still, still, g.base_acceleration, g.choices
     )
     n = len(still)
     slopes = [[found.by_q[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
@@ -31,7 +31,7 @@ def trace(g: Ingredients) -> Outputs:
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     rest = np.zeros_like(given["q"])
     by_q, _, _ = robot.torque_derivatives(given["q"], rest, rest)
-    return {"g": robot.torques(given["q"], rest, rest, robot.base), "dg_dq": by_q}
+    return {"g": robot.torques(given["q"], rest, rest, robot.base_acceleration), "dg_dq": by_q}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    return {"tau": torques(g, g.inputs["qd"], g.inputs["qdd"], g.base)}
+    return {"tau": torques(g, g.inputs["qd"], g.inputs["qdd"], g.base_acceleration)}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    return {"tau": robot.torques(given["q"], given["qd"], given["qdd"], robot.base)}
+    return {"tau": robot.torques(given["q"], given["qd"], given["qdd"], robot.base_acceleration)}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

@@ -17,7 +17,14 @@ if TYPE_CHECKING:
 
 def trace(g: Ingredients) -> Outputs:
     found = inverse_dynamics_derivatives(
-        g.frames, g.bodies, g.drives, g.inputs["q"], g.inputs["qd"], g.inputs["qdd"], g.base, g.choices
+        g.frames,
+        g.bodies,
+        g.drives,
+        g.inputs["q"],
+        g.inputs["qd"],
+        g.inputs["qdd"],
+        g.base_acceleration,
+        g.choices,
     )
     return {"dtau_dq": found.by_q, "dtau_dqd": found.by_qd, "dtau_dqdd": found.by_qdd}
 

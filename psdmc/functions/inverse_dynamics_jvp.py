@@ -21,7 +21,7 @@ DIRECTIONS = (DQ, DQD, DQDD)
 
 def trace(g: Ingredients) -> Outputs:
     q, qd, qdd = (g.inputs[name] for name in ("q", "qd", "qdd"))
-    tau = torques(g, qd, qdd, g.base)
+    tau = torques(g, qd, qdd, g.base_acceleration)
     tangent = [value for direction in DIRECTIONS for value in g.inputs[direction.name]]
     return {"tau": tau, "dtau": slopes(tau, [*q, *qd, *qdd], tangent)}
 
@@ -29,7 +29,7 @@ def trace(g: Ingredients) -> Outputs:
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q, qd, qdd = (given[name] for name in ("q", "qd", "qdd"))
     return {
-        "tau": robot.torques(q, qd, qdd, robot.base),
+        "tau": robot.torques(q, qd, qdd, robot.base_acceleration),
         "dtau": _along(robot.torque_derivatives(q, qd, qdd), given),
     }
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def trace(g: Ingredients) -> Outputs:
     q, qd, qdd = (g.inputs[name] for name in ("q", "qd", "qdd"))
-    tau = torques(g, qd, qdd, g.base)
+    tau = torques(g, qd, qdd, g.base_acceleration)
     by_q, by_qd, by_qdd = gradients(tau, g.inputs[COTANGENT.name], (q, qd, qdd))
     return {"tau": tau, "grad_q": by_q, "grad_qd": by_qd, "grad_qdd": by_qdd}
 
@@ -27,7 +27,9 @@ def trace(g: Ingredients) -> Outputs:
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q, qd, qdd = (given[name] for name in ("q", "qd", "qdd"))
     return _weighted(
-        robot.torques(q, qd, qdd, robot.base), robot.torque_derivatives(q, qd, qdd), given[COTANGENT.name]
+        robot.torques(q, qd, qdd, robot.base_acceleration),
+        robot.torque_derivatives(q, qd, qdd),
+        given[COTANGENT.name],
     )
 
 

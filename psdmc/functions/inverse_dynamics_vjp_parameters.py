@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from psdmc.functions import inverse_dynamics_vjp
 from psdmc.program.signature import Signature
-from psdmc.recipes.base_regressor import rows_on_arrays
 from psdmc.recipes.directions import COTANGENT, GRADIENT_THETA, parameter_gradient, weighted
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.regressor_rows import rows_on_arrays
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:

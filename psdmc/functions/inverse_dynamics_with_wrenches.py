@@ -23,14 +23,18 @@ WRENCHES = Quantity("wrenches", ("frames", "6"), largest=20.0)
 def trace(g: Ingredients) -> Outputs:
     rows = [g.inputs["wrenches"][6 * k : 6 * k + 6] for k in range(len(g.named))]
     external = link_wrenches(g.named, rows, g.unit)
-    return {"tau": torques(g, g.inputs["qd"], g.inputs["qdd"], g.base, external=external)}
+    return {"tau": torques(g, g.inputs["qd"], g.inputs["qdd"], g.base_acceleration, external=external)}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     named = robot.chain.frames
     wrenches = given["wrenches"].reshape(-1, len(named), 6)
     external = link_wrenches(named, [list(wrenches[:, k].T) for k in range(len(named))])
-    return {"tau": robot.torques(given["q"], given["qd"], given["qdd"], robot.base, external=external)}
+    return {
+        "tau": robot.torques(
+            given["q"], given["qd"], given["qdd"], robot.base_acceleration, external=external
+        )
+    }
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    return {"h": torques(g, g.inputs["qd"], g.still, g.base)}
+    return {"h": torques(g, g.inputs["qd"], g.still, g.base_acceleration)}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    return {"h": robot.torques(given["q"], given["qd"], np.zeros_like(given["q"]), robot.base)}
+    return {"h": robot.torques(given["q"], given["qd"], np.zeros_like(given["q"]), robot.base_acceleration)}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

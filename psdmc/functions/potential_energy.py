@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    return {"U": potential_energy(g.frames, g.bodies, g.inputs["q"], g.base)}
+    return {"U": potential_energy(g.frames, g.bodies, g.inputs["q"], g.base_acceleration)}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q = given["q"]
-    return {"U": entries(potential_energy(robot.frames, robot.bodies, list(q.T), robot.base), len(q))}
+    return {
+        "U": entries(potential_energy(robot.frames, robot.bodies, list(q.T), robot.base_acceleration), len(q))
+    }
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

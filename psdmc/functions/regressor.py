@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
-from psdmc.recipes.base_regressor import rows_on_arrays, traced_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
+from psdmc.recipes.regressor_rows import rows_on_arrays, traced_rows
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psdmc.program.signature import QD, Q, Quantity, Signature
-from psdmc.recipes.base_regressor import rows_on_arrays, traced_rows
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.regressor_rows import rows_on_arrays, traced_rows
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:

@@ -320,7 +320,9 @@ def _sampled_columns(reframed: Reframed) -> Long:
     drawn = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(3, n, STATES))
     q, qd, qdd = drawn.astype(np.longdouble)
     here = [Placement.identity()] * n
-    rows = regressor(reframed.frames, here, range(11 * n), list(q), list(qd), list(qdd), reframed.base)
+    rows = regressor(
+        reframed.frames, here, range(11 * n), list(q), list(qd), list(qdd), reframed.base_acceleration
+    )
     standard = np.zeros((n, STATES, 11 * n), np.longdouble)
     for i, row in enumerate(rows):
         for column, value in row.items():

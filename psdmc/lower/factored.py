@@ -119,7 +119,7 @@ def _traced(
 ) -> Recorded:
     ingredients = Ingredients(
         frames=reframed.frames,
-        base=reframed.base,
+        base_acceleration=reframed.base_acceleration,
         bodies=bodies,
         drives=drives,
         choices=choices,
@@ -180,7 +180,7 @@ def in_unit(reframed: Reframed, unit: float) -> Reframed:
         return (x, y, z)
 
     frames = tuple(replace(f, translation=scaled(f.translation)) for f in reframed.frames)
-    return replace(reframed, frames=frames, base=scaled(reframed.base))
+    return replace(reframed, frames=frames, base_acceleration=scaled(reframed.base_acceleration))
 
 
 def _ratio(value: float, unit: float) -> float:

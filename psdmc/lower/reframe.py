@@ -46,7 +46,7 @@ class Reframed:
     """A robot's geometry for lowering.
 
     frames       n
-    base         base acceleration, minus gravity, m/s^2, along base_axes
+    base_acceleration  of the base, minus gravity, m/s^2, along base_axes
     link_frames  n, the file's link frames in the new joint frames
     tip          the tip frame in the new joint frame of `tip_body`
     base_axes    3 x 3, the axes that the first frame turns from, as columns in the robot's base frame
@@ -56,7 +56,7 @@ class Reframed:
     """
 
     frames: tuple[Frame, ...]
-    base: Vector
+    base_acceleration: Vector
     link_frames: tuple[Placement, ...]
     tip: Placement
     base_axes: Matrix
@@ -67,7 +67,8 @@ class Reframed:
     def is_same(self, other: Reframed) -> bool:
         """Whether every number of both is."""
         return (
-            (self.frames, self.base, self.base_axes) == (other.frames, other.base, other.base_axes)
+            (self.frames, self.base_acceleration, self.base_axes)
+            == (other.frames, other.base_acceleration, other.base_axes)
             and all(map(_is_same, self.link_frames, other.link_frames))
             and _is_same(self.tip, other.tip)
         )
@@ -103,7 +104,7 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
         )
         mine = Placement(after[i], origins[i])
         link_frames.append(_rounded(mine.inverse() @ placed[i] @ joint.link_frame, reach))
-    base = _clean_lengths(times(before[0].T, -chain.gravity), length(chain.gravity))
+    at_base = _clean_lengths(times(before[0].T, -chain.gravity), length(chain.gravity))
     end = chain.tip_body
     tip = _rounded(_moved(after, origins, placed, chain.tip_frame), reach)
     named = tuple(
@@ -113,7 +114,7 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
     base_axes = as_matrix(np.where(np.abs(before[0]) < EXACT, 0.0, before[0]).tolist())
     origin = as_vector((_clean_lengths(origins[0], reach) + 0.0).tolist())
     return Reframed(
-        tuple(frames), as_vector(base.tolist()), tuple(link_frames), tip, base_axes, end, origin, named
+        tuple(frames), as_vector(at_base.tolist()), tuple(link_frames), tip, base_axes, end, origin, named
     )
 
 

@@ -1,4 +1,4 @@
-"""MODEL: inverse dynamics as functions times constants, and everything known about where it came from."""
+"""MODEL: inverse dynamics as monomials times constants, and everything known about where it came from."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DynamicsModel:
-    """Inverse dynamics as functions times constants: tau[i] = y(state) @ P[i] @ theta_b.
+    """Inverse dynamics as monomials times constants: tau[i] = y(state) @ P[i] @ theta_b.
 
-    n joints, p functions, l base parameters.
+    n joints, p monomials, l base parameters.
 
     expansion    E and P; None where derived with --no-expand
     theta_b      (l,) float      base parameters, SI, units per entry; None while unknown
@@ -76,7 +76,7 @@ class DynamicsModel:
 
     @property
     def E(self) -> NDArray[np.uint8] | None:
-        """(5n, p) exponents of the functions; None where they were not expanded."""
+        """(5n, p) exponents of the monomials; None where they were not expanded."""
         return None if self.expansion is None else self.expansion.E
 
     @property
@@ -86,7 +86,7 @@ class DynamicsModel:
 
     @property
     def p(self) -> int | None:
-        """Number of functions; None where they were not expanded."""
+        """Number of monomials; None where they were not expanded."""
         return None if self.expansion is None else self.expansion.p
 
     @property

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 CHUNK_BYTES = 64 * 2**20
-"""Function values held at once."""
+"""Values of monomials held at once."""
 BLOCK_BYTES = 2**18
-"""Function values multiplied at once: a share of a core's own cache."""
+"""Values of monomials multiplied at once: a share of a core's own cache."""
 
 
 def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
@@ -42,10 +42,10 @@ def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], lis
     return shape[:-1], [np.broadcast_to(a, shape).reshape(-1, n) for a in arrays.values()]
 
 
-class _Products:
-    """The functions y of an expansion, ready to be valued: products of the rows of E, gravity functions times |g|.
+class _Monomials:
+    """The monomials y of an expansion, ready to be evaluated: products of the rows of E, those of gravity times |g|.
 
-    Functions share the part that the position decides, and few factors come after it: each part is computed once.
+    Monomials share the part that the position decides, and few factors come after it: each part is computed once.
     """
 
     def __init__(self, expansion: Expansion, chain: Mechanism) -> None:
@@ -57,7 +57,7 @@ class _Products:
         self.factors = tuple(_factors(exponents[3 * n :]))
 
     def values(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """(p, states) from (states, n) arrays; each function's factors in the order of E's rows."""
+        """(p, states) from (states, n) arrays; each monomial's factors in the order of E's rows."""
         placed = np.repeat(self.strength[:, None], q.shape[0], axis=1)
         for powers, row in zip(self.parts, np.concatenate([q.T, np.sin(q).T, np.cos(q).T]), strict=True):
             for power in (1, 2):
@@ -85,7 +85,7 @@ def _alike(columns: NDArray[np.uint8]) -> tuple[NDArray[np.intp], NDArray[np.int
 
 
 def _factors(exponents: NDArray[np.uint8]) -> Iterator[NDArray[np.intp]]:
-    """(p,) each: which of 1, the rates, their squares is a function's first factor, its second, and so on.
+    """(p,) each: which of 1, the rates, their squares is a monomial's first factor, its second, and so on.
 
     exponents  (2n, p) of qd and qdd, at most 2
     """
@@ -115,7 +115,7 @@ def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Ar
 
 
 def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) -> Array:
-    """M (states, n, n) at q (states, n): column j is what the functions with qdd_j give for qdd_j = 1."""
+    """M (states, n, n) at q (states, n): column j is what the monomials with qdd_j give for qdd_j = 1."""
     n, weights = expansion.n, _weights(expansion, theta)
     columns = [np.flatnonzero(expansion.E[4 * n + j]) for j in range(n)]
     parts = [weights[:, own] for own in columns]
@@ -127,7 +127,7 @@ def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) 
 
 
 def _weights(expansion: Expansion, theta: Array) -> sparse.csr_array:
-    """(n, p) what each function weighs in each torque; sparse, whose sums do not hang on the number of
+    """(n, p) the weight of each monomial in each torque; sparse, whose sums do not hang on the number of
     threads."""
     from scipy import sparse
 
@@ -137,9 +137,9 @@ def _weights(expansion: Expansion, theta: Array) -> sparse.csr_array:
 def _by_chunks(
     expansion: Expansion, chain: Mechanism, arrays: list[Array], result: Callable[[Array], Array]
 ) -> Array:
-    """result(function values) for few enough states at a time, put together along the states."""
+    """result(values of monomials) for few enough states at a time, put together along the states."""
     count = len(arrays[0])
     size = max(1, CHUNK_BYTES // (8 * max(1, expansion.p)))
     pieces = ([a[start : start + size] for a in arrays] for start in range(0, max(count, 1), size))
-    products = _Products(expansion, chain)
+    products = _Monomials(expansion, chain)
     return np.concatenate([result(products.values(*piece)) for piece in pieces])

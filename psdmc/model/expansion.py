@@ -1,4 +1,4 @@
-"""The functions of a model and what each contributes: E and P, which only come together."""
+"""The monomials of a model and what each contributes: E and P, which only come together."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Entries(NamedTuple):
     """The entries of n sparse matrices P: joint by joint, row by row.
 
     joint   (k,) int32    which matrix, 0 to n - 1
-    row     (k,) int32    function, 0 to p - 1
+    row     (k,) int32    monomial, 0 to p - 1
     column  (k,) int32    base parameter, 0 to l - 1
     value   (k,) float64
     """
@@ -31,7 +31,7 @@ class Entries(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Expansion:
-    """tau[i] = y @ P[i] @ theta_b: n joints, p functions y, l base parameters.
+    """tau[i] = y @ P[i] @ theta_b: n joints, p monomials y, l base parameters.
 
     E        (5n, p) uint8   exponents; row blocks q, sin q, cos q, qd, qdd
     entries  of P
@@ -87,7 +87,7 @@ class Expansion:
 
     @property
     def p(self) -> int:
-        """Number of functions."""
+        """Number of monomials."""
         return int(self.E.shape[1])
 
     @property

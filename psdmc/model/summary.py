@@ -15,7 +15,7 @@ from psdmc.robot.mechanism import Joint
 
 
 class Sizes(NamedTuple):
-    """How many functions each kind of acceleration has."""
+    """How many monomials each kind of acceleration has."""
 
     gravity: int
     acceleration: int
@@ -27,7 +27,7 @@ class Sizes(NamedTuple):
 class Summary:
     """A model at a glance.
 
-    sizes        functions by kind of acceleration; None where the model was not expanded
+    sizes        monomials by kind of acceleration; None where the model was not expanded
     entries      non-zero entries of P; None likewise
     certificate  largest torque error relative to the joint's largest torque, per joint
     """
@@ -75,7 +75,7 @@ def summary(model: DynamicsModel) -> Summary:
 
 
 def sizes_of(E: NDArray[np.uint8]) -> Sizes:
-    """Count the functions of E (5n, p) by kind of acceleration."""
+    """Count the monomials of E (5n, p) by kind of acceleration."""
     n = E.shape[0] // 5
     speeds, accelerations = E[3 * n : 4 * n], E[4 * n :]
     accelerating, moving = accelerations.any(axis=0), speeds.any(axis=0)
@@ -89,7 +89,7 @@ def sizes_of(E: NDArray[np.uint8]) -> Sizes:
 
 
 def term_texts(model: DynamicsModel) -> Iterator[str]:
-    """Every function of y as text, in the order of E: 'g s2 c3', 'qdd1 c2^2', 'qd1 qd2 s2 c2'."""
+    """Every monomial y as text, in the order of E: 'g s2 c3', 'qdd1 c2^2', 'qd1 qd2 s2 c2'."""
     exponents = model.expanded().E
     n = model.n
     names = [f"{symbol}{j + 1}" for symbol in ("q", "s", "c", "qd", "qdd") for j in range(n)]

@@ -26,5 +26,5 @@ def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], 
     The mass matrix is factorized before the bias is found: its divisions wait for each other, the recursion fills the time.
     """
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
-    bias = torques(g, g.inputs["qd"], g.still, g.base)
+    bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
     return solve(factors, [given - h for given, h in zip(tau, bias, strict=True)]), factors

@@ -39,7 +39,7 @@ def torque_gradients(
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Gradients of the weighted torques by q and by qd, at fixed computed accelerations."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g)
-    by_q, by_qd = gradients(torques(g, qd, free, g.base), weights, (q, qd))
+    by_q, by_qd = gradients(torques(g, qd, free, g.base_acceleration), weights, (q, qd))
     found = substituted([*by_q, *by_qd], free, qdd)
     return found[: len(q)], found[len(q) :]
 
@@ -48,7 +48,7 @@ def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[
     """l derivatives of the weighted torques by theta_b, at fixed accelerations: Y^T weights, Y their regressor."""
     theta_b, bodies, drives = g.by_theta()
     loose, free = replace(g, bodies=bodies, drives=drives), _free(g)
-    (found,) = gradients(torques(loose, g.inputs["qd"], free, g.base), weights, (theta_b,))
+    (found,) = gradients(torques(loose, g.inputs["qd"], free, g.base_acceleration), weights, (theta_b,))
     return substituted(found, free, qdd)
 
 
@@ -56,7 +56,7 @@ def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
     """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g)
     along = [*g.inputs[DQ.name], *g.inputs[DQD.name]]
-    return substituted(slopes(torques(g, qd, free, g.base), [*q, *qd], along), free, qdd)
+    return substituted(slopes(torques(g, qd, free, g.base_acceleration), [*q, *qd], along), free, qdd)
 
 
 def _free(g: Ingredients) -> list[Scalar]:

@@ -48,7 +48,7 @@ class RobotOnArrays:
         return frames_of(self.chain)
 
     @cached_property
-    def base(self) -> Vector:
+    def base_acceleration(self) -> Vector:
         return base_acceleration(self.chain)
 
     @cached_property
@@ -69,7 +69,7 @@ class RobotOnArrays:
         q: Array,
         qd: Array,
         qdd: Array,
-        base: Vector,
+        base_acceleration: Vector,
         qd_r: Array | None = None,
         external: Mapping[int, Wrench] = NO_WRENCHES,
     ) -> Array:
@@ -77,20 +77,22 @@ class RobotOnArrays:
         rates = None if qd_r is None else list(qd_r.T)
         given = (list(q.T), list(qd.T), list(qdd.T))
         torques = inverse_dynamics(
-            self.frames, self.bodies, self.drives, *given, base, qd_r=rates, external=external
+            self.frames, self.bodies, self.drives, *given, base_acceleration, qd_r=rates, external=external
         )
         return columns(torques, len(q))
 
     def torque_derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
         """(k, n, n) each: derivatives of the torques by q, qd and qdd; row i: of tau[i]."""
         given = (list(q.T), list(qd.T), list(qdd.T))
-        found = inverse_dynamics_derivatives(self.frames, self.bodies, self.drives, *given, self.base)
+        found = inverse_dynamics_derivatives(
+            self.frames, self.bodies, self.drives, *given, self.base_acceleration
+        )
         by_q, by_qd, by_qdd = (matrix(rows, len(q)) for rows in found[:3])
         return by_q, by_qd, by_qdd
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
         """(k, n)"""
-        bias = self.torques(q, qd, np.zeros_like(q), self.base)
+        bias = self.torques(q, qd, np.zeros_like(q), self.base_acceleration)
         found = np.linalg.solve(self.mass_matrix(q), (tau - bias)[..., None])[..., 0]
         return np.asarray(found, dtype=np.float64)
 

@@ -38,7 +38,7 @@ class Ingredients:
     """What a trace runs on: symbols, and one robot's constants.
 
     frames       n joint frames
-    base         base acceleration, minus gravity, along the axes that the first frame turns from
+    base_acceleration  of the base, minus gravity, along the axes that the first frame turns from
     bodies       n bodies about the joint frames and
     drives       n drive inertias that belong to theta_b; only torques are those of the real bodies. Empty for functions
                  without theta_b
@@ -58,7 +58,7 @@ class Ingredients:
     """
 
     frames: tuple[Frame, ...]
-    base: Vector
+    base_acceleration: Vector
     bodies: tuple[Body, ...]
     drives: tuple[Scalar, ...]
     choices: Choices

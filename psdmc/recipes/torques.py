@@ -13,11 +13,13 @@ def torques(
     g: Ingredients,
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
-    base: Vector,
+    base_acceleration: Vector,
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
     """n joint torques M qdd + C(q, qd) qd_r, qd_r = qd if not given, and what the base's acceleration asks for, less what
     wrenches on the links give."""
     q = g.inputs["q"]
-    return inverse_dynamics(g.frames, g.bodies, g.drives, q, qd, qdd, base, g.choices, qd_r, external)
+    return inverse_dynamics(
+        g.frames, g.bodies, g.drives, q, qd, qdd, base_acceleration, g.choices, qd_r, external
+    )

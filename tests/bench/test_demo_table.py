@@ -28,7 +28,7 @@ def test_the_table_without_a_cpp_compiler(monkeypatch: pytest.MonkeyPatch):
 
     text = demo.demo(bundled_model("two_link"), said.append)
 
-    assert "p = 10 functions, l = 4 base parameters" in text
+    assert "p = 10 monomials, l = 4 base parameters" in text
     for name in demo.FUNCTIONS:
         assert name.replace("_", " ") in text
     assert "not measured: Pinocchio: no C++ compiler found" in text

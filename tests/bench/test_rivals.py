@@ -45,7 +45,7 @@ def test_a_form_too_large_to_compile_is_left_out_with_the_reason(two_link, monke
     (answer,) = psdmc_c.expanded(two_link, ())
 
     assert answer == Unavailable(
-        "psdmc expanded", "p = 18 functions: not lowered and compiled beyond 17, it takes too long"
+        "psdmc expanded", "p = 18 monomials: not lowered and compiled beyond 17, it takes too long"
     )
 
 

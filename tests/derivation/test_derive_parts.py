@@ -8,9 +8,9 @@ from bundled import bundled_model
 from random_chains import random_chain
 
 from psdmc.derivation.derive import derive_model
-from psdmc.derivation.functions import Functions
 from psdmc.derivation.interpolate import along_axes, evaluation, interpolation, nodes, quadratic_basis
-from psdmc.derivation.memory import grid_bytes, largest_function_count, velocity_bytes
+from psdmc.derivation.memory import grid_bytes, largest_monomial_count, velocity_bytes
+from psdmc.derivation.monomials import Monomials
 from psdmc.derivation.reduce import reduced, row_space, triangular
 from psdmc.derivation.rounding import merged
 from psdmc.derivation.terms import Terms, summed, times_matrix
@@ -20,8 +20,8 @@ from psdmc.robot.joints import PRISMATIC, REVOLUTE, JointType
 
 
 def terms(*entries: tuple[int, int, int, float]) -> Terms:
-    row, function, column, value = zip(*entries, strict=True)
-    return Terms(np.array(row), np.array(function), np.array(column), np.array(value))
+    row, monomial, column, value = zip(*entries, strict=True)
+    return Terms(np.array(row), np.array(monomial), np.array(column), np.array(value))
 
 
 def test_a_product_of_two_linear_polynomials_interpolates_to_its_coefficients() -> None:
@@ -39,16 +39,16 @@ def test_a_product_of_two_linear_polynomials_interpolates_to_its_coefficients() 
 
 @pytest.mark.parametrize("kind", [REVOLUTE, PRISMATIC])
 def test_the_derivative_in_coefficient_space_is_the_derivative(kind: JointType) -> None:
-    functions = Functions((REVOLUTE, kind))
+    monomials = Monomials((REVOLUTE, kind))
     count = len(nodes(kind))
     coefficients = np.random.default_rng(0).normal(size=count)
     given = terms(*((0, 10 + digit, 0, value) for digit, value in enumerate(coefficients)))
-    slope = derivative(given, functions, 1)
-    assert slope_count(given, functions, 1) == len(slope.value)
+    slope = derivative(given, monomials, 1)
+    assert slope_count(given, monomials, 1) == len(slope.value)
     q, h = np.array([0.3, -1.1]), 1e-6
     expected = (quadratic_basis(kind, q + h) - quadratic_basis(kind, q - h)) @ coefficients / (2 * h)
-    assert (slope.function // 5 == 2).all()
-    found = quadratic_basis(kind, q)[:, slope.function % 5] @ slope.value
+    assert (slope.monomial // 5 == 2).all()
+    found = quadratic_basis(kind, q)[:, slope.monomial % 5] @ slope.value
     assert np.allclose(found, expected, atol=1e-8)
 
 
@@ -137,13 +137,13 @@ def test_values_further_apart_than_rounding_stay() -> None:
 def test_the_bound_on_p_holds_and_is_near(kinds: str) -> None:
     chain = random_chain(0, kinds)
     p = derive_model(chain).p
-    bound = largest_function_count(chain.types)
+    bound = largest_monomial_count(chain.types)
     assert p <= bound
     assert kinds != "RRRR" or p > 0.8 * bound
 
 
 def test_expansion_beyond_memory_is_refused_before_it_is_made() -> None:
-    with pytest.raises(DerivationError, match=r"2-joint .* functions and about .* GiB") as caught:
+    with pytest.raises(DerivationError, match=r"2-joint .* monomials and about .* GiB") as caught:
         derive_model(random_chain(0, "RR"), memory=100)
     assert "--no-expand" in caught.value.hint
 
@@ -157,9 +157,9 @@ def test_velocity_terms_beyond_memory_are_refused() -> None:
 
 
 def test_terms_are_counted_before_they_are_made() -> None:
-    functions = Functions((REVOLUTE, REVOLUTE))
+    monomials = Monomials((REVOLUTE, REVOLUTE))
     mass = {(0, 0): terms((0, 3, 0, 1.0), (0, 0, 0, 1.0)), (0, 1): terms((0, 1, 0, 1.0))}
-    count, _ = velocity_bytes(mass, functions, ((1,), ()))
+    count, _ = velocity_bytes(mass, monomials, ((1,), ()))
     assert count == 2 * 2 + 3
 
 

@@ -158,7 +158,7 @@ def test_a_second_child_may_lie_along_its_parents_x() -> None:
             body_from_parameters(moved(row[:10], place).tolist())
             for row, place in zip(chain.parameters, reframed.link_frames, strict=True)
         ]
-        tau = inverse_dynamics(reframed.frames, bodies, tree.drives, *states, reframed.base)
+        tau = inverse_dynamics(reframed.frames, bodies, tree.drives, *states, reframed.base_acceleration)
         expected = tree.each(pin.rnea, *tree.states(20, 3))
         np.testing.assert_allclose(np.stack(tau, axis=1), expected, atol=1e-11)
 

@@ -32,7 +32,7 @@ EXPANDED = tuple(
 
 
 EXPANDED_LIMIT = 30_000
-"""Functions p up to which the expanded form is measured: beyond, lowering and compiling it takes many minutes."""
+"""Monomials p up to which the expanded form is measured: beyond, lowering and compiling it takes many minutes."""
 
 
 def factored(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
@@ -45,7 +45,7 @@ def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailabl
     if case.model.p is None:
         return [Unavailable("psdmc expanded", "this model was derived without E and P")]
     if case.model.p > EXPANDED_LIMIT:
-        reason = f"p = {case.model.p:,} functions: not lowered and compiled beyond {EXPANDED_LIMIT:,}, it takes too long"
+        reason = f"p = {case.model.p:,} monomials: not lowered and compiled beyond {EXPANDED_LIMIT:,}, it takes too long"
         return [Unavailable("psdmc expanded", reason)]
     return [*contestants(case, "expanded", EXPANDED, flags)]
 

@@ -198,12 +198,12 @@ def _descended(data: JointRun, p: Array, options: FrictionOptions, evaluations: 
         return data.residual(_put(p, free, x), data.fit)
 
     def jacobian(x: Array) -> Array:
-        base = residual(x)
+        here = residual(x)
         columns = []
         for j, step in enumerate(1e-4 * scale):
             moved = x.copy()
             moved[j] += step if x[j] + step <= high[j] else -step
-            columns.append((residual(moved) - base) / (moved[j] - x[j]))
+            columns.append((residual(moved) - here) / (moved[j] - x[j]))
         return np.stack(columns, axis=1)
 
     bounds = {"bounds": (low, high), "x_scale": scale}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from psdmc.calibration.identify.least_squares import Consider, Estimate, Prior, estimate
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
-from psdmc.calibration.identify.prior import base_scale, torque_sizes
+from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.identify.steps import GravityRun, StepOptions, StepQuality, judged
 from psdmc.calibration.logs.filter import States, away_from, filtered, held_out
@@ -114,7 +114,7 @@ def calibrate_gravity(
     out = held_out(len(q), options.split)
     kept = use & ~out[:, None]
     consider = Consider(-currents[:, :, None] * np.eye(len(chain)), np.diag(motors.relative_std**2))
-    scale = base_scale(chain, model, torque_sizes(currents), file_theta)[split.pivots]
+    scale = base_parameter_scale(chain, model, torque_sizes(currents), file_theta)[split.pivots]
     start = np.zeros(len(scale)) if file_theta is None else split.phi(file_theta)
     solved = estimate(columns, target, options.fit, consider, kept, Prior(start, scale))
     return GravityResult(split, solved, noise_warnings("gravity", chain.joint_names, solved))

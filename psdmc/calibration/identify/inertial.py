@@ -19,7 +19,7 @@ from psdmc.calibration.identify.least_squares import Consider, Estimate, Prior, 
 from psdmc.calibration.identify.lugre import Lugre, friction_torque
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
-from psdmc.calibration.identify.prior import base_scale, torque_sizes
+from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.identify.steps import InertialRun, StepOptions, StepQuality, judged
 from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
@@ -96,7 +96,7 @@ def calibrate_inertial(
     out = held_out(len(target), options.split)
     consider = _considered(motors, gravity, friction, rows)
     kept = np.repeat(~out[:, None], len(chain), axis=1)
-    scale = base_scale(chain, model, torque_sizes(rows.torque), file_theta)
+    scale = base_parameter_scale(chain, model, torque_sizes(rows.torque), file_theta)
     start = np.zeros(len(split.rest)) if file_theta is None else file_theta[split.rest]
     prior = Prior(start, scale[split.rest], rows.noise @ split.from_psi())
     solved = estimate(rows.columns @ split.from_psi(), target, options.fit, consider, kept, prior)
@@ -213,7 +213,7 @@ class _Late:
         return spread
 
 
-def _friction_slopes(found: JointFriction, states: States, k: int, base: Array) -> list[Array]:
+def _friction_slopes(found: JointFriction, states: States, k: int, unmoved: Array) -> list[Array]:
     """d torque / d parameter for each of the seven, by one-sided differences that keep the bounds."""
     slopes = []
     values, std = found.friction.as_array(), found.std
@@ -222,7 +222,7 @@ def _friction_slopes(found: JointFriction, states: States, k: int, base: Array) 
         moved = values.copy()
         moved[j] += step if j != 0 or values[0] + step <= values[1] else -step
         changed = friction_torque(Lugre(*moved.tolist()), states.qd[:, k], states.period)
-        slopes.append((changed - base) / (moved[j] - values[j]))
+        slopes.append((changed - unmoved) / (moved[j] - values[j]))
     return slopes
 
 

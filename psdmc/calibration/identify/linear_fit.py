@@ -16,7 +16,7 @@ from psdmc.calibration.identify.kept_rows import KeptRows
 from psdmc.calibration.identify.least_squares import Estimate, FitOptions, Prior, estimate_rows
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.identify.prior import base_scale, torque_sizes
+from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.logs.check_options import CheckOptions
 from psdmc.calibration.logs.filter import SplitOptions, States, held_out, smoothed_rows, stretches
@@ -149,7 +149,7 @@ def _prior(
 ) -> Prior:
     """The file's theta_b and no friction; friction may be as large as its joint's torque at an ordinary speed."""
     sizes = torque_sizes(problem.torque[~problem.held_out])
-    rigid = base_scale(chain, model, sizes, theta_b)
+    rigid = base_parameter_scale(chain, model, sizes, theta_b)
     own = np.repeat(sizes, len(problem.friction))
     values = np.concatenate([np.zeros(problem.l) if theta_b is None else theta_b, np.zeros(len(own))])
     return Prior(values, np.concatenate([rigid, own]))

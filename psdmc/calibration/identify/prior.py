@@ -26,7 +26,7 @@ def torque_sizes(torque: Array) -> Array:
     return np.asarray(np.maximum(size, QUIET_JOINT * float(size.max(initial=0.0)) or 1.0))
 
 
-def base_scale(chain: Mechanism, model: Regressor, sizes: Array, theta_b: Array | None) -> Array:
+def base_parameter_scale(chain: Mechanism, model: Regressor, sizes: Array, theta_b: Array | None) -> Array:
     """(l,) believable size of each base parameter: what would explain a joint's whole torque in an ordinary motion.
 
     sizes    (n,) N m, of the joints' torques

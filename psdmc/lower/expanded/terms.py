@@ -70,8 +70,8 @@ def baked_torque_terms(model: DynamicsModel) -> Terms:
     n, p = expansion.n, expansion.p
     joint, row, column, value = expansion.entries
     weights = np.bincount(joint * np.int64(p) + row, value * theta_b[column], n * p).reshape(n, p)
-    joints, functions = np.nonzero(weights)
-    entries = Entries(joints, functions, np.zeros_like(joints), weights[joints, functions])
+    joints, monomials = np.nonzero(weights)
+    entries = Entries(joints, monomials, np.zeros_like(joints), weights[joints, monomials])
     return _stacked(expansion.E, entries, 1)[0]
 
 

@@ -1,4 +1,4 @@
-"""The functions of one coordinate that a joint's motion is made of; derivation interpolates in their products."""
+"""The factors 1, sin q, cos q, q ... that a joint's motion is made of; derivation interpolates in their products."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Exponents = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """Functions of one coordinate, numbered by digit; digit 0 is the constant one.
+    """Factors that depend on one coordinate, numbered by digit; digit 0 is the constant one.
 
     exponents    by digit; the first `linear` are of degree one at most, all of degree two at most: products of two of
                  degree one are sums of these

@@ -29,7 +29,7 @@ class JointType(ABC):
     urdf_words     types of a URDF's <joint> that move so
     nq, nv         numbers of coordinates and of rates
     twists         nv of them, the motion subspace: what the joint frame does per unit rate, in itself
-    basis          the functions of q that its transform is made of
+    basis          the factors in q that its transform is made of
     length_order   exponent of metre in the coordinate: 0 for an angle
     position_unit  of q; effort_unit of the joint's torque or force
     free_range     where a joint without limits is looked at, plus or minus, in the unit of q

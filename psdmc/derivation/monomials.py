@@ -1,10 +1,10 @@
-"""The functions y_j: how they are numbered, in which order they stand, and their exponents E.
+"""The monomials y_j: how they are numbered, in which order they stand, and their exponents E.
 
-A product of joint functions is a code: one digit per joint to base 5, the first joint's digit the highest. What
-a digit stands for is in the basis of the joint's type: 1, s, c, s c, c^2 where it turns, 1, q, q^2 where it
-slides. A function is a code times a rate factor: |g|; qdd_j; qd_j^2; qd_j qd_k. Its key is the rate's number
-times 5^n plus the code; E's columns stand in the order of keys: gravity, acceleration, centrifugal, Coriolis; within each by
-joint (pair), then by code.
+A monomial is a product of one factor per joint, which depends on that joint's q, and a rate factor: |g|; qdd_j;
+qd_j^2; qd_j qd_k. The joints' factors are written as a code: a number with one digit per joint, radix 5, the first
+joint's digit the highest. The basis of the joint's type says what a digit stands for: 1, s, c, s c, c^2 where it
+turns, 1, q, q^2 where it slides. A monomial's key is the rate's number times 5^n plus the code; E's columns stand in the
+order of keys: gravity, acceleration, centrifugal, Coriolis; within each by joint (pair), then by code.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ RADIX = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Functions:
+class Monomials:
     """The numbering for joints of these types."""
 
     types: tuple[JointType, ...]
@@ -76,7 +76,7 @@ class Functions:
         return table
 
     def exponents(self, keys: Integers) -> NDArray[np.uint8]:
-        """E: (5n, p) uint8 for p function keys; row blocks q, sin q, cos q, qd, qdd."""
+        """E: (5n, p) uint8 for p monomial keys; row blocks q, sin q, cos q, qd, qdd."""
         n = self.n
         table = np.zeros((5 * n, len(keys)), dtype=np.uint8)
         rates, codes = np.divmod(keys, self.codes)

@@ -20,7 +20,7 @@ def traced_rows(
     """n rows of l entries: torques M qdd + C(q, qd) qd_r + g by theta_b, qd_r = qd if not given."""
     needed = [j for j in range(len(g.lift)) if g.lift[j].any()]
     q, qd = g.inputs["q"], g.inputs["qd"]
-    found = regressor(g.frames, g.link_frames, set(needed), q, qd, qdd, g.base, qd_r)
+    found = regressor(g.frames, g.link_frames, set(needed), q, qd, qdd, g.base_acceleration, qd_r)
     return [[_entry(g.lift[:, k], needed, row) for k in range(g.lift.shape[1])] for row in found]
 
 
@@ -38,6 +38,6 @@ def rows_on_arrays(robot: RobotOnArrays, q: Array, qd: Array, qdd: Array, qd_r: 
     places = [joint.link_frame for joint in robot.chain.joints]
     states = (list(q.T), list(qd.T), list(qdd.T))
     rates = None if qd_r is None else list(qd_r.T)
-    rows = regressor(robot.frames, places, frozenset(wanted), *states, robot.base, rates)
+    rows = regressor(robot.frames, places, frozenset(wanted), *states, robot.base_acceleration, rates)
     full = np.stack([columns([row.get(c, 0.0) for c in wanted], len(q)) for row in rows], axis=1)
     return np.asarray(times(full, robot.lift[wanted]))
