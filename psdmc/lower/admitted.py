@@ -1,4 +1,5 @@
-"""Which functions a model can have: some need a positive definite mass matrix or known links, baked code parameters."""
+"""Which functions a model can have. Some need a positive definite mass matrix, or links whose parameters are all known;
+baked code needs a known theta_b."""
 
 from __future__ import annotations
 
@@ -41,8 +42,8 @@ def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
-    """A sentence that names those of `functions` (None: the default ones) that only take parameters at run time, as
-    theta_b is unknown; none where it is known or no function needs it."""
+    """Sentences that name those of `functions` (None: the default ones) that only take theta_b at run time, because the
+    model's is unknown. Empty where it is known or no function needs it."""
     names = [name for name in wanted(functions) if RECIPES[name].signature.theta]
     if model.theta_b is not None or not names:
         return ()

@@ -1,8 +1,9 @@
-"""Sparse equivalent link parameters: the model's freedom placed on few link parameters, all others exactly zero.
+"""Carriers: a few link parameters that give the same torques as all of the model's, every other one being exactly zero.
 
 Infinitely many link parameters give the same torques. Any set of parameters whose regressor columns form a basis of all
-columns can carry a model; such sets are the bases of a matroid, so the greedy choice by weight is the lightest. What a
-parameter costs depends on its neighbours, so a search by PROGRAM cost refines the choice (lower/search.py).
+columns can carry a model. Such sets are the bases of a matroid, so that the greedy choice by weight has the least total
+weight. What a parameter costs depends on its neighbours, so that a search by PROGRAM cost refines the choice
+(lower/search.py).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ PSEUDO_NAMES = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz", "Im")
 """A link's parameters in pseudo-inertia form, in the order of carriers."""
 
 LENGTH_ORDER = (0, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2)
-"""Exponent of metre in each one's unit, a sliding joint's drive inertia apart."""
+"""Exponent of the metre in the unit of each parameter. The drive inertia of a sliding joint is kg and is treated apart."""
 
 WEIGHTS = {
     "m": 6.0,
@@ -44,12 +45,12 @@ WEIGHTS = {
     "yz": 6.2,
     "Im": 1.0,
 }
-"""Operations that a parameter adds to Newton-Euler, roughly; the start of the search."""
+"""Operations that a parameter adds to Newton-Euler, roughly. Weights of the search's start."""
 
 INDEPENDENT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12)
-"""A column counts as independent where this part of its length is left beside the columns already chosen: the first
-figure, then, for the places that are still open, the next. A carrier that is barely independent would carry huge
-values."""
+"""Part of a column's length that must be left beside the columns already chosen for it to count as independent: the
+first figure first, then, for places that are still open, the next. A carrier that is barely independent would have
+huge values."""
 
 EXACT = 3e-14
 """Contributions below this, relative to the whole, are rounding of an exact zero."""
@@ -58,18 +59,21 @@ FAIR_SHARE = 1e-3
 """Exchanges that would multiply the carriers' values by more than the inverse of this are not considered."""
 
 FAIR_GROWTH = 1e3
-"""Carriers' values may be this many times theta_b, lengths in the chain's unit, before they are chosen more carefully:
-nearly parallel axes make columns that are small or nearly equal, whose differences would be lost in double."""
+"""Largest ratio of the carriers' values to theta_b, lengths in the chain's unit. Where it is exceeded the carriers are
+chosen more carefully: nearly parallel axes make columns that are small or nearly equal, and differences of large
+values lose digits in double."""
 
 MISS = 1e-13
-"""Share of the longest of the model's columns by which carriers may miss any: rounding leaves 1e-15. Their rank was not
-decided well where they miss more."""
+"""Largest part of a column of the model that carriers may leave unexplained, as a share of the longest column. Rounding
+leaves 1e-15; where more is left, the rank of the columns was decided wrongly."""
 
 EFFECT = 1e-15
-"""Share of the longest column, lengths in the chain's unit, that a carrier adds at least where chosen so."""
+"""Smallest part that a carrier must add in the careful choice, as a share of the longest column, lengths in the chain's
+unit."""
 
 RANK = 1e-12
-"""Share of the longest column, all brought to the same length, that an independent one has at least; see MISS."""
+"""Smallest part that makes a column independent, as a share of the longest one, all columns brought to the same length.
+See MISS."""
 
 STATES = 48
 SEED = 20211
@@ -107,8 +111,8 @@ class Careful(NamedTuple):
     units: Array
 
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
-        """A basis of little weight, ascending, that takes no column whose part beside the others is much smaller than
-        what another one has there."""
+        """A basis of little weight, ascending. A column is not taken where its part beside the others is much smaller
+        than another column's."""
         count = len(self.units)
         order = np.array(sorted(range(count), key=lambda j: (weights[j], j)))
         work = (self.rows[:, :count] * self.units)[:, order]
@@ -119,15 +123,15 @@ class Careful(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarrierSpace:
-    """Which link parameters can carry a model, and how.
+    """Which sets of link parameters can carry a model, and the values that theta_b gives them.
 
     r, the rank of all columns; l, the model's base parameters
 
     columns   (r, 11 n)  regressor columns in pseudo-inertia form about the re-framed joint frames, as coordinates in a
                          basis of their span
-    tableau   the same columns in a basis of themselves, and behind them the model's l: what theta_b has to give
+    tableau   the same columns in a basis of themselves, followed by the model's l columns, which theta_b weights
     whole     (l,)  lengths of the model's columns
-    careful   where columns are nearly dependent, all of the above in extended precision; None where none are
+    careful   the same in extended precision, where columns are nearly dependent; None where none are
     """
 
     columns: Array
@@ -141,16 +145,16 @@ class CarrierSpace:
         return int(self.columns.shape[1])
 
     def lightest(self, weights: Sequence[float]) -> tuple[int, ...]:
-        """The basis of least weight, ascending; ties go to the earlier parameter. Where rounding hides the last directions
-        from this order, the basis that the tableau started with."""
+        """The basis of least weight, ascending; of equal weights the earlier parameter is taken. Where rounding hides
+        the last directions from that order: the basis that the tableau started with."""
         if self.careful is not None:
             return self.careful.lightest(weights)
         chosen = _lightest(self.columns, weights)
         return chosen if len(chosen) == len(self.tableau.basis) else self.tableau.basis
 
     def exchanges(self, carriers: Sequence[int]) -> list[tuple[int, int]]:
-        """(out, in): pairs whose exchange leaves a basis: where the one coming in carries, in the old basis, a fair
-        share of the one going out."""
+        """Pairs (out, in) whose exchange leaves a basis: in the old basis, the parameter that comes in has a fair share
+        of the one that goes out."""
         lengths = self.lengths
         coefficients = self._coordinates(carriers)
         pairs = []
@@ -165,7 +169,8 @@ class CarrierSpace:
     def transfer(self, carriers: Sequence[int]) -> Array:
         """(len(carriers), l): theta_b to the carriers' values, with exact zeros and ones.
 
-        An entry is zero where what it would contribute is rounding beside what its base parameter does.
+        An entry is zero where its contribution is rounding, compared with what the base parameter contributes as a
+        whole.
         """
         key = tuple(carriers)
         if key not in self._transfers:
@@ -184,14 +189,14 @@ class CarrierSpace:
         return np.asarray(np.linalg.norm(self.columns, axis=0))
 
     def _coordinates(self, carriers: Sequence[int]) -> Array:
-        """All columns and the model's in the basis of the carriers."""
+        """All columns, the model's included, in the basis of the carriers."""
         if self.careful is not None:  # exchanges would magnify what rounding left of the smallest columns
             return Tableau.of(self.careful.rows, carriers).entries.astype(np.float64)
         return self.tableau.within(carriers).entries.astype(np.float64)
 
 
 def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
-    """The carriers of a model whose theta_b lifts to standard parameters about the link frames by `representative`."""
+    """The carriers' space of a model. `representative` takes theta_b to standard parameters about the link frames."""
     n = len(reframed.frames)
     samples = _sampled_columns(reframed)
     lift = np.zeros((PARAMETERS_PER_LINK * n, representative.shape[1]), np.longdouble)
@@ -220,10 +225,10 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
 
 
 def _in_their_span(columns: Array) -> Array:
-    """(rank, k) coordinates of k columns along some orthonormal basis of their span, by Householder's reflections with
-    column pivots; columns of which less than RANK is left beside the others are taken to depend on them.
+    """(rank, k) coordinates of k columns in an orthonormal basis of their span, by Householder's reflections with
+    column pivots. Columns of which less than RANK is left beside the others count as dependent.
 
-    Written out: LAPACK shares such small matrices among all cores, which takes longer than one.
+    Not LAPACK's: it shares such small matrices among all cores, which takes longer than one core needs.
     """
     rest, order = columns.copy(), np.arange(columns.shape[1])
     rank, least = 0, 0.0
@@ -246,7 +251,7 @@ def _in_their_span(columns: Array) -> Array:
 
 
 def _combined(columns: Long, weights: Long) -> Long:
-    """columns @ weights, term by term, where few weights are not zero."""
+    """columns @ weights, added column by column, as few weights are not zero."""
     total = np.zeros((len(columns), weights.shape[1]), columns.dtype)
     for row, column in zip(*np.nonzero(weights), strict=True):
         total[:, column] += columns[:, row] * weights[row, column]
@@ -270,8 +275,8 @@ def _careful_space(samples: Long, target: Long, units: Array) -> CarrierSpace:
 
 
 def _is_fair(space: CarrierSpace, samples: Long, target: Long, units: tuple[Array, Array]) -> bool:
-    """Whether the first carriers that come to mind give the model's columns, and are no large multiples of theta_b in the
-    chain's unit."""
+    """Whether the first choice of carriers gives the model's columns with values that are no large multiples of theta_b
+    in the chain's unit."""
     start = list(space.lightest([WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]))
     transfer = space.transfer(start)
     missed = np.abs(_combined(samples[:, start], transfer) - target).max(initial=0.0)
@@ -281,7 +286,7 @@ def _is_fair(space: CarrierSpace, samples: Long, target: Long, units: tuple[Arra
 
 
 def _units(reframed: Reframed, representative: Array) -> tuple[Array, Array]:
-    """What one unit of each carrier and of each base parameter is in SI, for a unit of length near the chain's size."""
+    """One unit of each carrier and of each base parameter in SI, for a unit of length near the chain's size."""
     longest = max(
         math.hypot(*translation)
         for frame, place in zip(reframed.frames, reframed.link_frames, strict=True)
@@ -294,7 +299,7 @@ def _units(reframed: Reframed, representative: Array) -> tuple[Array, Array]:
 
 
 def _lightest(columns: Array, weights: Sequence[float]) -> tuple[int, ...]:
-    """The basis of least weight among columns; ties go to the earlier one."""
+    """The basis of least weight among columns; of equal weights the earlier column is taken."""
     size = {j: np.linalg.norm(columns[:, j]) for j in range(columns.shape[1])}
     order = sorted((j for j in size if size[j] != 0.0), key=lambda j: (weights[j], j))
     chosen: list[int] = []
@@ -334,7 +339,8 @@ def _sampled_columns(reframed: Reframed) -> Long:
 def bodies_from_carriers(
     n: int, carriers: Sequence[int], values: Sequence[Scalar], unit: float
 ) -> tuple[tuple[Body, ...], tuple[Scalar, ...]]:
-    """Bodies and drive inertias whose carriers have these values and all else zero; lengths in units of `unit` m."""
+    """Bodies and drive inertias whose carriers have these values, every other parameter being zero; lengths in units of
+    `unit` m."""
     rows: list[list[Scalar]] = [[0.0] * PARAMETERS_PER_LINK for _ in range(n)]
     powers = (2, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0)
     for carrier, value in zip(carriers, values, strict=True):

@@ -30,7 +30,7 @@ from psdmc.robot.mechanism import Array, Mechanism
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotConstants:
-    """What of a model every trace needs.
+    """The parts of a model that every trace needs.
 
     representative  (11 n, l)  theta_b to standard parameters about the link frames
     theta_b         (l,)       None: an input of the PROGRAM
@@ -65,13 +65,13 @@ class Arrangement:
 
 
 def trace_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Program:
-    """The PROGRAM of one function that needs bodies; unknown base parameters become an input."""
+    """The PROGRAM of one function that needs bodies. Unknown base parameters become an input."""
     tracer = Tracer()
     return drop_unused(tracer.finish(_recorded(recipe, arrangement, robot, tracer)))
 
 
 def cost_of_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Cost:
-    """What that PROGRAM costs."""
+    """The cost of the PROGRAM that trace_dynamics would return."""
     tracer = Tracer()
     return tracer.cost(_recorded(recipe, arrangement, robot, tracer))
 
@@ -143,7 +143,8 @@ def _inputs(recipe: Recipe, robot: RobotConstants, tracer: Tracer) -> dict[str, 
 
 
 def _stored(signature: Signature, outputs: Outputs) -> Recorded:
-    """Every entry of what a trace gives; InternalError where that is not what the signature says."""
+    """Every entry of a trace's outputs with its slot, in order of storing; InternalError where they do not fit the
+    signature."""
     if tuple(outputs) != tuple(quantity.name for quantity in signature.stored):
         raise InternalError(f"{signature.name}: its trace gives {', '.join(outputs)}")
     return [

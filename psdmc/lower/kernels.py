@@ -24,7 +24,7 @@ from psdmc.target.native import COSTS
 Lowering = Literal["auto", "expanded", "factored"]
 
 EXPANDED_LIMIT = 600
-"""`auto` tries the expanded lowering up to this many functions p; beyond, it has never been the cheaper."""
+"""Largest p for which `auto` tries the expanded lowering; beyond it, the factored one has always been cheaper."""
 
 
 def lower(
@@ -95,12 +95,12 @@ def _kernel(
 
 
 def _is_worth_two_bodies(shared: float, own: float, theta: bool, costs: Costs) -> bool:
-    """Whether lanes get a body of their own that costs `own`, where the one for one state costs `shared`."""
+    """Whether lanes get a body of their own, at cost `own`, instead of the one for one state, at cost `shared`."""
     return shared > costs.worth_two_bodies * own and not (theta and own > costs.longest_of_two)
 
 
 class _Lowered:
-    """One model's programs; searches are shared between the functions that run the same recursion."""
+    """One model's programs. Functions that run the same recursion share one search."""
 
     def __init__(self, model: DynamicsModel, lowering: Lowering, costs: Costs) -> None:
         self.model, self.lowering, self.costs = model, lowering, costs
@@ -130,7 +130,7 @@ class _Lowered:
         return min(self._candidates(recipe, theta), key=scoring.score)
 
     def _candidates(self, recipe: Recipe, theta: bool) -> tuple[Program, ...]:
-        """What code for one state and code for lanes choose from; traced once for both."""
+        """The PROGRAMs that code for one state and code for lanes choose from, traced once for both."""
         if (recipe.name, theta) not in self._traced:
             self._traced[recipe.name, theta] = tuple(self._traces(recipe, theta))
         return self._traced[recipe.name, theta]

@@ -1,11 +1,12 @@
-"""Re-frame a robot to modified DH for cheap arithmetic: joint axes as z, frames turned about and slid along them.
+"""Re-frame a robot to modified DH for cheap arithmetic: z along the joint's axis, frames turned about it and moved
+along it.
 
-Never for E, P or theta_b: joint variables keep their zero, only intermediate frames move. A frame's x points along the
-common normal from its axis to its child's, so that the constant rotation between the two frames is about x alone and a
-right angle costs nothing. A body with several children does so towards the first; the others' frames are turned about
-both z and x. Where a frame's origin sits on its axis is a free choice (`feet`), on the normal to its parent's axis
-("previous") or to its first child's ("next"); an axis that slides has only a direction and is put through a
-neighbour's origin.
+The new frames are for generated code alone. E, P and theta_b do not depend on them, and joint variables keep their
+zero. A frame's x points along the common normal from its axis to its child's, so that the constant rotation between the
+two frames is about x alone and a right angle costs nothing. A body with several children does so towards the first; the
+frames of the others are turned about both z and x. Where on its axis a frame's origin sits is free (`feet`): on the
+normal to its parent's axis ("previous") or to its first child's ("next"). The axis of a sliding joint has only a
+direction and is put through a neighbour's origin.
 """
 
 from __future__ import annotations
@@ -31,10 +32,11 @@ NEARLY_PARALLEL = 2e-2
 normal may lie kilometres away, and torques would be differences of huge numbers."""
 
 LITTLE = 1e-2
-"""Part of a vector across an axis below which rounding has turned it off the perpendicular: it is made so once more."""
+"""Part of a vector across an axis below which rounding has changed its direction: it is made perpendicular once more."""
 
 DECIMALS = 12
-"""A length this near to one of so many decimals is that one, so that equal lengths stay equal; see ROUNDING."""
+"""A length that differs by rounding from one of so many decimals is replaced by that one, so that equal lengths stay
+equal. See ROUNDING."""
 
 ROUNDING = 1e-15
 """What composing placements can move a length by, relative to the chain's reach. Rounded to decimals beyond this, lengths of
@@ -45,14 +47,14 @@ centimetres would lose digits."""
 class Reframed:
     """A robot's geometry for lowering.
 
-    frames       n
-    base_acceleration  of the base, minus gravity, m/s^2, along base_axes
-    link_frames  n, the file's link frames in the new joint frames
-    tip          the tip frame in the new joint frame of `tip_body`
-    base_axes    3 x 3, the axes that the first frame turns from, as columns in the robot's base frame
-    tip_body     the body that the tip frame is fixed to
-    base_origin  m, the point that frames on the base have their translations from, in the robot's base frame
-    named        the robot's named frames in the new joint frames
+    frames             n joint frames
+    base_acceleration  m/s^2, minus gravity, along base_axes
+    link_frames        n, the file's link frames in the new joint frames
+    tip                the tip frame in the new joint frame of `tip_body`
+    base_axes          3 x 3, the axes that the first frame turns from, as columns in the robot's base frame
+    tip_body           the body that the tip frame is fixed to
+    base_origin        m, the point that frames on the base have their translations from, in the robot's base frame
+    named              the robot's named frames in the new joint frames
     """
 
     frames: tuple[Frame, ...]
@@ -65,7 +67,7 @@ class Reframed:
     named: tuple[NamedFrame, ...]
 
     def is_same(self, other: Reframed) -> bool:
-        """Whether every number of both is."""
+        """Whether every number of the two is equal."""
         return (
             (self.frames, self.base_acceleration, self.base_axes)
             == (other.frames, other.base_acceleration, other.base_axes)
@@ -152,7 +154,7 @@ def _first_children(chain: Mechanism) -> list[int | None]:
 
 
 def _has_direction_only(chain: Mechanism, i: int) -> bool:
-    """Whether an axis may be shifted sideways: that of a joint that slides, and does not turn."""
+    """Whether an axis may be shifted sideways: that of a joint that slides and does not turn."""
     return not any(any(angular) for _, angular in chain.joints[i].type.twists)
 
 
@@ -166,7 +168,7 @@ def _clean(direction: Array) -> Array:
 
 
 def _clean_lengths(lengths: Array, scale: float) -> Array:
-    """Rounding of zeros removed, and of decimal lengths, so that equal lengths stay equal."""
+    """Lengths without rounding: zeros made exact, decimal lengths made decimal, so that equal lengths stay equal."""
     return _decimal(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), scale)
 
 
@@ -182,7 +184,8 @@ def _parallel(a: Array, b: Array) -> bool:
 def _origins(
     chain: Mechanism, placed: Sequence[Placement], axes: Sequence[Array], feet: Sequence[Foot]
 ) -> list[Array]:
-    """Origins at q = 0 in the base frame. Parallel neighbours share a level; sliding axes go through a neighbour."""
+    """Origins of the joint frames at q = 0 in the base frame. The origins of parallel neighbours lie in one plane
+    across them; sliding axes go through a neighbour's origin."""
     n, children = len(chain), _first_children(chain)
     points = [place.translation for place in placed]
     for i, child in reversed(list(enumerate(children))):
@@ -246,20 +249,20 @@ def _orientations(
 
 
 def _own_normal(axis: Array, following: Array, step: Array, x: Array) -> Array:
-    """The common normal of a body's axis and a further child's, x where every perpendicular would do: the body's own x
-    looks along the normal to its first child."""
+    """The common normal of a body's axis and a child's that is not its first; x where every perpendicular would do.
+    (The body's own x points along the normal to its first child.)"""
     own = _normal(axis, following, step)
     return x if own is None else own
 
 
 def _across(direction: Array, axis: Array) -> Array:
-    """The part of a unit direction across an axis; itself where it is all across."""
+    """The part of a unit direction across an axis; the direction itself where nearly all of it is across."""
     along = times(axis, direction)
     return direction if abs(along) < EXACT else _clean(direction - along * axis)
 
 
 def _perpendicular(vector: Array, axis: Array) -> Array:
-    """The part of a vector across a unit axis, at right angles to it also where little is left."""
+    """The part of a vector across a unit axis, at right angles to it even where little is left."""
     part = vector - axis * times(axis, vector)
     if length(part) < LITTLE * length(vector):
         part = part - axis * times(axis, part)
@@ -267,8 +270,8 @@ def _perpendicular(vector: Array, axis: Array) -> Array:
 
 
 def _normal(axis: Array, following: Array, step: Array) -> Array | None:
-    """Direction of the common normal of two axes; None where every perpendicular would do. Nearly parallel axes take
-    the step from one origin to the next instead."""
+    """Direction of the common normal of two axes; None where every perpendicular would do. For nearly parallel axes the
+    step from one origin to the next takes its place."""
     normal = cross(axis, following)
     if _parallel(axis, following):
         normal = _perpendicular(step, axis)
@@ -278,7 +281,8 @@ def _normal(axis: Array, following: Array, step: Array) -> Array | None:
 
 
 def _first_x(chain: Mechanism, first: Placement, axis: Array) -> Array:
-    """The base is free to turn about the first axis: with gravity across it, x goes along gravity's part across."""
+    """The x direction of the first frame. The base may be turned about the first axis: with gravity across that axis, x
+    points along gravity's part across it."""
     across = _perpendicular(chain.gravity, axis)
     if np.linalg.norm(across) < EXACT * (1.0 + float(np.linalg.norm(chain.gravity))):
         return np.asarray(first.rotation[:, 0])
@@ -289,13 +293,13 @@ def _first_x(chain: Mechanism, first: Placement, axis: Array) -> Array:
 
 
 def _between(rotation: Array) -> Array:
-    """A constant rotation between frames: about x, but where axes are nearly parallel."""
+    """The constant rotation between two frames: about x, except where axes are nearly parallel."""
     turns_x = np.max(np.abs([*rotation[0, 1:], *rotation[1:, 0]])) > EXACT
     return rotation if turns_x else _about_x(rotation)
 
 
 def _about_x(rotation: Array) -> Array:
-    """The rotation about x that this is but for rounding, with exact zeros and ones."""
+    """The rotation about x nearest to this one, with exact zeros and ones."""
     c, s = float(rotation[1, 1]), float(rotation[2, 1])
     c, s = (0.0 if abs(v) < EXACT else v for v in (c, s))
     length = np.hypot(c, s)

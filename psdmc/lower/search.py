@@ -31,51 +31,52 @@ BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
 
 LARGEST_TRANSFER = 1e4
-"""Carriers whose values would be larger multiples of theta_b (in units of the chain) are not considered: torques would
-be small differences of large numbers."""
+"""Carriers whose values would be larger multiples of theta_b (lengths in the chain's unit) are not considered: torques
+would be small differences of large numbers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scoring:
-    """What PROGRAMs cost on a target. In code for one state, angles share a vector sincos; with one state per lane each
-    angle has its own."""
+    """The score of PROGRAMs on a target. In code for one state, the angles share vector sincos calls; with one state
+    per lane each angle has its own."""
 
     costs: Costs
     angles_per_sincos: int
 
     def score(self, program: Program) -> float:
-        """What `weight` gives of the PROGRAM's cost."""
+        """Weighted operations of the PROGRAM, see `weight`."""
         return self.weight(cost(program))
 
     def weight(self, c: Cost) -> float:
-        """Operations, with the target's weights, and trigonometry."""
+        """Operations with the target's weights, plus trigonometry."""
         calls, costs = math.ceil(c.sincos / self.angles_per_sincos), self.costs
         operations = c.total - costs.fused * c.fused + costs.neg * c.neg + costs.div * c.div
         return operations + costs.sincos * calls + costs.angle * c.sincos
 
 
 def for_one_state(costs: Costs) -> Scoring:
-    """Of code for one state a call."""
+    """The scoring of code for one state a call."""
     return Scoring(costs, costs.angles_per_sincos)
 
 
 def for_lanes(costs: Costs) -> Scoring:
-    """Of code for one state per lane."""
+    """The scoring of code for one state per lane."""
     return Scoring(costs, 1)
 
 
 SINGLE, BATCH = for_one_state(COSTS), for_lanes(COSTS)
-"""For the default target."""
+"""The default target's."""
 
 CHOICES = tuple(
     Choices(compound, fold, double) for compound, fold, double in product((False, True), repeat=3)
 )
 ALL_CHOICES = (*CHOICES, *(replace(choices, add_sines=True) for choices in CHOICES if choices.compound))
-"""What `rearranged` tries; the descent leaves added sines out, which pay only where each angle has a sincos of its own."""
+"""All that `rearranged` tries. The descent leaves `add_sines` out: it pays only where each angle has a sincos of its
+own."""
 
 
 def distinct(recipe: Recipe, choices: Sequence[Choices]) -> tuple[Choices, ...]:
-    """Those that make a difference to a function: the first of each kind."""
+    """The choices that make a difference to a function: of equivalent ones the first."""
     kinds = {tuple(getattr(each, field) for field in recipe.matters): each for each in reversed(choices)}
     return tuple(each for each in choices if each in kinds.values())
 
@@ -99,7 +100,8 @@ class Search:
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
-        """The cheapest arrangement found for one function; `start` is one found for another, whose geometry stays."""
+        """The cheapest arrangement found for one function. `start` is one found for another function, whose geometry is
+        kept."""
         descent = _Descent(lambda a: scoring.weight(cost_of_dynamics(recipe, a, self.robot)), self.budget)
         if start is not None:
             descent.consider(replace(start, choices=choices) for choices in distinct(recipe, CHOICES))
@@ -112,13 +114,13 @@ class Search:
         return descent.arrangement
 
     def rearranged(self, recipe: Recipe, found: Arrangement, scoring: Scoring) -> Program:
-        """The PROGRAM of a function in an arrangement found for another function or target: only the choices within
-        the recursion are made anew."""
+        """The PROGRAM of a function in an arrangement that was found for another function or target. Only the choices
+        within the recursion are made again."""
         return min(self.rearrangements(recipe, found), key=scoring.score)
 
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
-        """The PROGRAMs that `rearranged` chooses from: the cheapest for one state and for lanes, the others are only
-        counted."""
+        """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes. All
+        others are only counted."""
         tried = [replace(found, choices=choices) for choices in _felt(found, distinct(recipe, ALL_CHOICES))]
         costs = [cost_of_dynamics(recipe, arrangement, self.robot) for arrangement in tried]
         weights = [[scoring.weight(each) for each in costs] for scoring in (self.single, self.batch)]
@@ -154,13 +156,13 @@ class Search:
 
 
 def _felt(arrangement: Arrangement, choices: Iterable[Choices]) -> Iterator[Choices]:
-    """Those that make a difference: without parallel neighbours no turns are compound."""
+    """The choices that make a difference in an arrangement: without parallel neighbours there are no compound turns."""
     parallel = any(frame.is_parallel for frame in arrangement.reframed.frames[1:])
     return (each for each in choices if parallel or not each.compound)
 
 
 class _Descent:
-    """The cheapest arrangement so far, and what is left of the budget."""
+    """The cheapest arrangement so far, and the rest of the budget."""
 
     arrangement: Arrangement
 
@@ -168,7 +170,7 @@ class _Descent:
         self._score_of, self._left, self._score = score, budget, math.inf
 
     def consider(self, candidates: Iterator[Arrangement]) -> bool:
-        """Try candidates in order, moving to each that is cheaper; whether any was."""
+        """Try candidates in order, moving to each that is cheaper. Returns whether any was."""
         improved = False
         for candidate in candidates:
             if self._left == 0:

@@ -1,7 +1,7 @@
-"""Columns as combinations of some of them, in extended precision: what must be exactly zero or one comes out so.
+"""Columns as combinations of some of them, in extended precision, so that exact zeros and ones come out as such.
 
-LAPACK's results differ in the last digit from one processor to the next, and with them which numbers are equal. Here
-every operation is elementwise, in NumPy's longest float, so that generated code is the same on every x86.
+LAPACK's results differ in the last digit from one processor to the next, and so which numbers are equal. Here every
+operation is elementwise, in NumPy's longest float: generated code is the same on every x86.
 """
 
 from __future__ import annotations

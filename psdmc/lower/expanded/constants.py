@@ -1,4 +1,4 @@
-"""Equal constants made the same float: coefficients closer than their uncertainty are one constant."""
+"""Constants that are closer than their uncertainty are made the same float."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 EXACT = (0.5, 1.0, 2.0)
-"""Constants known beforehand: a coefficient that may be one of these is."""
+"""Constants that are likely: a coefficient that may equal one of them becomes it."""
 
 SMALLEST_UNCERTAINTY = 1e-15
 
 
 class Constants:
-    """A growing table of magnitudes. `merged` returns each value's entry: equal values, equal bits.
+    """A growing table of magnitudes. `merged` returns each value's entry, so that equal values have equal bits.
 
-    The most certain values are entered first and stand for the less certain ones near them: no value moves by
-    more than its own uncertainty and its entry's, and no doubtful value joins two certain ones.
+    The most certain values are entered first and replace less certain ones near them: no value moves by more than its
+    own uncertainty plus its entry's, and no uncertain value joins two certain ones.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class Constants:
         return np.copysign(out, values)
 
     def _looked_up(self, values: Array, uncertainty: Array) -> Array:
-        """Entries near values of about equal uncertainty; values near none become entries."""
+        """The nearest entries for values of about equal uncertainty; values that are near no entry become entries."""
         nearest = self._nearest(values)
         tolerance = (uncertainty + self._uncertainty[nearest]) * values
         known = np.abs(self._entries[nearest] - values) <= tolerance
@@ -52,7 +52,8 @@ class Constants:
         return right - is_left
 
     def _entered(self, values: Array, uncertainty: Array) -> Array:
-        """One new entry per run of neighbours: its most certain member, of several the smallest."""
+        """One new entry for each run of neighbours: the value that is most certain, of equally certain ones the
+        smallest."""
         order = np.lexsort((uncertainty, values))
         ordered, doubt = values[order], uncertainty[order]
         gap = np.diff(ordered) > (doubt[1:] + doubt[:-1]) * ordered[1:]

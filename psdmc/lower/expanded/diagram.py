@@ -1,10 +1,10 @@
-"""Polynomials as a diagram of nested Horner forms, parts that are equal up to a constant factor shared.
+"""Polynomials as a diagram of nested Horner forms, in which parts that are equal up to a constant factor are shared.
 
-PSDM-2021, section 4.1: take the rows in some order, group the terms that agree in all remaining rows, and
-write what a group's members differ in as a small polynomial in the row just taken, whose coefficients are
-sums over the groups further in. Built here from the innermost row outward, so that each group is known by the
-nodes it is made of: scaled until its leading coefficient is one, it is looked up among the nodes of its row,
-and only its factor travels on. (Decision diagrams with multiplicative edge values are the same thing.)
+PSDM-2021, section 4.1: take the rows in some order, group the terms that agree in all remaining rows, and write what a
+group's members differ in as a small polynomial in the row just taken, whose coefficients are sums over the groups
+further in. Here the diagram is built from the innermost row outward, so that each group is known by the nodes it is
+made of: it is scaled until its leading coefficient is one, looked up among the nodes of its row, and its factor is
+passed outward. (Decision diagrams with multiplicative edge values are the same thing.)
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def _sorted(terms: Terms, rows: Sequence[int]) -> tuple[Integers, Integers]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Groups:
-    """Groups of one row before they are looked up: child, coefficient, uncertainty by power, each (g, 3)."""
+    """The groups of one row before they are looked up: child, coefficient and uncertainty by power, (g, 3) each."""
 
     child: Integers
     coefficient: Array
@@ -174,14 +174,15 @@ def with_constants(diagram: Diagram, values: Mapping[int, float]) -> Diagram:
 
 
 def _numbers_as_factors(node: Integers, ratio: Array, number: Array) -> tuple[Integers, Array]:
-    """References to nodes that are numbers become references to ONE, or to NOTHING where it is zero."""
+    """Node and ratio arrays in which references to nodes that are numbers have become references to ONE, or to NOTHING
+    where the number is zero."""
     is_number = node < len(number)
     value = np.where(is_number, number[np.where(is_number, node, ONE)], 1.0) * ratio
     return np.where(is_number, np.where(value == 0.0, NOTHING, ONE), node), value
 
 
 def operations(diagram: Diagram) -> tuple[int, int]:
-    """Multiplications and additions that the diagram takes, squares of rows shared."""
+    """Multiplications and additions that the diagram takes; squares of rows are computed once."""
     multiplications, additions = 0, 0
     for level in diagram.levels:
         present = level.child != NOTHING
@@ -194,7 +195,7 @@ def operations(diagram: Diagram) -> tuple[int, int]:
 
 
 def _products_with_constants(level: Level) -> int:
-    """Distinct constant times child, up to sign."""
+    """How many distinct products constant * child a level takes; the sign makes no difference."""
     scaled = (level.child > ONE) & (np.abs(level.ratio) != 1.0)
     pairs = np.stack([level.child[scaled], np.abs(level.ratio[scaled])], axis=1)
     return len(np.unique(pairs, axis=0))

@@ -37,16 +37,16 @@ Outputs = list[tuple[Slot, Symbol | Number]]
 
 
 TRACED = 3
-"""Diagrams, of those that should be cheapest, that are traced and optimized to find the one that is."""
+"""How many diagrams, the cheapest by count, are traced and optimized to find the cheapest PROGRAM."""
 
 
 def lower_expanded(model: DynamicsModel, recipe: Recipe, theta: bool, costs: Costs = COSTS) -> Program:
-    """The PROGRAM of one function that is a part of the torques' polynomials; with `theta`, theta_b is an input instead
-    of constants.
+    """The PROGRAM of one function that is a part of the torques' polynomials. With `theta`, theta_b is an input; else
+    its values are constants.
 
-    Row order, and whether parameters enter before or after equal parts are found, are chosen by cost, the
-    same on every machine. InputError where the model has no E and P, or its base parameters are needed and
-    unknown; SingularMassMatrix where the mass matrix cannot be inverted for any q.
+    The order of rows, and whether parameters enter before or after equal parts are found, are chosen by cost, the same
+    on every machine. Raises InputError where the model has no E and P, or its base parameters are needed and unknown;
+    SingularMassMatrix where the mass matrix cannot be inverted for any q.
     """
     if recipe.polynomials is None or (theta and not recipe.signature.theta):
         raise ValueError(f"the expanded lowering does not make {recipe.name}{'_theta' * theta}")
@@ -56,8 +56,9 @@ def lower_expanded(model: DynamicsModel, recipe: Recipe, theta: bool, costs: Cos
 
 
 def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool) -> Iterator[Diagram]:
-    """Candidates. Baked parameters enter as rows that become constants afterwards - equal parts are then found
-    whatever the parameters' values, and constants sit furthest in - or in the coefficients at once."""
+    """Candidate diagrams. Baked parameters enter in one of two ways: as rows that become constants afterwards (equal
+    parts are then found whatever the parameters' values are, and constants stand innermost), or in the coefficients
+    at once."""
     n = model.n
     if part is Polynomials.REGRESSOR:
         yield from _in_all_orders(with_gravity(regressor_terms(model), model.mechanism), tip_first(n))
@@ -84,7 +85,7 @@ def _without_zero_rows(terms: Terms, values: Mapping[int, float]) -> Terms:
 
 
 def _part(part: Polynomials, torque: Terms, n: int) -> Terms:
-    """The terms of a function's polynomials, out of those of all torques."""
+    """The terms of one function's polynomials, taken from those of all torques."""
     match part:
         case Polynomials.MASS:
             return mass_matrix_terms(torque, n)

@@ -1,4 +1,4 @@
-"""In which order the expanded lowering takes the rows."""
+"""The orders in which the expanded lowering takes the rows of E."""
 
 from __future__ import annotations
 
@@ -12,20 +12,22 @@ TRIGONOMETRY = ((0, 2, 1), (0, 1, 2))
 
 
 def base_first(n: int) -> Joints:
-    """For torques: what stands inside is about the outer links only, and recurs often."""
+    """Joint order for torques, from the base outward: the inner parts of the nested forms then depend on the outer
+    links only, and recur often."""
     return tuple(range(n))
 
 
 def tip_first(n: int) -> Joints:
-    """For regressors: a column, which is about one link, does not contain the joints further out."""
+    """Joint order for regressors, from the tip inward: a column is about one link and does not contain the joints
+    beyond it."""
     return tuple(reversed(range(n)))
 
 
 def candidates(joints: Joints, rows: int) -> Iterator[Order]:
-    """Orders of all rows, outermost first, with the joints' positions taken in the order given.
+    """Orders of all rows, outermost first, with the joints' positions in the order given.
 
-    Rates go outermost, where the torques of two joints meet in the same polynomials of position, or joint by
-    joint. Parameters, the rows from 5 n on, stay innermost.
+    Rates stand outermost, where the torques of two joints share polynomials of position, or joint by joint. Parameters,
+    the rows from 5 n on, stay innermost.
     """
     n = len(joints)
     parameters = tuple(range(5 * n, rows))

@@ -1,4 +1,4 @@
-"""What the expanded lowering starts from: outputs as sums of monomials, read off E, P and theta_b."""
+"""The expanded lowering's input: outputs as sums of monomials, read from E, P and theta_b."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 COEFFICIENT_NOISE = 1e-13
-"""Uncertainty of a coefficient, relative to the largest one of its joint (and parameter): rounding of the
-derivation, a tenth of the accuracy that every lowering must keep."""
+"""Uncertainty of a coefficient, relative to the largest one of its joint (and parameter): rounding of the derivation, a
+tenth of the accuracy that every lowering must keep."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +103,8 @@ def known_parameters(model: DynamicsModel) -> Array:
 
 
 def _stacked(E: NDArray[np.uint8], weights: Entries, width: int) -> tuple[Terms, Integers]:
-    """One term per entry of each joint's (p, width) weights, and its column; doubt goes by columns."""
+    """One term for each entry of the joints' (p, width) weights, and the column of each. Uncertainties are relative to
+    the largest entry of a joint's column."""
     place = weights.joint * np.int64(width) + weights.column
     largest = np.zeros((E.shape[0] // 5) * width)
     np.maximum.at(largest, place, np.abs(weights.value))
@@ -116,8 +117,9 @@ def _stacked(E: NDArray[np.uint8], weights: Entries, width: int) -> tuple[Terms,
 
 
 def mass_matrix_terms(torque: Terms, n: int) -> Terms:
-    """M[i, j], i <= j, as output i * n + j: what multiplies qdd[j] in tau[i], or qdd[i] in tau[j], out of the torque whose
-    coefficients are known the better: what is nothing beside an arm's inertia may be much of its finger's."""
+    """M[i, j], i <= j, as output i * n + j. The terms are those with qdd[j] in tau[i] or with qdd[i] in tau[j],
+    whichever torque's coefficients are less uncertain: what is rounding beside an arm's inertia may matter for its
+    finger."""
     accelerations = torque.exponents[4 * n : 5 * n]
     own, other = torque.output, np.argmax(accelerations, axis=0)
     doubt = np.zeros(n)
@@ -131,17 +133,17 @@ def mass_matrix_terms(torque: Terms, n: int) -> Terms:
 
 
 def nonlinear_terms(torque: Terms, n: int) -> Terms:
-    """h[i]: what is left of tau[i] at rest accelerations."""
+    """h[i]: the terms of tau[i] without joint accelerations."""
     return torque.where(np.asarray(~torque.exponents[4 * n : 5 * n].any(axis=0)))
 
 
 def gravity_terms(torque: Terms, n: int) -> Terms:
-    """g[i]: what is left of tau[i] at rest."""
+    """g[i]: the terms of tau[i] without joint rates and accelerations."""
     return torque.where(np.asarray(~torque.exponents[3 * n : 5 * n].any(axis=0)))
 
 
 def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
-    """Gravity's terms times |g| (m/s^2), which E leaves to y."""
+    """The terms with gravity's multiplied by |g| (m/s^2), which E leaves to the monomials y."""
     n = len(chain)
     at_rest = ~terms.exponents[3 * n : 5 * n].any(axis=0)
     factor = np.where(at_rest, np.linalg.norm(chain.gravity), 1.0)
@@ -149,7 +151,7 @@ def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
 
 
 def joined(first: Terms, second: Terms, offset: int) -> Terms:
-    """Both lists of terms, the second's outputs renumbered to follow at `offset`."""
+    """Both lists of terms; `offset` is added to the second one's output numbers."""
     return Terms(
         np.concatenate([first.output, second.output + offset]),
         np.concatenate([first.exponents, second.exponents], axis=1),
