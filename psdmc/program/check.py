@@ -25,7 +25,7 @@ def check(program: Program, after: str = "tracing") -> Program:
 
 
 def _is_sound(i: int, instr: Instr) -> bool:
-    """Whether instruction i obeys the rules: asked of every instruction after every pass."""
+    """Whether instruction i obeys the rules. Fast, as it is called for every instruction after every pass."""
     op, args, slot, value = instr
     if op is Op.LOAD:
         return slot is not None and value is None and not args
@@ -39,7 +39,7 @@ def _is_sound(i: int, instr: Instr) -> bool:
 
 
 def _fault(i: int, instr: Instr) -> str:
-    """Which rule instruction i breaks."""
+    """The rule that instruction i breaks, as text."""
     op, args, slot, value = instr
     if len(args) != ARITY[op]:
         return f"t{i} = {op.value} has {len(args)} arguments"

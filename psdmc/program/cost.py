@@ -9,7 +9,7 @@ from psdmc.program.program import Op, Program
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Operation counts. add includes subtractions; negations are free in most places and stand apart.
+    """Operation counts. `add` includes subtractions; negations are free in most places and are counted apart.
 
     fused   multiplications that a fused multiply-add can absorb: used once, by an addition or subtraction, each of which
             absorbs one

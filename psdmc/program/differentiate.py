@@ -1,7 +1,7 @@
 """Derivatives of a PROGRAM as PROGRAMs: forward mode (tangents), reverse mode (adjoints), and Jacobians by either.
 
-The road for anything that can be traced, and the oracle for what has recursions of its own. Every result keeps the outputs
-of the PROGRAM that it differentiates.
+They work for every PROGRAM, and are the reference for functions whose derivatives have a recursion of their own. Every
+result keeps the outputs of the PROGRAM that it differentiates.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def _rows(replay: _Replay, block: Block) -> Iterator[tuple[int, int, Value]]:
 
 
 class _Replay:
-    """A PROGRAM on symbols, so that derivatives can be written in terms of its values."""
+    """A PROGRAM recorded on symbols, so that derivatives can be written in terms of its values."""
 
     def __init__(self, program: Program) -> None:
         self.tracer = Tracer()

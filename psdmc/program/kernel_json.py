@@ -1,4 +1,4 @@
-"""Kernels as JSON text and back: what a cache keeps of a lowering."""
+"""Kernels as JSON text and back: the form in which a cache keeps a lowering."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.signature import Signature
 
 FORMAT = 1
-"""Grows where the text's form changes."""
+"""Version of the text's form."""
 
 
 def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
@@ -32,7 +32,7 @@ def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
 
 
 def kernels_from_json(text: str, functions: Mapping[str, Signature]) -> dict[str, Kernel]:
-    """Kernels by name, in the order of `kernels_to_json`; InternalError where the text is not of its making.
+    """Kernels by name, in the order of `kernels_to_json`; InternalError where that did not write the text.
 
     functions  signatures by name, one of which each kernel must have
     """

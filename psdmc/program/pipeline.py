@@ -31,15 +31,17 @@ ROUND: tuple[Pass, ...] = (
 """Repeated while it saves operations: a bracket taken out of one sum may equal another, or be a factor."""
 
 LAST: tuple[Pass, ...] = (merge_duplicates, drop_unused)
-"""Before instructions are put in order, for both."""
+"""Passes of both forms before instructions are put in order."""
 
 
 LAST_FOR_LANES: tuple[Pass, ...] = (schedule,)
-"""Many states hide each other's waiting; what costs them is values that do not fit the registers."""
+"""For lanes: many states run side by side, so that dependent operations do not delay them; values that do not fit the
+registers do."""
 
 
 def last_for_one_state(costs: Costs) -> tuple[Pass, ...]:
-    """One state waits for its chain of dependent operations: make it short, with the target's latencies."""
+    """Passes for one state, which is delayed by its longest chain of dependent operations: they shorten it, by the
+    target's latencies."""
 
     @wraps(fuse_sums)
     def fuse(program: Program) -> Program:
@@ -49,12 +51,12 @@ def last_for_one_state(costs: Costs) -> tuple[Pass, ...]:
 
 
 LONGEST = 10
-"""Rounds at most; two or three are usual."""
+"""Largest number of rounds; two or three are usual."""
 
 
 def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> Program:
-    """The same function of its inputs in fewer operations, up to rounding, in the order that suits the target; `lanes`
-    for one state per SIMD lane.
+    """A PROGRAM with the same outputs in fewer operations, up to rounding, in the order that suits the target; with
+    `lanes`, for one state per SIMD lane.
 
     InternalError, naming the pass, where one breaks a PROGRAM's rules.
     """
@@ -62,7 +64,7 @@ def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> 
 
 
 def shortened(program: Program) -> Program:
-    """The same function in fewer operations, before its instructions are put in order."""
+    """A PROGRAM with the same outputs in fewer operations, before its instructions are put in order."""
     for _ in range(LONGEST):
         shorter = _applied(ROUND, program)
         if _operations(shorter) >= _operations(program):
@@ -72,9 +74,9 @@ def shortened(program: Program) -> Program:
 
 
 def ordered(short: Program, costs: Costs = COSTS) -> tuple[Program, Program]:
-    """A shortened PROGRAM in the order for one state a call, and in that for one state per SIMD lane: the first again
-    where it serves both, or where the target has no lanes. Where spilled values delay one state's code, too, it takes
-    the order that spills less."""
+    """A shortened PROGRAM in two orders: for one state a call, and for one state per SIMD lane. They are the same where
+    the target has no lanes or one order serves both; where spilled values also delay the code for one state, it
+    takes the order that spills less."""
     last = _applied(LAST, short)
     for_lanes = _applied(LAST_FOR_LANES, last)
     for_one = _applied(last_for_one_state(costs), last)

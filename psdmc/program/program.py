@@ -68,7 +68,7 @@ class Instr(NamedTuple):
 
 
 def operation(op: Op, args: tuple[int, ...]) -> Instr:
-    """Instr(op, args), in a third of the time: passes make some hundred thousand."""
+    """Instr(op, args), made in a third of the time: passes make some hundred thousand."""
     return tuple.__new__(Instr, (op, args, None, None))
 
 

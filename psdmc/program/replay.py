@@ -1,4 +1,4 @@
-"""A PROGRAM recorded again on symbols: in front of what shall be computed with its values, or on other inputs."""
+"""A PROGRAM recorded again on symbols, to compute with its values or to give it other inputs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Value = Symbol | Number
 
 
 def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> list[Value]:
-    """What the PROGRAM puts out, in its order, with these values for its inputs; what is not given stays an input."""
+    """The PROGRAM's outputs, in its order, with these values for its inputs. Inputs that are not given stay inputs."""
     values: list[Value] = []
     for instr in program.body:
         if instr.slot is not None:
@@ -26,7 +26,7 @@ def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> l
 
 
 def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequence[Value]) -> list[Value]:
-    """Recorded values with others in place of some inputs that they are computed from."""
+    """Recorded values, with other values in place of some of the inputs that they are computed from."""
     tracer = inputs[0].tracer
     slots = [slot for symbol in inputs if (slot := symbol.slot) is not None]
     if len(slots) < len(inputs):

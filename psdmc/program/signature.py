@@ -1,5 +1,5 @@
-"""What a generated function reads and puts out: named quantities with sizes in words. Lowering fills signatures in, emission
-prints them."""
+"""What a generated function reads and puts out: named quantities with sizes in words. Lowering computes what a
+signature names, emission prints it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Sizes:
 
     @staticmethod
     def of_chain(n: int, l: int, frames: int = 1) -> Sizes:
-        """Of a robot whose joints have one coordinate each."""
+        """The sizes of a robot whose joints have one coordinate each."""
         return Sizes(n, n, n, l, frames)
 
     def shape(self, axes: Sequence[str]) -> tuple[int, ...]:
@@ -63,11 +63,11 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class Positive:
-    """What a function computes beside its outputs and must find positive, entry by entry, to have any.
+    """Intermediate results that must be positive, entry by entry, for the function to have a result.
 
-    which   the entry that is not, in words, and
-    reason  the same by what it means
-    spoilt  what becomes NaN then, in words
+    which   says in words which entry is not positive
+    reason  says what that means
+    spoilt  says which outputs become NaN then
     """
 
     quantity: Quantity
@@ -107,16 +107,16 @@ class Signature:
 
     @property
     def stored(self) -> tuple[Quantity, ...]:
-        """Everything that its PROGRAMs put out."""
+        """All quantities that its PROGRAMs put out: outputs, then those that must be positive."""
         return (*self.outputs, *((self.positive.quantity,) if self.positive else ()))
 
     def label(self, output: Quantity, theta: bool = False) -> str:
-        """What values of one output are called: as the function, and the output where there are several."""
+        """The name for one output's values: the function's, followed by the output's where there are several."""
         kernel = self.name + ("_theta" if theta else "")
         return kernel if len(self.outputs) == 1 else f"{kernel}_{output.name}"
 
     def sizes(self, sizes: Sizes) -> dict[str, int]:
-        """Reals per state of everything that its PROGRAMs put out."""
+        """Reals per state of all quantities that its PROGRAMs put out."""
         return {quantity.name: sizes.size(quantity) for quantity in self.stored}
 
 

@@ -1,8 +1,9 @@
 """Derivatives of recorded values, recorded beside them: along tangents (forward mode) and as gradients (reverse mode).
 
-Griewank, Walther 2008, chapters 3 (modes) and 4 (what each costs). Derivatives are by inputs (`Tracer.symbols`): constants
-along a product become one, so that a product of a computed value may no longer show it. To differentiate at computed values,
-trace with inputs and put the values in their place afterwards (replay.py).
+Griewank, Walther 2008, chapters 3 (modes) and 4 (what each costs). Derivatives are taken by inputs (`Tracer.symbols`),
+not by computed values: constants along a product are merged into one, so that a recorded product may no longer contain
+the value that it was written with. To differentiate at computed values, trace with inputs and put the values in their
+place afterwards (replay.py).
 """
 
 from __future__ import annotations
@@ -53,9 +54,9 @@ def gradients(
 
 
 class _Sources:
-    """What some values are computed from, back to those that are held for inputs.
+    """The values that some values are computed from, down to the inputs.
 
-    needed  for each of the tracer's values, up to the last that matters, whether they need it
+    needed  for each of the tracer's values, up to the last one of interest, whether it is used
     """
 
     def __init__(self, tracer: Tracer, roots: Sequence[int], held: Mapping[int, None]) -> None:

@@ -1,4 +1,4 @@
-"""PROGRAM as text and back, for tests, documents and eyes."""
+"""PROGRAM as text and back, for tests and documents."""
 
 from __future__ import annotations
 

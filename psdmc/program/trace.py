@@ -1,11 +1,11 @@
-"""Symbols that record the arithmetic done to them as a PROGRAM, simplifying as they go.
+"""Symbols that record the arithmetic done to them as a PROGRAM, and simplify it as they go.
 
-Recorded once however often it is written: values are hash-consed, commutative arguments sorted, and a sign is kept
-beside a value rather than computed, so that a - b and b - a, x * y and x * -y are one instruction each. Exact zeros and
-ones disappear; constants fold and merge along products (which reorders floating point).
+Equal expressions are recorded once: values are hash-consed, commutative arguments sorted, and a sign is kept beside a
+value instead of being computed, so that a - b and b - a, or x * y and x * -y, are one instruction. Exact zeros and ones
+disappear; constants fold and merge along products (which reorders floating point).
 
-A search traces some hundred programs: the arithmetic of symbols is written out in place, on plain tuples, and becomes
-instructions only in `finish`.
+A search traces some hundred programs. The arithmetic of symbols is therefore written out in place, on plain tuples,
+which become instructions only in `finish`.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Tracer:
         return index
 
     def arguments(self, index: int) -> tuple[int, ...]:
-        """The indices of what a step's value is computed from."""
+        """The indices of the values that a step is computed from."""
         op, a, b = self.steps[index]
         if b is not None:
             return (a, b)
@@ -82,7 +82,8 @@ class Tracer:
         return Program(tuple(map(_instruction, self.steps)), tuple(stored))
 
     def cost(self, outputs: Outputs) -> Cost:
-        """What `finish` would give, without what no output needs: for searches, which only compare."""
+        """The cost of the PROGRAM that `finish` would give, values that no output needs left out. For searches, which
+        only compare."""
         stored = self._stored(outputs)
         steps, uses = self.steps, [0] * len(self.steps)
         for _, index in stored:

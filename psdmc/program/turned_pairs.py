@@ -1,8 +1,9 @@
-"""Turned pairs among recorded values: y0 = c x0 + s x1 and y1 = c x1 - s x0, whose derivatives by the angle are each other.
+"""Turned pairs among recorded values: y0 = c x0 + s x1 and y1 = c x1 - s x0. Each is the derivative of the other by the
+angle, up to sign.
 
-Of a sum of two products with the sine and cosine of one angle, the derivative by the angle is another such sum. Where that
-is recorded already, as it is wherever a vector is turned, a derivative takes it instead of differentiating sine and cosine:
-one product instead of two, and one sum.
+The derivative by the angle of a sum of two products with its sine and cosine is another such sum. Where that sum is
+recorded already, as it is wherever a vector is turned, a derivative takes it instead of differentiating sine and
+cosine: one product instead of two, and one sum.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ _SUMS = (Op.ADD, Op.SUB)
 
 
 class Part(NamedTuple):
-    """A value of which a turned one is linear: the other argument of its product, and the sine or cosine with its sign."""
+    """A value that a turned one is linear in: its index, and the sine or cosine, with sign, that multiplies it."""
 
     value: int
     factor: Symbol
 
 
 class Turned(NamedTuple):
-    """One value of such a pair, by the angle and by what is turned.
+    """One value of a turned pair, by the angle and by what is turned.
 
     angle  index of the angle
     slope  the recorded derivative by it
@@ -48,9 +49,9 @@ class _Product(NamedTuple):
 
 
 class TurnedPairs:
-    """Looks for the pairs among a tracer's values.
+    """Finds turned pairs among a tracer's values.
 
-    needed  for each value whether it is wanted anyway: others are not worth computing
+    needed  for each value whether it is used anyway; other values are not worth computing
     """
 
     def __init__(self, tracer: Tracer, needed: Sequence[bool]) -> None:
@@ -90,7 +91,7 @@ class TurnedPairs:
         return Part(product.value, Symbol(self._tracer, product.trigonometric, negative))
 
     def _slope_of_product(self, product: _Product) -> Symbol | None:
-        """What is recorded of it, whether needed or not."""
+        """The recorded derivative of a product by its angle, whether used or not; None where there is none."""
         op, negative = _SLOPE[self._tracer.steps[product.trigonometric][0]]
         factor = self._tracer.known.get((op, product.angle, None))
         if factor is None:

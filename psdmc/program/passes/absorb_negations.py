@@ -1,4 +1,4 @@
-"""Let neighbours take a sign change over."""
+"""Remove sign changes by changing neighbouring operations."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _into_uses(program: Program) -> Program:
 
 
 def _absorbed(instr: Instr, body: list[Instr]) -> Instr | int:
-    """The instruction with its arguments' signs taken over, or the index of the value that it is."""
+    """The instruction with the signs of its arguments absorbed, or the index of the value that it equals."""
     plain = [body[a].args[0] if body[a].op is Op.NEG else None for a in instr.args]
     match instr.op, plain:
         case Op.NEG, [int(x)]:
@@ -74,7 +74,8 @@ def _into_producers(program: Program) -> Program:
 
 
 def _negate(body: list[Instr], uses: list[int], index: int) -> bool:
-    """Change the sign of a value in place, if that costs nothing and nobody else sees it."""
+    """Change the sign of a value in place where that costs nothing and no other instruction uses it. Returns whether it
+    was done."""
     instr = body[index]
     if uses[index] != 1:
         return False

@@ -1,4 +1,4 @@
-"""Drop what no output needs."""
+"""Drop instructions that no output needs."""
 
 from __future__ import annotations
 

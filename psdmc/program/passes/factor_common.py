@@ -13,13 +13,13 @@ _SIGNED_SUM = {Op.ADD: (1, 1), Op.SUB: (1, -1)}
 
 @dataclass(frozen=True, slots=True)
 class _Term:
-    """sign times a product; a factor is the index of a value or a sum that is yet to be computed."""
+    """A sign times a product. A factor is the index of a value, or a sum that is yet to be computed."""
 
     sign: int
     factors: tuple[int | _Sum, ...]
 
     def is_product_with(self, factor: int) -> bool:
-        """Whether something is left without the factor; a * b + a gains nothing as a * (b + 1)."""
+        """Whether the term has this factor and others: a * b + a gains nothing as a * (b + 1)."""
         return len(self.factors) > 1 and factor in self.factors
 
     def without(self, factor: int) -> _Term:
@@ -69,7 +69,8 @@ def _parts_of_larger_sums(program: Program, uses: list[int]) -> list[bool]:
 
 
 def _signed_factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[tuple[int, list[int]]]:
-    """Sign and factors of the terms of a chain of sums, left to right (a stack, since chains can be thousands long)."""
+    """Sign and factors of each term of a chain of sums, left to right. Written with a stack, since chains can be
+    thousands long."""
     terms: list[tuple[int, list[int]]] = []
     stack = [(index, 1)]
     while stack:
@@ -84,7 +85,7 @@ def _signed_factors(body: tuple[Instr, ...], uses: list[int], index: int) -> lis
 
 
 def _shares_a_factor(terms: list[tuple[int, list[int]]]) -> bool:
-    """Whether two of the terms are products with a common factor: in most sums there are none."""
+    """Whether two of the terms are products with a common factor; false for most sums."""
     seen: set[int] = set()
     for _, factors in terms:
         if len(factors) > 1:
@@ -109,7 +110,7 @@ def _factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[int]:
 
 
 def _grouped(terms: tuple[_Term, ...]) -> tuple[_Term, ...]:
-    """Terms with common factors taken out, most frequent first; where each group stood first."""
+    """The terms with common factors taken out, the most frequent first; a group stands where its first term stood."""
     remaining = list(enumerate(terms))
     done: list[tuple[int, _Term]] = []
     while (factor := _most_frequent([term for _, term in remaining])) is not None:
@@ -144,7 +145,7 @@ class _Builder:
         return len(self.body) - 1
 
     def total(self, terms: tuple[_Term, ...]) -> int:
-        """The sum of some terms; the first one has a plus, as in every chain of sums and every bracket."""
+        """The index of the sum of some terms. The first one has a plus, as in every chain of sums and every bracket."""
         value = self._product(terms[0])
         for term in terms[1:]:
             op = Op.ADD if term.sign > 0 else Op.SUB

@@ -1,4 +1,5 @@
-"""Nest sums so that their results are ready early: what arrives late is added last, products by multiply-add."""
+"""Nest sums so that their results are ready early: the term that is ready last is added last, and products are added by
+multiply-add."""
 
 from __future__ import annotations
 
@@ -46,7 +47,7 @@ class _Part(NamedTuple):
 
 
 class _Fusion:
-    """Rebuilds the program; sums whose value is used once inside another sum are taken apart first."""
+    """Rebuilds the program. Sums whose value is used once, by another sum, are taken apart first."""
 
     def __init__(self, program: Program, latency: Latency) -> None:
         self.program, self.uses = program, program.uses()
@@ -94,7 +95,7 @@ class _Fusion:
         return out
 
     def _chain(self, terms: list[Term]) -> int:
-        """Add the two terms that are done soonest until one is left."""
+        """Add the two terms that are ready soonest until one is left; its index."""
         parts = [_Part(negative, self._operands(index), self.new_index[index]) for negative, index in terms]
         parts.sort(key=lambda part: part.value)
         while len(parts) > 2:
@@ -110,7 +111,7 @@ class _Fusion:
         return self._add(*parts).value
 
     def _operands(self, index: int) -> tuple[int, ...]:
-        """Factors of a product that an addition may swallow."""
+        """The factors of a product that an addition may absorb; empty where it may not."""
         instr = self.program.body[index]
         if instr.op is Op.MUL and self.uses[index] == 1:
             return tuple(self.new_index[a] for a in instr.args)
@@ -127,7 +128,7 @@ class _Fusion:
         return max(self._done(a), self._done(b)) + self.fused
 
     def _add(self, a: _Part, b: _Part) -> _Part:
-        """The sum of two parts, negated where both or the one that is left negative are."""
+        """The sum of two parts; their difference where one is negative. Negative where both are."""
         when = self._sum_done(a, b)
         if a.negative == b.negative:
             instr = Instr(Op.ADD, (a.value, b.value)).canonical()
