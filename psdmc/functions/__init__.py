@@ -1,4 +1,4 @@
-"""The functions that psdmc generates: every file of this folder is one, its RECIPE says all that is known of it."""
+"""The functions that psdmc generates: one file of this folder each, described by its RECIPE."""
 
 from __future__ import annotations
 
@@ -25,4 +25,4 @@ SIGNATURES = {signature.name: signature for signature in in_order([r.signature f
 RECIPES = {name: _FOUND[name] for name in SIGNATURES}
 
 DEFAULT = tuple(name for name, recipe in RECIPES.items() if recipe.default)
-"""What is generated where no functions are named."""
+"""Names of the functions that are generated where none are named."""

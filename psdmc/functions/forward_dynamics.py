@@ -21,7 +21,8 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """The accelerations that the torques were computed from: exact, where a solution loses the condition number."""
+    """The accelerations that the torques were computed from. They are exact; a solution would lose digits by the mass
+    matrix's condition number."""
     return {"qdd": given["qdd"]}
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """d qdd = M^-1 (d tau - d tau_id), tau_id the torques that inverse dynamics asks for at the same acceleration."""
+    """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration."""
     qdd, factors = accelerations(g, g.inputs["tau"])
     load = [given - own for given, own in zip(g.inputs[DTAU.name], torque_slopes(g, qdd), strict=True)]
     return {"qdd": qdd, "dqdd": solve(factors, load), "pivot": factors.pivots}

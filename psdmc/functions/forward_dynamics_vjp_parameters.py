@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 STATE = forward_dynamics_vjp.RECIPE
-"""The same without theta_b."""
+"""The function without the gradient by theta_b."""
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -34,7 +34,8 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """The gradient by theta_b, times theta_b, is - weights . tau, the weights being the gradient by tau."""
+    """For the comparison: the gradient by theta_b, times theta_b, is - weights . tau, where the weights are the
+    gradient by tau."""
     found = STATE.pinocchio(robot, given)
     return found | {GRADIENT_THETA.name: -(found["grad_tau"] * given["tau"]).sum(axis=-1)}
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 STATE = inverse_dynamics_vjp.RECIPE
-"""The same without theta_b."""
+"""The function without the gradient by theta_b."""
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -31,7 +31,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """The gradient by theta_b, times theta_b, is the weighted torques' sum."""
+    """For the comparison: the gradient by theta_b, times theta_b, is the sum of the weighted torques."""
     found = STATE.pinocchio(robot, given)
     return found | {GRADIENT_THETA.name: (given[COTANGENT.name] * found["tau"]).sum(axis=-1)}
 

@@ -1,4 +1,4 @@
-"""Inverse dynamics of a robot on which the world pushes."""
+"""Inverse dynamics with external wrenches at the named frames."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Each wrench carried from its frame into the joint's, as Pinocchio's fext are given."""
+    """Torques from Pinocchio with each wrench carried from its frame into the joint's, as Pinocchio's fext are given."""
     import pinocchio as pin
 
     def loaded(model: Any, data: Any, q: Array, qd: Array, qdd: Array, wrenches: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The drift of the named frames: what their Jacobians' rates add to their accelerations."""
+"""The drift of the named frames: their accelerations at constant joint rates, dJ/dt qd."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's energy of the links, and that of the drives beside: Pinocchio 4.1 leaves out the armature of joints about
+    """Pinocchio's energy of the links, plus that of the drives: Pinocchio 4.1 leaves out the armature of joints about
     oblique axes, which its mass matrix has."""
     import pinocchio as pin
 

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Of the links' own bodies: those that theta_b stands for have other momenta."""
+    """The momentum of the links' own bodies. Bodies that stand for theta_b have the same torques, but not the same
+    momentum."""
     bodies = bodies_about(g.link_frames, g.standard)
     linear, angular = total_momentum(g.frames, bodies, g.inputs["q"], g.inputs["qd"])
     axes, origin = g.root

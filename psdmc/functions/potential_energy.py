@@ -1,4 +1,4 @@
-"""Potential energy, but for the constant that no torque shows."""
+"""Potential energy, zero at q = 0: torques do not determine its constant."""
 
 from __future__ import annotations
 

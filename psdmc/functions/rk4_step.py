@@ -44,7 +44,8 @@ def trace(g: Ingredients) -> Outputs:
 def _step(
     start: State, rates: Callable[[Sequence[Scalar], Sequence[Scalar]], Sequence[Scalar]], dt: Scalar
 ) -> State:
-    """The state after dt: slopes at the start, twice in the middle and at the end count 1, 2, 2, 1 sixths."""
+    """The state after dt: the slopes at the start, twice in the middle and at the end have the weights 1/6, 2/6, 2/6,
+    1/6."""
     q, qd = start
     half = 0.5 * dt
     velocities, slopes = [qd], [rates(q, qd)]
@@ -69,7 +70,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 
 def _on_arrays(given: Mapping[str, Array], rates: Callable[[Array, Array], Array]) -> Arrays:
-    """The same step with whole vectors of joints, (k, n), in place of lists of numbers."""
+    """The same step on vectors of joints, (k, n), in place of lists of numbers."""
     dt = step_on_arrays(given)
     q, qd = given["q"], given["qd"]
     first = rates(q, qd)

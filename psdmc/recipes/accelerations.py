@@ -1,4 +1,4 @@
-"""Forward dynamics on a trace's ingredients: what several functions are made of."""
+"""Forward dynamics on a trace's ingredients, which several functions need."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ PIVOTS = Positive(
     reason="the joint at which the mass matrix is not positive definite",
     spoilt="accelerations",
 )
-"""What M(q) must have to be inverted."""
+"""The pivots of M(q), which must be positive for it to be inverted."""
 
 
 def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], Factors]:
     """n accelerations M^-1 (tau - h), and the factors of M.
 
-    The mass matrix is factorized before the bias is found: its divisions wait for each other, the recursion fills the time.
+    The mass matrix is factorized before the bias is found: its divisions depend on each other, and the processor
+    computes the recursion meanwhile.
     """
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)

@@ -31,7 +31,7 @@ GRADIENT_THETA = Quantity("grad_theta_b", ("l",))
 """Derivatives of the weighted sum of outputs by each input."""
 
 _FREE = "free_qdd"
-"""A vector that no function has: accelerations while torques are differentiated."""
+"""Name of an input that no function has: the accelerations while torques are differentiated."""
 
 
 def torque_gradients(
@@ -60,7 +60,7 @@ def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
 
 
 def _free(g: Ingredients) -> list[Scalar]:
-    """Accelerations as inputs: a derivative at fixed ones must not see what they are computed from."""
+    """Accelerations as inputs, so that a derivative at fixed accelerations does not follow what they are computed from."""
     found: list[Scalar] = g.inputs["q"][0].tracer.symbols(_FREE, len(g.frames))
     return found
 

@@ -1,4 +1,4 @@
-"""A robot's dynamics on arrays of states by psdmc.dynamics: what references are computed with."""
+"""A robot's dynamics on arrays of states by psdmc.dynamics, for the NumPy references of functions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RobotOnArrays:
-    """A chain with standard parameters x, (11 n,) about the link frames, that theta_b stands for.
+    """A chain with standard parameters x, (11 n,) about the link frames, which have the torques of theta_b.
 
     lift   (11 n, l) theta_b to such parameters
     """
@@ -36,7 +36,7 @@ class RobotOnArrays:
 
     @staticmethod
     def of(model: DynamicsModel, theta_b: Array) -> RobotOnArrays:
-        """A model with these base parameters."""
+        """The robot of a model, with these base parameters."""
         return RobotOnArrays(model.mechanism, times(model.representative, theta_b), model.representative)
 
     @property
@@ -61,7 +61,7 @@ class RobotOnArrays:
 
     @cached_property
     def solids(self) -> tuple[Body, ...]:
-        """The links' own bodies, which the chain knows."""
+        """The links' own bodies, from the chain's standard parameters."""
         return bodies_of(self.chain, self.chain.parameters)
 
     def torques(
@@ -73,7 +73,8 @@ class RobotOnArrays:
         qd_r: Array | None = None,
         external: Mapping[int, Wrench] = NO_WRENCHES,
     ) -> Array:
-        """(k, n)"""
+        """(k, n) joint torques M qdd + C(q, qd) qd_r, qd_r = qd if not given, with the base's acceleration and external
+        wrenches."""
         rates = None if qd_r is None else list(qd_r.T)
         given = (list(q.T), list(qd.T), list(qdd.T))
         torques = inverse_dynamics(
@@ -91,7 +92,7 @@ class RobotOnArrays:
         return by_q, by_qd, by_qdd
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
-        """(k, n)"""
+        """(k, n) joint accelerations."""
         bias = self.torques(q, qd, np.zeros_like(q), self.base_acceleration)
         found = np.linalg.solve(self.mass_matrix(q), (tau - bias)[..., None])[..., 0]
         return np.asarray(found, dtype=np.float64)

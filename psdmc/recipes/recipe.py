@@ -1,4 +1,4 @@
-"""How one generated function is made and held against others: what a file of psdmc/functions says."""
+"""The form in which a file of psdmc/functions says how one generated function is made and compared with others."""
 
 from __future__ import annotations
 
@@ -37,24 +37,24 @@ class ByTheta(NamedTuple):
 class Ingredients:
     """What a trace runs on: symbols, and one robot's constants.
 
-    frames       n joint frames
-    base_acceleration  of the base, minus gravity, along the axes that the first frame turns from
-    bodies       n bodies about the joint frames and
-    drives       n drive inertias that belong to theta_b; only torques are those of the real bodies. Empty for functions
-                 without theta_b
-    choices      how the recursions are arranged
-    unit         m, unit of all lengths above: forces come out in 1/unit N; 1 for functions without theta_b
-    base_axes    axes that the first frame turns from as columns in the base frame, and
-    base_origin  m, their origin there
-    link_frames  n, the file's link frames in the joint frames
-    named        the named frames, placed in the joint frames
-    tip          the tip frame in the joint frame of
-    tip_body     the body that it is fixed to
-    lift         (11 n, l) theta_b to standard parameters about the link frames
-    standard     (n, 11) the robot's own standard parameters about the link frames, NaN where unknown
-    inputs       the function's inputs by name
-    by_theta     theta_b as symbols whether it is compiled in or not, for derivatives by it: what is linear in theta_b, as
-                 torques are, has derivatives in which it does not occur
+    frames             n joint frames
+    base_acceleration  minus gravity, along the axes that the first frame turns from
+    bodies             n bodies about the joint frames, and
+    drives             n drive inertias, from theta_b: they have the torques of the real ones and nothing else of them.
+                       Empty for functions without theta_b
+    choices            how the recursions are arranged
+    unit               m, unit of all lengths above: forces come out in 1/unit N; 1 for functions without theta_b
+    base_axes          axes that the first frame turns from as columns in the base frame, and
+    base_origin        m, their origin there
+    link_frames        n, the file's link frames in the joint frames
+    named              the named frames, placed in the joint frames
+    tip                the tip frame, in the joint frame of
+    tip_body           the body that it is fixed to
+    lift               (11 n, l) theta_b to standard parameters about the link frames
+    standard           (n, 11) the robot's own standard parameters about the link frames, NaN where unknown
+    inputs             the function's inputs by name
+    by_theta           theta_b as symbols, also where it is compiled in, for derivatives by it: the derivatives of
+                       quantities that are linear in theta_b, such as torques, do not depend on its values
     """
 
     frames: tuple[Frame, ...]
@@ -86,7 +86,7 @@ class Ingredients:
 
 
 class Polynomials(StrEnum):
-    """Which part of the torques that E, P and theta_b expand a function is: what the expanded lowering makes it from."""
+    """Which part of the torques expanded in E, P and theta_b a function is; the expanded lowering needs it."""
 
     TORQUE = "all terms"
     MASS = "terms of qdd"
@@ -111,17 +111,17 @@ class Recipe:
     title        its name in prose
     trace        its arithmetic over psdmc.dynamics on symbols
     reference    the same in NumPy on the MODEL's own frames and bodies, no lowering involved: (robot, given) to the values
-                 of all outputs. `given` holds every quantity of states, tau being the torques of q, qd and qdd
-    against      Pinocchio's function that it is held against, and
-    pinocchio    that function's values: (model on arrays, given)
+                 of all outputs. `given` holds every quantity of states; tau are the torques of q, qd and qdd
+    against      name of Pinocchio's function that it is compared with
+    pinocchio    the values of Pinocchio's function: (model on arrays, given)
     starts       name of the function whose search decides where frames sit and the unit of length
-    shares       name of the function whose arrangement is taken over whole; only the choices in it are made anew
+    shares       name of the function whose whole arrangement is used; only the choices within it are made again
     matters      fields of Choices that make a difference to it
-    polynomials  what the expanded lowering makes it from; None: it does not
-    times_theta  its outputs times theta_b are torques and are compared so: `pinocchio` gives these torques
-    gradient     its output that is a gradient by theta_b of a number linear in it, and is compared so: times theta_b, with
-                 what `pinocchio` gives of that number
-    beside       name of the function whose values this one's are differences of: what is rounding beside them is rounding
+    polynomials  what the expanded lowering needs; None: there is none for this function
+    times_theta  whether its outputs times theta_b are torques and are compared as such: `pinocchio` gives these torques
+    gradient     name of its output that is the gradient by theta_b of a number linear in theta_b. It is compared as that
+                 number, times theta_b, which `pinocchio` gives
+    beside       name of the function whose values this one's are differences of: errors are measured relative to those
     needs        what the model must have
     default      whether it is generated where no functions are named
     benched      whether `make bench` measures it

@@ -1,4 +1,4 @@
-"""The torques' coefficients of theta_b, over symbols and on arrays: what both regressors are made of."""
+"""The torques' coefficients of theta_b, over symbols and on arrays, for both regressors."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _entry(weights: Array, needed: Sequence[int], row: dict[int, Scalar]) -> Sca
 
 
 def rows_on_arrays(robot: RobotOnArrays, q: Array, qd: Array, qdd: Array, qd_r: Array | None = None) -> Array:
-    """(k, n, l): the same on arrays."""
+    """(k, n, l): `traced_rows` on arrays of states."""
     wanted = np.flatnonzero(robot.lift.any(axis=1)).tolist()
     places = [joint.link_frame for joint in robot.chain.joints]
     states = (list(q.T), list(qd.T), list(qdd.T))

@@ -1,4 +1,4 @@
-"""One step of an integrator: quantities, and matrices of the step made of those of the accelerations."""
+"""One step of an integrator: its quantities, and its Jacobians from the derivatives of accelerations."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _plus_one(i: int, row: list[Scalar]) -> list[Scalar]:
 
 
 def semi_implicit_on_arrays(by_q: Array, by_qd: Array, by_tau: Array, dt: Array) -> tuple[Array, Array]:
-    """(k, 2 n, 2 n) and (k, 2 n, n): the same on arrays, as matrices of the two half steps."""
+    """(k, 2 n, 2 n) and (k, 2 n, n): `semi_implicit` on arrays, as matrices of the two half steps."""
     n, h = by_q.shape[-1], dt[..., None]
     unit, none = np.broadcast_to(np.eye(n), by_q.shape), np.zeros_like(by_q)
     kick = np.block([[unit, none], [h * by_q, unit + h * by_qd]])

@@ -1,4 +1,4 @@
-"""Newton-Euler on a trace's ingredients: what several functions are made of."""
+"""Newton-Euler on a trace's ingredients, which several functions need."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def torques(
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
-    """n joint torques M qdd + C(q, qd) qd_r, qd_r = qd if not given, and what the base's acceleration asks for, less what
-    wrenches on the links give."""
+    """n joint torques M qdd + C(q, qd) qd_r, qd_r = qd if not given, for this acceleration of the base, less the
+    torques of external wrenches on the links."""
     q = g.inputs["q"]
     return inverse_dynamics(
         g.frames, g.bodies, g.drives, q, qd, qdd, base_acceleration, g.choices, qd_r, external
