@@ -36,10 +36,10 @@ def body_from_parameters(x: Sequence[Scalar]) -> Body:
 
 
 def turned(body: Body, turn: Turn | None, double: Turn | None = None) -> Body:
-    """A body about a frame, seen from the frame before its turn about z: R h, R S R^T.
+    """A body about a frame, turned into the frame before that frame's rotation about z: R h, R S R^T.
 
-    What xx loses and yy gains is s^2 (xx - yy) + 2 s c xy. With `double`, the turn by twice the angle, half their
-    difference and xy turn by that instead.
+    The second moment xx loses s^2 (xx - yy) + 2 s c xy, and yy gains it. With `double`, half the difference of xx and
+    yy and the product xy are turned by twice the angle instead.
     """
     if turn is None:
         return body
@@ -58,8 +58,8 @@ def turned(body: Body, turn: Turn | None, double: Turn | None = None) -> Body:
 
 
 def spun(body: Body, turn: Turn | None) -> Body:
-    """The same as `turned`, its products nested: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes c t - xy. Four
-    operations fewer, of which one must wait for another."""
+    """The same as `turned`, with nested products: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes c t - xy.
+    Four operations fewer, in a longer dependency chain."""
     if turn is None:
         return body
     xx, yy, zz, xy, xz, yz = body.second
@@ -71,7 +71,7 @@ def spun(body: Body, turn: Turn | None) -> Body:
 
 
 def in_previous(frame: Frame, body: Body) -> Body:
-    """A body about a frame before its turn, along the axes of its parent's (origin unmoved)."""
+    """A body about a frame, before its turn, along the axes of its parent's frame; the origin stays."""
     if frame.is_parallel:
         return body
     moment = to_previous(frame, body.moment)

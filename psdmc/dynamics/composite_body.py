@@ -1,4 +1,5 @@
-"""Composite rigid body: the mass matrix from bodies gathered tip to base (Walker and Orin 1982; Featherstone 2008, 6.2)."""
+"""Composite rigid bodies: the mass matrix from bodies joined from tip to base (Walker and Orin 1982; Featherstone 2008,
+6.2)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""From the robot's coordinates to its joints' and back, where joints follow others: q_joint = ratio q_leader + offset.
+"""The robot's coordinates and its joints' positions, where joints follow others: q_joint = ratio q_leader + offset.
 
-The algorithms run on joint values. A motion of the coordinates gives those by `joint_positions` and `joint_rates`; the
-power of the joints' torques at these rates is that of the coordinates' torques, so torques and the mass matrix's rows and
-columns are gathered with the same ratios.
+The algorithms take joint values, which `joint_positions` and `joint_rates` compute from the coordinates. The joints'
+torques and the coordinates' torques have equal power, so that torques, and rows and columns of the mass matrix, are
+summed with the same ratios.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Rows = Sequence[Sequence[Scalar]]
 
 
 def joint_positions(coordinates: Sequence[Coordinate], q: Sequence[Scalar]) -> list[Scalar]:
-    """q of every joint from the coordinates, one for each leader."""
+    """Position of every joint from the coordinates, one coordinate for each leader."""
     return [
         value + coordinate.offset if coordinate.offset else value
         for value, coordinate in zip(joint_rates(coordinates, q), coordinates, strict=True)
@@ -24,7 +24,7 @@ def joint_positions(coordinates: Sequence[Coordinate], q: Sequence[Scalar]) -> l
 
 
 def joint_rates(coordinates: Sequence[Coordinate], qd: Sequence[Scalar]) -> list[Scalar]:
-    """qd, or qdd, of every joint from the coordinates'; zero of one that is held."""
+    """Rate (or acceleration) of every joint from the coordinates'; zero for a joint that is held."""
     own = dict(zip(leaders(coordinates), qd, strict=True))
     return [
         _times(coordinate, own[coordinate.leader]) if coordinate.leader is not None else 0.0

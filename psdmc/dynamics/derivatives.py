@@ -1,22 +1,22 @@
 """Derivatives of inverse dynamics by recursion: d tau / d q, d tau / d qd, and M = d tau / d qdd on the way.
 
-Turn joint j a little, and every point of the bodies beyond it goes along with t_j = z_j x r. Seen from these bodies, it is
-the motion of the link before the joint that turns the other way. With z' = w x z and z'' = U z of that link and a the
-acceleration of the joint's origin, this asks of a joint i beyond j (or j itself) the additional torque
+When joint j turns by a small angle, every point of the bodies beyond it moves along t_j = z_j x r. Relative to these
+bodies, the motion of the link before the joint turns the other way. With z' = w x z and z'' = U z of that link and a the
+acceleration of the joint's origin, a joint i beyond j (or j itself) needs the additional torque
 
     d tau_i / d q_j   = A_i . z_j'' + B_i . z_j' + C_i . (a_j x z_j)
     d tau_i / d qd_j  = 2 A_i . z_j' + B_i . z_j
     M_ij              = A_i . z_j
 
 where A_i = int r x t_i dm, B_i = 2 int (dr/dt) x t_i dm and C_i = int t_i dm over the bodies beyond joint i, r from the
-origin of joint j as a point of the link before it. Where joint j slides, C_i takes the place of A_i, and nothing else
-counts. In turn, joints before i feel what the motion of joint i asks of the bodies beyond it: two wrenches, whose parts
-along their axes are the rest of the matrices. Rows and wrenches are carried from each joint to the base.
+origin of joint j as a point of the link before it. Where joint j slides, C_i takes the place of A_i, and there are no
+other terms. The torques of joints before i by the motion of joint i are the components along their axes of two wrenches,
+those that this motion requires on the bodies beyond it. Rows and wrenches are carried from each joint to the base.
 
-Carpentier, Mansard 2018 and Singh, Russell, Wensing 2022 have the same derivatives in spatial vectors; here they stand on
-the pseudo-inertia, and on composites that move (moving_composite.py): turned about z as a whole, these ask for what they
-asked for before with z x h for h and so on. Everything of a joint is written in the orientation before it turns; of
-parallel neighbours (`compound`) before the first of them turns.
+Carpentier, Mansard 2018 and Singh, Russell, Wensing 2022 have the same derivatives in spatial vectors. Here they are
+written on the pseudo-inertia, and on composites that move (moving_composite.py): when a composite turns about z as a
+whole, z x h takes the place of h in its wrench, and so on. All quantities of a joint are in the orientation before it
+turns; those of parallel neighbours (`compound`) before the first of them turns.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class Derivatives(NamedTuple):
-    """n x n each: entry [i][j] = d tau_i / d q_j, d tau_i / d qd_j, d tau_i / d qdd_j = M_ij; and the n torques of gravity,
-    C . (minus gravity), which come with them."""
+    """n x n each: entry [i][j] = d tau_i / d q_j, d tau_i / d qd_j, d tau_i / d qdd_j = M_ij; and the n torques of
+    gravity, C . (minus gravity), which the recursion also gives."""
 
     by_q: Rows
     by_qd: Rows
@@ -98,7 +98,8 @@ def _composites(
     choices: Choices,
     steps: Sequence[Step],
 ) -> list[tuple[int, Composite]]:
-    """Joint and composite beyond it, in the joint's orientation about its origin: children before parents."""
+    """For each joint its number and the composite beyond it, in the joint's orientation about its origin; children
+    before parents."""
     found: list[tuple[int, Composite]] = []
     hung: list[list[Composite]] = [[] for _ in frames]
     joined_to: list[list[Composite]] = [[] for _ in frames]
@@ -141,7 +142,7 @@ def _fill_row(
     by_qd: list[list[Scalar]],
     by_qdd: list[list[Scalar]],
 ) -> None:
-    """What joint i feels of the motion of joints from itself to the base."""
+    """Set row i, for the joints between joint i and the base: the torque of joint i by their motion."""
     j = i
     while True:
         joint, axis = frames[j].joint, axes[j]
@@ -163,7 +164,7 @@ def _fill_column(
     by_q: list[list[Scalar]],
     by_qd: list[list[Scalar]],
 ) -> None:
-    """What the joints before joint i feel of its motion."""
+    """Set column i for the joints before joint i: their torques by its motion."""
     (moved, pushed), j = wrenches, i
     while frames[j].parent != BASE:
         moved, pushed, j = steps[j].carried(moved), steps[j].carried(pushed), frames[j].parent

@@ -17,7 +17,8 @@ def kinetic_energy(
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
 ) -> Scalar:
-    """qd^T M(q) qd / 2, J, drive inertias included; bodies need only have the torques of the real ones."""
+    """Kinetic energy qd^T M(q) qd / 2 in J, with drive inertias. Bodies that have the torques of the real ones are
+    enough."""
     twice: Scalar = 0.0
     for twist, body in zip(twists(frames, q, qd), bodies, strict=True):
         linear, angular = momentum_of(body, twist)
@@ -30,9 +31,10 @@ def kinetic_energy(
 def potential_energy(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base_acceleration: Vector
 ) -> Scalar:
-    """J, zero at q = 0; `base_acceleration` is minus gravity, m/s^2 in the base frame.
+    """Potential energy in J, zero at q = 0. `base_acceleration` is minus gravity, m/s^2 in the base frame.
 
-    The energy at q = 0 shows in no torque: bodies that have the torques of the real ones give the same differences.
+    Torques do not depend on the energy at q = 0: bodies that have the torques of the real ones give the same
+    differences.
     """
     rest = [0.0] * len(frames)
     moved, resting = first_moment(frames, bodies, q), first_moment(frames, bodies, rest)
@@ -40,7 +42,7 @@ def potential_energy(
 
 
 def first_moment(frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]) -> Vector:
-    """kg m: total mass times its centre, along and about the frame that the first joint frame turns from."""
+    """Total mass times its centre, kg m, along and about the frame that the first joint frame turns from."""
     masses, moments = [body.mass for body in bodies], [body.moment for body in bodies]
     total = ZERO
     for i in reversed(range(len(frames))):

@@ -1,7 +1,7 @@
-"""Joint frames in a tree, and the turn that a joint makes: what every algorithm here starts from.
+"""Joint frames in a tree, and the turn that each joint makes: the input of every algorithm here.
 
 Frame i sits in its parent's frame at   rotation @ Rz(turn + offset), translation + rotation @ z slide
-where turn and slide are what its joint's type makes of q, and carries one rigid body whose parameters are about frame i
+where turn and slide follow from q by its joint's type. It carries one rigid body, whose parameters are about frame i
 itself. Parents come before their children. Whole quarter turns of the offset are kept apart, so that they exchange sine
 and cosine exactly and cost nothing.
 """
@@ -25,7 +25,7 @@ class Frame:
     """One joint's constant geometry as plain floats, so that exact zeros and ones stay visible.
 
     parent       index of the frame that it sits in; BASE: the base frame
-    rotation     3 x 3, this frame in the parent's where the turn about z is none
+    rotation     3 x 3, this frame's axes in the parent's, without the turn about z
     translation  m, origin of this frame at q = 0 in the parent's
     offset       rad, turn about z at q = 0, beside
     quarters     whole quarter turns, 0 to 3
@@ -108,7 +108,7 @@ def as_vector(values: Sequence[float]) -> Vector:
 
 
 def frames_of(chain: Mechanism) -> tuple[Frame, ...]:
-    """The robot's own joint frames, none moved. What runs on them takes joint values; see coordinates.py."""
+    """The robot's own joint frames, none moved. Algorithms on them take joint values; see coordinates.py."""
     return tuple(
         frame_at(joint.type, parent, joint.placement)
         for joint, parent in zip(chain.joints, chain.parents, strict=True)
@@ -121,7 +121,7 @@ def frame_at(joint: JointType, parent: int, placement: Placement) -> Frame:
 
 
 def leaves(frames: Sequence[Frame]) -> tuple[bool, ...]:
-    """For each frame whether no other sits in it."""
+    """For each frame, whether no other frame sits in it."""
     parents = {frame.parent for frame in frames}
     return tuple(i not in parents for i in range(len(frames)))
 

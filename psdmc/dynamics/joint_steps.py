@@ -1,4 +1,5 @@
-"""How the link before each joint moves, and the way from each joint to its parent: what derivatives are carried along."""
+"""The motion of the link before each joint, and the step from each joint to its parent, for the recursion of
+derivatives."""
 
 from __future__ import annotations
 
@@ -15,9 +16,9 @@ Wrench = tuple[Vector, Vector]
 
 
 class Axis(NamedTuple):
-    """How the link before a joint moves, in the joint's orientation.
+    """The motion of the link before a joint, in the joint's orientation.
 
-    w             rad/s, its angular velocity; dw its derivative
+    w, dw         rad/s, its angular velocity; rad/s^2, the derivative
     spin          its U, so that its points at r accelerate with acceleration + U r
     acceleration  m/s^2, of the joint's origin as one of its points
     rate, twice   z' = w x z and 2 z'
@@ -53,13 +54,13 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The way from a joint's orientation and origin to those of its parent.
+    """The step from a joint's orientation and origin to those of its parent.
 
     joins     whether both share an orientation, as parallel neighbours may
     offset    m, this origin from the parent's, and
-    velocity  m/s, twice how that point of the parent's link moves about the parent's origin: both in the shared
-              orientation, else along the axes of the parent's link
-    turn      the turn of the parent, or of its group up to it
+    velocity  m/s, twice the velocity of that point of the parent's link about the parent's origin; both are in the shared
+              orientation, or else along the axes of the parent's link
+    turn      the turn of the parent, or of its group of parallel axes up to it
     slide     m/s, twice the rate at which the parent slides; None where it does not
     """
 
@@ -75,7 +76,7 @@ class Step:
         return v if self.joins else to_previous(self.frame, v)
 
     def to_orientation(self, v: Vector) -> Vector:
-        """From there into the parent's orientation."""
+        """A vector along those axes, in the parent's orientation."""
         return v if self.joins else inward(self.turn, v)
 
     def carried(self, wrench: Wrench) -> Wrench:
@@ -130,7 +131,7 @@ def axis_and_step(
 
 
 def _after(axis: Axis, rate: Scalar | None, acceleration: Scalar | None) -> tuple[Vector, Vector]:
-    """Angular velocity of the link behind a joint and its derivative, in the joint's orientation."""
+    """Angular velocity of the link beyond a joint and its derivative, in the joint's orientation."""
     (w, dw) = axis.w, axis.dw
     if rate is None:
         return w, dw

@@ -1,4 +1,5 @@
-"""What a joint's motion asks of the bodies beyond it, and what it feels of other joints' motion, about its own origin."""
+"""Wrenches between a joint and the bodies beyond it, for derivatives: those that its motion requires, and its own row
+A, B, C."""
 
 from __future__ import annotations
 
@@ -43,7 +44,7 @@ def _sliding_row(axis: Axis, composite: Composite) -> Row:
 
 
 def wrenches_of_motion(frame: Frame, axis: Axis, composite: Composite) -> tuple[Wrench, Wrench]:
-    """What a joint's motion asks of the composite, per unit of q and of qd."""
+    """Wrenches on the composite that a joint's motion requires, per unit of q and per unit of qd."""
     turn, slide = frame.joint.turn(1.0), frame.joint.slide(1.0)
     parts = []
     if turn is not None:
@@ -65,8 +66,8 @@ def _scaled(wrench: Wrench, factor: float) -> Wrench:
 
 
 def _turned_wrench(axis: Axis, composite: Composite) -> Wrench:
-    """What accelerations a + U r + 2 w x r' + r'' ask for, of the composite as it turns about z: with z x h for h and so
-    on."""
+    """Wrench that accelerations a + U r + 2 w x r' + r'' require, differentiated as the composite turns about z: z x h
+    takes the place of h, and so on."""
     (_, (hx, hy, _), (xx, yy, _, xy, xz, yz)), (second, first), (force, moment) = composite
     (pxx, pxy, pxz), (pyx, pyy, pyz), (pzx, pzy, _) = second
     (wx, wy, wz), (u, differences) = axis.w, axis.spin

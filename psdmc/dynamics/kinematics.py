@@ -51,7 +51,7 @@ def jacobian(
 
 
 def column(frame: Frame, placed: tuple[Matrix, Vector], point: Vector) -> tuple[Scalar, ...]:
-    """Velocity of a point and angular velocity that the joint's unit rate gives what it carries."""
+    """Velocity of a point, then angular velocity, that the joint's unit rate gives to what it carries."""
     rotation, origin = placed
     along, about = axis_twist(frame.joint)
     linear, angular = turned(rotation, along), turned(rotation, about)
@@ -71,7 +71,7 @@ def path_to(frames: Sequence[Frame], body: int) -> tuple[int, ...]:
 
 
 def carried_by(frames: Sequence[Frame]) -> tuple[tuple[int, ...], ...]:
-    """For each joint those beyond it, which its motion carries along, ascending."""
+    """For each joint the joints beyond it, ascending: those that its motion carries along."""
     beyond: list[list[int]] = [[] for _ in frames]
     for k in range(len(frames)):
         for i in path_to(frames, k)[:-1]:

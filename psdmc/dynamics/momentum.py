@@ -1,4 +1,4 @@
-"""Momentum of bodies, one by one and of all."""
+"""Momentum of single bodies and of all together."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale
 
 
 def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Twist]:
-    """Of every joint frame: velocity of its origin and angular velocity, along its axes."""
+    """For every joint frame, velocity of its origin and angular velocity, along its axes."""
     found: list[Twist] = []
     for frame, state, rate in zip(frames, _states(frames, q), qd, strict=True):
         before = (ZERO, ZERO) if frame.parent == BASE else found[frame.parent]
@@ -39,7 +39,7 @@ def total_momentum(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], qd: Sequence[Scalar]
 ) -> tuple[Vector, Vector]:
     """Momentum (kg m/s) and angular momentum (kg m^2/s) of all bodies, along and about the frame that the first joint
-    frame turns from. Torques do not show it: the bodies must be the real ones."""
+    frame turns from. Needs the real bodies: others with the same torques have another momentum."""
     moving = [momentum_of(body, twist) for body, twist in zip(bodies, twists(frames, q, qd), strict=True)]
     states, total = _states(frames, q), (ZERO, ZERO)
     for i in reversed(range(len(frames))):

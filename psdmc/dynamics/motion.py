@@ -1,18 +1,17 @@
-"""How bodies move: the outward sweep of Newton-Euler, once, for every use.
+"""Motions of bodies: the outward sweep of Newton-Euler, written once for all its uses.
 
 Each frame gets the matrix U = [w][w_r] + [dw_r] and the acceleration a of its origin, so that the body's point at r
-accelerates with a + U r; newton_euler.py carries the wrenches that this asks of the bodies down to the axes.
+accelerates with a + U r. newton_euler.py carries the wrenches that this requires inward, to the axes.
 
-w_r is a second ("reference") angular velocity, linear in qd_r. A caller that gives no qd_r has one velocity: w_r is w, it
-is not computed, and the result is ordinary inverse dynamics. With qd_r the result is M qdd_r + C(q, qd) qd_r + g, where C
-is the matrix of
-C_ij = sum_k tr(dT_k/dq_i S_k d/dt(dT_k/dq_j)^T) over the links' pseudo-inertias S_k, for which dM/dt - 2 C is
-skew-symmetric: the Slotine-Li form.
+w_r is a second ("reference") angular velocity, linear in qd_r. Without qd_r there is one velocity: w_r is w and is not
+computed, and the result is ordinary inverse dynamics. With qd_r the result is M qdd_r + C(q, qd) qd_r + g, where C is
+the matrix of C_ij = sum_k tr(dT_k/dq_i S_k d/dt(dT_k/dq_j)^T) over the links' pseudo-inertias S_k, for which dM/dt - 2
+C is skew-symmetric: the Slotine-Li form.
 
-Two choices that change the operation count, never the result:
-compound  parallel axes that follow each other turn w and dw once, by the sum of their angles, from the frame before the
-          first.
-fold      a leaf, a body that carries no other, is looked at from the frame before its joint's turn, where U differs from
+Two choices change the number of operations, but not the result:
+
+compound  consecutive parallel axes turn w and dw once, by the sum of their angles, from the frame before the first.
+fold      a leaf (a body that carries no other) is described in the frame before its joint's turn, where U differs from
           its parent's in six entries only; the body's parameters are turned instead.
 """
 
@@ -72,7 +71,8 @@ class LinkMotion(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Angular velocity, derivative of the reference angular velocity, and that velocity, of one frame in itself.
+    """Of one frame, along its own axes: angular velocity, derivative of the reference angular velocity, and that
+    velocity.
 
     w_r   None: there is one velocity, w
     """
@@ -88,7 +88,7 @@ class Rates(NamedTuple):
 
 
 class JointRates(NamedTuple):
-    """Rate, reference acceleration and reference rate of a turn about z or of a way along it; qd_r None: it is qd."""
+    """Rate, reference acceleration and reference rate of a turn about z or a slide along it; qd_r None: it is qd."""
 
     qd: Scalar
     qdd_r: Scalar
@@ -100,15 +100,15 @@ class JointRates(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """Where one joint stands: its turn relative to its parent's frame, and the offset of its origin there."""
+    """A joint's position: its turn relative to its parent's frame, and the offset of its origin there."""
 
     turn: Turn | None
     offset: Vector
 
 
 class Forward(NamedTuple):
-    """Result of the outward sweep, body by body. Bodies are in the frames that `motions` and `rates` are in: all after the
-    joint's turn, but for folded ones, whose motions are before it and whose rates are their parent's."""
+    """Result of the outward sweep, body by body. Bodies are in the frames of `motions` and `rates`: after the joint's
+    turn; for folded ones, motions are before it and rates are their parent's."""
 
     states: tuple[JointState, ...]
     compound_turns: tuple[Turn | None, ...]
@@ -130,7 +130,7 @@ def spin_of(rates: Rates) -> Spin:
 
 
 def spin_before_turn(frame: Frame, previous: Spin, before: Rates, turning: JointRates | None) -> Spin:
-    """A leaf's spin seen from before its turn: its parent's plus ([qd w_r + qd_r w + qd qd_r z] + qdd_r)[z]."""
+    """The spin of a leaf in the frame before its turn: its parent's plus ([qd w_r + qd_r w + qd qd_r z] + qdd_r)[z]."""
     (u, d) = _turned_field(frame, previous)
     if turning is None:
         return Spin(u, d)
@@ -154,7 +154,7 @@ def spin_before_turn(frame: Frame, previous: Spin, before: Rates, turning: Joint
 
 
 def _turned_field(frame: Frame, spin: Spin) -> Spin:
-    """A spin of the parent's frame in this one before its turn."""
+    """The spin of the parent's frame, along this frame's axes before its turn."""
     if frame.is_parallel:
         return spin
     field = rotated_tensor(frame.outward_rows, spin.field)
@@ -162,7 +162,8 @@ def _turned_field(frame: Frame, spin: Spin) -> Spin:
 
 
 def _permuted_differences(rotation: Matrix, spin: Spin, field: Matrix) -> Vector:
-    """The differences again: the old ones in another order where axes map to axes, else from the diagonal."""
+    """The differences of the turned field: the old ones in another order where axes map to axes, else from the
+    diagonal."""
     columns = transpose(rotation)
     axes = [next((k for k in range(3) if abs(column[k]) == 1.0), -1) for column in columns]
     known = {(2, 1): spin.differences[0], (0, 2): spin.differences[1], (1, 0): spin.differences[2]}
@@ -176,7 +177,7 @@ def _permuted_differences(rotation: Matrix, spin: Spin, field: Matrix) -> Vector
 
 
 class _Group(NamedTuple):
-    """Parallel axes that turn as one: rates in the frame before the first turn, and what the joints so far add up to."""
+    """Parallel axes that turn as one: rates in the frame before the first turn, and the sums over the joints so far."""
 
     before: Rates
     turning: JointRates
@@ -185,7 +186,7 @@ class _Group(NamedTuple):
 
 
 class _Moved(NamedTuple):
-    """One body after the sweep has passed it."""
+    """One body after the sweep has computed its motion."""
 
     state: JointState
     motion: LinkMotion
@@ -202,7 +203,7 @@ def sweep_outward(
     base_acceleration: Vector,
     choices: Choices = PLAIN,
 ) -> Forward:
-    """Motions of all bodies; `base_acceleration` includes gravity: the base's own, minus gravity (m/s^2, base frame).
+    """Motions of all bodies. `base_acceleration` is the base's acceleration minus gravity (m/s^2, base frame).
 
     qd_r   reference rates; None: there is one velocity, qd
     """
@@ -226,7 +227,7 @@ def sweep_outward(
 
 
 def _resting(base_acceleration: Vector, two_velocities: bool) -> _Moved:
-    """The base: it accelerates, and does not turn."""
+    """The motion of the base: it accelerates and does not turn."""
     rates = Rates(ZERO, ZERO, ZERO if two_velocities else None)
     group = _Group(rates, _no_turning(rates), NO_TURN, None)
     return _Moved(JointState(None, ZERO), LinkMotion(base_acceleration, spin_of(rates)), rates, group)
@@ -244,7 +245,8 @@ def _swept(
     choices: Choices,
     is_folded: bool,
 ) -> _Moved:
-    """One body, from its parent; `given` are the joint's rate, reference acceleration and reference rate."""
+    """The motion of one body from its parent's; `given` are the joint's rate, reference acceleration and reference
+    rate."""
     own_angle, offset = joint_angle(frame, q), joint_offset(frame, q)
     turning, sliding = (_along(part, given) for part in (frame.joint.turn, frame.joint.slide))
     group = parent.group
@@ -273,7 +275,7 @@ def _swept(
 def _along(
     part: Callable[[Scalar], Scalar | None], given: tuple[Scalar, Scalar, Scalar | None]
 ) -> JointRates | None:
-    """The rates of a joint's turn, or of its way; None where it makes none."""
+    """The rates of a joint's turn, or of its slide; None where it has none."""
     qd, qdd_r, qd_r = given
     rate = part(qd)
     return None if rate is None else JointRates(rate, part(qdd_r), None if qd_r is None else part(qd_r))
@@ -308,7 +310,7 @@ def _rates_after_turn(group: Rates, turn: Turn | None, turning: JointRates) -> R
 
 
 def _slid(a: Vector, rates: Rates, sliding: JointRates | None) -> Vector:
-    """With what a sliding joint adds to its origin's acceleration: z qdd_r + w_r x z qd + w x z qd_r."""
+    """The origin's acceleration with what a sliding joint adds: z qdd_r + w_r x z qd + w x z qd_r."""
     if sliding is None:
         return a
     qd, qd_r = sliding.qd, sliding.reference

@@ -1,8 +1,8 @@
-"""Composites that move: all bodies from a joint on, and how they move relative to the link before it.
+"""Moving composites: all bodies from a joint on, and their motion relative to the link before it.
 
-Seen from that link, points at r move at r' and r'', which depend on the joints from this one on and on nothing before it.
-What the whole composite needs of them are moments: 2 int r r'^T, 2 int r', int r'', int r x r''. Composites are built tip
-to base like bodies: turned, shifted, joined, and given the motion of one joint more.
+Relative to that link, points at r have the velocity r' and the acceleration r'', which depend on the joints from this
+one on alone. Only moments of them over the whole composite are needed: 2 int r r'^T, 2 int r', int r'', int r x r''.
+Composites are built from tip to base like bodies: turned, shifted, joined, and given the motion of one joint more.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Composite(NamedTuple):
 
 
 def at_rest(body: Body) -> Composite:
-    """A body that does not move in the link."""
+    """The composite of a body that does not move relative to the link."""
     return Composite(body, Momenta((ZERO, ZERO, ZERO), ZERO), (ZERO, ZERO))
 
 
@@ -49,7 +49,7 @@ def both(a: Composite, b: Composite) -> Composite:
 
 
 def moved_to(composite: Composite, offset: Vector) -> Composite:
-    """About a point of the link from which the present one lies at `offset`."""
+    """The composite about the point of the link from which its present origin lies at `offset`."""
     (second, first), (force, moment) = composite.momenta, composite.wrench
     rows = tuple(add(row, scale(first, length)) for row, length in zip(second, offset, strict=True))
     return Composite(
@@ -71,7 +71,7 @@ def along_parent(frame: Frame, composite: Composite) -> Composite:
 
 
 def before_turn(composite: Composite, turn: Turn | None) -> Composite:
-    """Seen from before a turn about z."""
+    """The composite in the orientation before a turn about z."""
     if turn is None:
         return composite
     force, moment = (turn.inward(v) for v in composite.wrench)
@@ -89,7 +89,7 @@ def _turned(momenta: Momenta, turn: Turn) -> Momenta:
 
 
 def driven(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
-    """Relative to the link before the joint, a composite whose motion is given relative to the link behind it."""
+    """The composite relative to the link before the joint, from its motion relative to the link beyond the joint."""
     rate, way = joint.turn(qd), joint.slide(qd)
     found = composite if rate is None else _spinning(composite, rate, joint.turn(qdd))
     return found if way is None else _sliding(found, way, joint.slide(qdd))

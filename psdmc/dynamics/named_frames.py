@@ -1,4 +1,4 @@
-"""Named frames: where they are, how they move with the joints' rates, and what accelerates them besides."""
+"""Named frames: placements, Jacobians, drifts, and derivatives of velocities."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def frame_velocity_slopes(
 ) -> list[list[list[Scalar]]]:
     """6 x n per named frame: derivatives of its velocity J qd (linear, then angular) by q, along the base's axes.
 
-    Joint j moves along the twist (v, z) of its column and carries the rates that joints from it on add. With w the angular
-    velocity of the link before it, and (u, s) what joints from j on add to the frame's velocity, its motion changes the
-    frame's by (w x v + z x u, z x s): the whole turns, and the frame's origin moves in the field of the link before.
+    Joint j moves what it carries along the twist (v, z) of its column. With w the angular velocity of the link before
+    it, and (u, s) the part of the frame's velocity that joints from j on contribute, the frame's velocity changes by (w
+    x v + z x u, z x s): that part is turned, and the frame's origin moves in the velocity field of the link before.
     """
     found = []
     for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
@@ -92,7 +92,7 @@ def frame_velocity_slopes(
 
 
 def _running(parts: Sequence[Vector]) -> list[Vector]:
-    """The sum of all before each."""
+    """For each part the sum of all before it."""
     sums: list[Vector] = [ZERO]
     for part in parts[:-1]:
         sums.append(add(sums[-1], part))
@@ -105,7 +105,7 @@ def link_wrenches(
     """Force and moment about a joint frame's origin along its axes, by joint, from a force and a moment per named frame
     along that frame's own axes about its origin.
 
-    unit   m, unit of length of the algorithm that they enter: what it calls a force is `unit` times as many N
+    unit   m, unit of length of the algorithm that uses them: a force of one there is `unit` times as many N
     """
     found: dict[int, tuple[Vector, Vector]] = {}
     for each, (fx, fy, fz, mx, my, mz) in zip(named, wrenches, strict=True):

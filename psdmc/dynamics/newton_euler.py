@@ -1,4 +1,4 @@
-"""Recursive Newton-Euler: outward for motions (motion.py), inward for wrenches, each axis taking its component."""
+"""Recursive Newton-Euler: outward for motions (motion.py), inward for wrenches; each axis takes its component."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _folded_body(frame: Frame, body: Body, q: Scalar, turn: Turn | None, choices
 
 
 def _relieved(force: Vector, moment: Vector, external: Wrench, turn: Turn | None) -> Wrench:
-    """What a joint has left to give of a wrench; `turn`: the body's frame is that before its joint's turn."""
+    """A body's wrench less the external one; `turn` where the body's frame is that before its joint's turn."""
     (fx, fy, fz), (mx, my, mz) = (inward(turn, part) for part in external)
     return (
         (force[0] - fx, force[1] - fy, force[2] - fz),
@@ -84,9 +84,9 @@ def sweep_inward(
     choices: Choices = PLAIN,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
-    """Wrenches down to the base, children before parents; each axis takes its component. With compound turns the moments'
-    x and y of a group of parallel axes are gathered in the frame before its first turn, their z and the forces joint by
-    joint."""
+    """Joint torques: wrenches summed inward to the base, children before parents; each axis takes its component. With
+    compound turns, the x and y moments of a group of parallel axes are summed in the frame before its first turn,
+    their z and the forces joint by joint."""
     n = len(frames)
     torques: list[Scalar] = [0.0] * n
     forces, moments, gathered = [ZERO] * n, [ZERO] * n, [ZERO] * n

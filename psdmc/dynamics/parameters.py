@@ -18,11 +18,11 @@ BODY_PARAMETERS = PARAMETERS_PER_LINK - 1
 """Standard parameters of one rigid body: all of a link's but the joint's drive inertia."""
 
 _INERTIA_ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Where Ixx, Ixy, Iyy, Ixz, Iyz, Izz stand in the matrix, in the order of x."""
+"""Places of Ixx, Ixy, Iyy, Ixz, Iyz, Izz in the matrix, in the order of x."""
 
 
 def second_moments(inertia: Array) -> Array:
-    """The integral of r r^T over the mass from the inertia matrix about the same point: tr(I) / 2 - I."""
+    """The integral of r r^T over the mass, from the inertia matrix about the same point: tr(I) / 2 - I."""
     moments: Array = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     return moments
 
@@ -47,7 +47,7 @@ def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
 
 
 def moved(x: Array, frame: Placement) -> Array:
-    """Ten standard parameters about a frame, about the frame that it is placed in instead."""
+    """Ten standard parameters about a frame, moved to the frame that it is placed in."""
     return _moved(x, frame.rotation, frame.translation)
 
 
@@ -60,12 +60,13 @@ def _moved(x: Array, r: Array, p: Array) -> Array:
 
 
 def joint_frame_map(link_frame: Placement) -> Array:
-    """(10, 10) ten standard parameters about a link frame to those about the joint frame it is placed in."""
+    """(10, 10) map of ten standard parameters about a link frame to those about the joint frame it is placed in."""
     return moving_map(link_frame.rotation, link_frame.translation)
 
 
 def moving_map(rotation: NDArray[Any], translation: NDArray[Any]) -> NDArray[Any]:
-    """(10, 10) ten standard parameters about a frame to those about the frame it is placed in, in the arrays' precision."""
+    """(10, 10) map of ten standard parameters about a frame to those about the frame it is placed in, in the arrays'
+    precision."""
     units = np.eye(BODY_PARAMETERS, dtype=rotation.dtype)
     return np.column_stack([_moved(unit, rotation, translation) for unit in units])
 
@@ -79,7 +80,7 @@ def bodies_of(chain: Mechanism, x: Array) -> tuple[Body, ...]:
 
 
 def bodies_about(link_frames: Sequence[Placement], x: Array) -> tuple[Body, ...]:
-    """The same for link frames placed in any joint frames."""
+    """Bodies as of `bodies_of`, for link frames placed in any joint frames."""
     rows = np.asarray(x, dtype=np.float64).reshape(len(link_frames), PARAMETERS_PER_LINK)
     return tuple(
         body_from_parameters(times(joint_frame_map(place), row[:BODY_PARAMETERS]).tolist())

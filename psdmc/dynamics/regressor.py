@@ -1,7 +1,7 @@
 """The joint-torque regressor: torques as a matrix times the standard parameters.
 
-Each body's wrench is linear in its parameters; a column is that wrench for one parameter alone, dotted with the twist
-of each joint that carries it, moved into the body's frame.
+Each body's wrench is linear in its parameters. A column of the regressor is the wrench for one parameter alone, dotted
+with the twist of each joint that carries the body, moved into the body's frame.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ DRIVE = PARAMETERS_PER_LINK - 1
 
 
 class Placed(Protocol):
-    """Where a frame sits in another: a Placement, or one in another precision."""
+    """The placement of one frame in another: a Placement, or one in another precision."""
 
     @property
     def rotation(self) -> NDArray[Any]: ...
@@ -56,7 +56,7 @@ def regressor(
 
     link_frames  n, the frame that each link's parameters are about, in its joint frame
     wanted       indices into x (11 per link, link by link) whose columns are computed
-    qd_r         with it, the Slotine-Li regressor of M qdd_r + C qd_r + g; else qd
+    qd_r         reference rates, for the Slotine-Li regressor of M qdd_r + C qd_r + g; left out: qd
     """
     n = len(frames)
     forward = sweep_outward(frames, q, qd, qd_r, qdd_r, base_acceleration, PLAIN)
@@ -92,12 +92,12 @@ def _put(
 
 
 def own_twist(frame: Frame) -> Twist:
-    """What the joint's unit rate does to its own frame."""
+    """The twist that the joint's unit rate gives its own frame."""
     return axis_twist(frame.joint)
 
 
 def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
-    """A twist of the parent's frame, at the origin and along the axes of this one."""
+    """A twist of the parent's frame, at the origin and along the axes of this frame."""
     linear, angular = twist
     moved = add(linear, cross(angular, state.offset))
     return (
@@ -107,7 +107,7 @@ def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
 
 
 def twist_in(place: Placed, twist: Twist) -> Twist:
-    """A joint-frame twist at and along a frame placed in it."""
+    """A joint frame's twist, at the origin and along the axes of a frame placed in it."""
     rotation, translation = _plain(place)
     linear, angular = twist
     moved = add(linear, cross(angular, translation))
@@ -116,7 +116,7 @@ def twist_in(place: Placed, twist: Twist) -> Twist:
 
 
 def seen_from(place: Placed, motion: LinkMotion, rates: Rates) -> LinkMotion:
-    """A joint frame's motion as that of a frame placed in it."""
+    """A joint frame's motion, as the motion of a frame placed in it."""
     rotation, translation = _plain(place)
     rows = transpose(rotation)
     acceleration = add(motion.acceleration, transform(motion.spin.field, translation))

@@ -1,4 +1,4 @@
-"""What the algorithms ask of a number, and three-vectors of such numbers.
+"""The scalars that the algorithms run on, and three-vectors of them.
 
 A scalar is anything with + - * / and unary minus that mixes with floats: a float, a NumPy array of states, or a symbol
 that records what is done to it. Exact zeros and ones of the robot stay Python floats, so that a recording scalar can
@@ -27,7 +27,7 @@ Fixed = tuple[Terms, Terms, Terms]
 
 
 def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
-    """(sin, cos) of an angle in rad; symbols bring their own."""
+    """(sin, cos) of an angle in rad; symbols have a method for it."""
     if hasattr(angle, "sincos"):
         sine, cosine = angle.sincos()
         return sine, cosine

@@ -1,4 +1,4 @@
-"""Unrolled solution of M x = b for a symmetric positive definite M, from the last row up."""
+"""Solution of M x = b for a symmetric positive definite M, written out entry by entry, from the last row up."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class SingularMassMatrix(Exception):
-    """A pivot is zero for every q; `joint` counts from the base, 0 first."""
+    """A pivot is zero for every q; `joint` is its number, the one at the base being 0."""
 
     def __init__(self, joint: int) -> None:
         super().__init__(f"pivot {joint} is zero for every q")
@@ -35,8 +35,8 @@ class Factors:
 
 
 def factorize(matrix: Sequence[Sequence[Scalar]]) -> Factors:
-    """Elimination from the tip, whose entries the composite-rigid-body sweep finishes first (Featherstone 2008,
-    section 6.5). Raises SingularMassMatrix where a pivot is a constant not above 0."""
+    """The factors of M by elimination from the tip, whose entries the composite-rigid-body sweep finishes first
+    (Featherstone 2008, section 6.5). Raises SingularMassMatrix where a pivot is a constant not above 0."""
     n = len(matrix)
     rows = [list(row) for row in matrix]
     inverses: list[Scalar] = [0.0] * n
@@ -73,7 +73,7 @@ def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
 
 
 def inverse(factors: Factors) -> list[list[Scalar]]:
-    """M^-1 of M = L^T D L, both triangles: L^-1 D^-1 L^-T, of which one triangle is computed."""
+    """M^-1 from M = L^T D L, both triangles: L^-1 D^-1 L^-T, of which one triangle is computed."""
     n = len(factors.pivots)
     columns = _inverse_of_lower(factors.lower)
     scaled = [[entry * factors.inverses[k] for k, entry in enumerate(row)] for row in columns]

@@ -1,4 +1,4 @@
-"""Constant twists, such as a joint's motion subspace, applied to vectors; their zeros and ones cost nothing."""
+"""Constant twists, such as a joint's motion subspace, applied to vectors; zeros and ones cost nothing."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def axis_twist(joint: JointType) -> Twist:
 
 
 def effort(joint: JointType, force: Vector, moment: Vector) -> Scalar:
-    """What a force and a moment about the joint frame's origin do along the joint: N m, or N where it slides."""
+    """The component of a force and a moment about the joint frame's origin along the joint: N m, or N where it slides."""
     linear, angular = axis_twist(joint)
     return weighted((*linear, *angular), (*force, *moment))
 
@@ -53,7 +53,7 @@ def _scaled(v: Vector, weight: float) -> Vector:
 
 
 def _unit_momentum(body: Body, part: int) -> tuple[Vector, Vector]:
-    """Of a way along x, y or z (part 0, 1, 2), or a turn about it (3, 4, 5)."""
+    """Momentum and angular momentum for a unit velocity along x, y or z (part 0, 1, 2), or about it (3, 4, 5)."""
     m, (hx, hy, hz) = body.mass, body.moment
     if part == 0:
         return (m, 0.0, 0.0), (0.0, hz, -hy)
