@@ -1,4 +1,4 @@
-"""The certificate: the finished model against recursive Newton-Euler, on states that derivation never saw."""
+"""The certificate: the finished model compared with recursive Newton-Euler, at states that derivation did not use."""
 
 from __future__ import annotations
 
@@ -29,32 +29,33 @@ RANGES = (np.pi, 3.0, 5.0)
 """q (rad or m), qd and qdd are drawn from plus or minus these."""
 
 WORST_ALLOWED = 1e-8
-"""A certificate beyond this is no rounding, unless the robot's numbers make it so."""
+"""Largest error that rounding explains for ordinary robots."""
 
 ROUNDING = 1e-12
-"""Share of a joint's largest contribution that rounding can add to its torque: evaluating some thousand terms in double."""
+"""Share of a joint's largest contribution that rounding can add to its torque: some thousand terms are evaluated in
+double."""
 
 SCALES = "check the units of masses, inertias and lengths: these do not belong to one robot"
 
 DOUBTFUL = 1e-13
-"""A robot whose last digits change a torque by more than this share of its largest is measured against extended precision,
-and what they change is part of its certificate. Ordinary robots stay below 2e-14."""
+"""Where the last digits of a robot's numbers change a torque by more than this share of its largest, the model is
+compared in extended precision, and that change is part of the certificate. Ordinary robots stay below 2e-14."""
 
 PROMISED = 1e-11
-"""Such a robot's certificate must not exceed this."""
+"""Largest certificate of such a robot."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """A model's errors at fresh states, and what they are judged by; errors relative to each joint's largest torque.
+    """A model's errors at fresh states, relative to each joint's largest torque, and the data to judge them by.
 
-    model      whose errors
-    x          (11 n,) standard parameters that were used
-    states     q, qd, qdd
-    reference  (states, n) torques by Newton-Euler
-    errors     (n,) of what the model computes, E and P where it has them
-    plain      (n,) of its base parameters alone; zero where they were not looked at
-    last_digit (n,) what the last digits of the robot's own numbers change; zero where that is below DOUBTFUL throughout
+    model       whose errors
+    x           (11 n,) standard parameters that were used
+    states      q, qd, qdd
+    reference   (states, n) torques by Newton-Euler
+    errors      (n,) of what the model computes, from E and P where it has them
+    plain       (n,) of its base parameters alone; zero where they were not computed
+    last_digit  (n,) change by the last digit of the robot's own numbers; zero where below DOUBTFUL throughout
     """
 
     model: DynamicsModel
@@ -69,8 +70,8 @@ class Measured:
 def certificate(model: DynamicsModel) -> Array:
     """(n,) largest torque error per joint relative to that joint's largest torque.
 
-    The model's own parameters where they are known, else random ones from the span.
-    DerivationError or InternalError as `judged` says.
+    The model's own parameters are used where they are known, else random ones from the span. Raises DerivationError or
+    InternalError as `judged` does.
     """
     return judged(measured(model))
 
@@ -118,7 +119,7 @@ def _newton_euler(chain: Mechanism, x: Array, states: States) -> Array:
 
 
 def _too_fine(found: Measured, known: Array) -> DerivationError:
-    """Which joint's torque is not known, or not found, to PROMISED, and what to do about it."""
+    """The error that names the joint whose torque is not known, or not found, to PROMISED, with the remedy."""
     chain, worst = found.model.mechanism, int(np.argmax(known))
     joint, expected = chain.joints[worst], f"expected {PROMISED:g} at most"
     unit = "N" if joint.type.length_order else "N m"
@@ -145,7 +146,8 @@ def _too_fine(found: Measured, known: Array) -> DerivationError:
 
 
 def _failure(found: Measured, errors: Array) -> DerivationError | InternalError:
-    """Who is to blame for errors beyond WORST_ALLOWED: the robot's numbers or psdmc."""
+    """The error for torques that are off by more than WORST_ALLOWED: a DerivationError where the robot's numbers are
+    the cause, else an InternalError."""
     chain, largest = found.model.mechanism, np.abs(found.reference).max(axis=0)
     cancelled = _contributions(chain, found.x, found.states) / np.where(largest > 0, largest, 1.0)
     worst = int(np.argmax(np.where(np.isfinite(errors), errors, np.inf)))

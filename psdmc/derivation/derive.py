@@ -41,13 +41,14 @@ LARGEST_CHAIN = 200
 """Joints; beyond, base parameters alone take more than a minute and 2 GiB."""
 
 SIZES = (1e-12, 1e12)
-"""m; a robot's longest step lies between these, or squares of its lengths leave double precision behind."""
+"""m; a robot's longest step must lie between these: squares of other lengths exceed the range of double precision."""
 
 GOOD = 1e-13
-"""Where E and P leave larger errors, coefficients that count were taken for zeros: they are found again to FINEST."""
+"""Where E and P leave larger errors than this, coefficients that matter were taken for zeros: they are computed again
+with FINEST."""
 
 LAST_DIGIT = 4e-16
-"""The same where B was found in extended precision."""
+"""The same limit where B was found in extended precision."""
 
 
 def derive_model(
@@ -126,13 +127,13 @@ def _silent(step: str) -> None:
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """As a model file will give them back: tuples become lists."""
+    """Values as a model file gives them back: tuples become lists."""
     plain: dict[str, Any] = json.loads(json.dumps(values))
     return plain
 
 
 def tolerances(precision: Precision, reduction: Reduction) -> dict[str, float]:
-    """The numbers that decided."""
+    """The tolerances that this derivation used, by name, for the model's provenance."""
     return {
         "coefficient": precision.zero,
         "value_noise": precision.noise,
@@ -146,7 +147,7 @@ def _equation_noise(reduction: Reduction) -> float:
 
 
 def base_parameter_map(robot: Scaled, reduction: Reduction) -> Array:
-    """B (l, 11 n) in SI: base parameters from standard parameters, which the span's leading rows are."""
+    """B (l, 11 n) in SI: base parameters from standard parameters, which are the span's leading rows."""
     units = parameter_units(robot.types, robot.unit)[robot.leads]
     echelon = reduction.echelon * units[reduction.pivots][:, None] / units
     B = np.zeros((len(reduction.pivots), PARAMETERS_PER_LINK * len(robot.types)))
@@ -156,7 +157,7 @@ def base_parameter_map(robot: Scaled, reduction: Reduction) -> Array:
 
 
 def base_parameters(B: Array, chain: Mechanism) -> Array | None:
-    """theta_b = B x; None where a parameter that counts is unknown."""
+    """theta_b = B x; None where a parameter that it depends on is unknown."""
     x = chain.parameters.reshape(-1)
     unknown = np.isnan(x)
     if B[:, unknown].any():

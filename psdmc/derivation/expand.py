@@ -1,4 +1,4 @@
-"""From a chain to E, P and the base parameters' equations, in coefficient space."""
+"""E, P and the base parameters' equations of a chain, in coefficient space."""
 
 from __future__ import annotations
 
@@ -34,18 +34,20 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 COEFFICIENT_TOLERANCE = 1e-12
-"""Coefficients below this are zero, lengths in the robot's unit (units.py). Six joints with oblique axes have
-the same p for every tolerance from 3e-14 to 1e-9; the smallest true coefficient met is 1e-8 (seven such
-joints)."""
+"""Coefficients below this are zero, lengths in the robot's unit (units.py). Six joints with oblique axes have the same
+p for every tolerance from 3e-14 to 1e-9; the smallest true coefficient met is 1e-8 (seven such joints)."""
 
 VALUE_NOISE = 1e-14
-"""Uncertainty of a coefficient of size one, from rounding; relative for larger ones. Equal coefficients
-differ by up to 2e-15 (KR6, LBR7), different ones by more than 1e-4 there."""
+"""Uncertainty of a coefficient of size one, from rounding; relative for larger ones. Equal coefficients differ by up to
+2e-15 (KR6, LBR7), different ones by more than 1e-4 there."""
 
 
 class Precision(NamedTuple):
-    """What rounding leaves of an exact zero, and of a coefficient of size one (relative for larger ones), lengths in the
-    robot's unit."""
+    """Limits of rounding, lengths in the robot's unit.
+
+    zero   what an exact zero may become
+    noise  uncertainty of a coefficient of size one, relative for larger ones
+    """
 
     zero: float
     noise: float
@@ -53,19 +55,18 @@ class Precision(NamedTuple):
 
 IN_DOUBLE = Precision(COEFFICIENT_TOLERANCE, VALUE_NOISE)
 EXTENDED = Precision(1e-15, 1e-16)
-"""Where columns are nearly dependent: coefficients of size tilt^2 count. Rounding leaves less than 1e-17 there."""
+"""For nearly dependent columns, where coefficients of size tilt^2 matter. Rounding leaves less than 1e-17 there."""
 
 
 FINEST = Precision(1e-18, 1e-19)
-"""For robots of many scales: the coefficients of a joint whose lengths are 1e-5 of the robot's are 1e-10 of others. Some of
-1e-18 that are rounding are kept with them, which costs monomials, not digits."""
+"""For robots of many scales: the coefficients of a joint whose lengths are 1e-5 of the robot's are 1e-10 of others.
+Some coefficients of 1e-18 that are rounding are kept: they add monomials, but cost no digits."""
 
 
 def expand(
     scaled: Scaled, reduction: Reduction, precision: Precision, progress: Progress, memory: int | None = None
 ) -> Expansion:
-    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of
-    what is free)."""
+    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of the free memory)."""
     types = scaled.types
     if precision is not IN_DOUBLE:
         scaled = extended(scaled)
@@ -90,7 +91,7 @@ def expand(
 
 
 def precision_for(scaled: Scaled, reduction: Reduction) -> Precision:
-    """Double where every coefficient is either rounding or far from it."""
+    """The precision that a chain needs: double where every coefficient is either rounding or far larger."""
     if is_of_many_scales(scaled) and can_be_finest():
         return FINEST
     return IN_DOUBLE if reduction.is_clear and not has_small_entries(scaled) else EXTENDED
@@ -104,7 +105,7 @@ def can_be_finest() -> bool:
 def _mass_matrix(
     scaled: Scaled, chosen: Array, monomials: Monomials, zero: float
 ) -> dict[tuple[int, int], Terms]:
-    """In the chosen columns of the span; row 0 throughout."""
+    """The mass matrix's terms in the chosen columns of the span; row 0 throughout."""
     found = mass_matrix_terms(scaled.frames, scaled.link_frames, monomials, zero)
     return {
         pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, zero)

@@ -1,7 +1,7 @@
-"""A chain's geometry in extended precision, its rotations orthonormal to all of its digits.
+"""A chain's geometry in extended precision, with rotations that are orthonormal to all its digits.
 
-A file's rotation is orthonormal to 1e-16 only. Whatever cancels because it is a rotation would leave 1e-16 of itself, and
-could not be told from the effect of axes that are 1e-8 rad from parallel, which is of order 1e-16, too.
+A file's rotation is orthonormal to 1e-16 only. Terms that cancel because of orthonormality would leave 1e-16 of
+themselves, which is also the size of the effect of axes that are 1e-8 rad from parallel.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ Long = NDArray[Any]
 """An array of np.longdouble: 64 bits of mantissa on x86, 113 on most Arm, 53 where the C library has no more."""
 
 STEPS = 2
-"""Of Newton's iteration, each of which squares the distance from a rotation."""
+"""Steps of Newton's iteration, each of which squares the distance from a rotation."""
 
 
 SMALL = 1e-3
-"""A direction cosine, or a length in the robot's unit, below this makes coefficients of all sizes when it is multiplied by
-itself. Right angles that a file rounds, tilts of calibrated axes and offsets of a tenth of a millimetre are such."""
+"""A direction cosine, or a length in the robot's unit, below this gives coefficients of very different sizes when it is
+multiplied by itself. Examples are right angles that a file rounds, tilts of calibrated axes and offsets of a tenth
+of a millimetre."""
 
 
 MANY_SCALES = 1e-2
-"""A joint that moves nothing farther away than this, in the robot's unit of length, has coefficients of 1e-4 and less, and
-differences of theirs that count: thresholds made for a robot of one size would lose digits of its torque."""
+"""A joint that moves nothing farther away than this, in the robot's unit of length, has coefficients of 1e-4 and less,
+whose differences matter: thresholds for robots of one size would lose digits of its torque."""
 
 
 class LongPlacement(NamedTuple):
@@ -45,8 +46,8 @@ class LongPlacement(NamedTuple):
 
 
 def orthonormal(rotation: NDArray[np.float64]) -> Long:
-    """The rotation next to a (3, 3) one of doubles, in extended precision; the zeros of one that maps an axis to an
-    axis stay exact."""
+    """The rotation nearest to a (3, 3) one of doubles, in extended precision. Where it maps an axis to an axis, its
+    zeros stay exact."""
     near = rotation.astype(np.longdouble)
     three = 3.0 * np.eye(3, dtype=np.longdouble)
     for _ in range(STEPS):
@@ -83,8 +84,8 @@ def _vector(values: Sequence[Any] | Long) -> Vector:
 
 
 def has_small_entries(robot: Scaled) -> bool:
-    """Whether an angle or a length is small and yet not zero, so that double precision cannot tell its effects, and
-    theirs on each other, from rounding."""
+    """Whether an angle or a length is small and not zero, so that double precision cannot distinguish its effects from
+    rounding."""
     entries = [np.array([*frame.rotation, frame.translation]) for frame in robot.frames]
     entries += [np.vstack([place.rotation, place.translation]) for place in robot.link_frames]
     sizes = np.abs(np.stack([*entries, np.broadcast_to(robot.up, (4, 3))]))
@@ -92,8 +93,8 @@ def has_small_entries(robot: Scaled) -> bool:
 
 
 def is_of_many_scales(robot: Scaled) -> bool:
-    """Whether the lengths from some joint outward are all small, and not all zero: a finger of millimetres on an arm of
-    metres. Or all are small beside the metres that a joint of the robot slides."""
+    """Whether the lengths from some joint outward are all small but not all zero (a finger of millimetres on an arm of
+    metres), or all lengths are small beside the metres that a joint slides."""
     if robot.unit < MANY_SCALES and any(joint.length_order for joint in robot.types):
         return True
     reach = [_length(place.translation) for place in robot.link_frames]

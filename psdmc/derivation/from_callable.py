@@ -1,9 +1,8 @@
 """E, P and B of a user's own torque function, by sampling alone: the general path of PSDM-2021.
 
-Nothing is known of the function but that its torques are inverse dynamics of a serial chain, linear in its
-parameters: gravity of first order in every joint, acceleration and velocity terms of second. Each term is
-sampled on the tensor grid of all joints and interpolated axis by axis, so the cost grows as 5^n: for a few
-joints.
+The function's torques must be the inverse dynamics of a serial chain, linear in its parameters: gravity of first order
+in every joint, acceleration and velocity terms of second. Each term is sampled on the tensor grid of all joints and
+interpolated axis by axis, so that the cost grows as 5^n: for a few joints.
 """
 
 from __future__ import annotations
@@ -43,9 +42,8 @@ class SampledModel:
     P            n x (p, l)      reduction matrices
     B            (l, k)          base parameters from the function's own parameters
     parameters   k               their names
-    pivots       (l,)            the parameter that each base parameter leads with
-    certificate  (n,)            largest error against the function at fresh states, relative to the joint's
-    largest
+    pivots       (l,)            index of the parameter that each base parameter leads with
+    certificate  (n,)            largest error against the function at fresh states, relative to the joint's largest torque
     """
 
     E: NDArray[np.uint8]
@@ -76,16 +74,15 @@ def derive_from_callable(
 ) -> SampledModel:
     """E, P and B of tau = f(q, qd, qdd, X, gravity_scale).
 
-    f                q, qd, qdd (n,), X (k,) parameters, which enter linearly; gravity_scale multiplies
-    gravity,
-                     1 being its full strength; returns (n,). With `vectorised`, states (m, n) to torques (m,
-                     n).
+    f                takes q, qd, qdd (n,), parameters X (k,), in which it is linear, and gravity_scale, which multiplies
+                     gravity, 1 being its full strength; returns (n,). With `vectorised`, states (m, n) to torques (m, n)
     kinds            of the n joints, base to tip: "revolute" or "prismatic"
     parameter_names  k, in the order of X, which is also the order in which pivots are chosen
     length           m, the robot's size: prismatic joints are sampled at -length, 0 and length
     memory           bytes that the grids may take; default: most of what the machine has free
-    Raises InputError where f returns something else or is no such function, DerivationError where it does not
-    fit.
+
+    Raises InputError where f returns something else or is no such function, DerivationError where the grids exceed the
+    memory.
     """
     types = _types(kinds)
     monomials = Monomials(types)
@@ -166,7 +163,7 @@ class _Sampler:
 
 
 def _all_terms(sample: _Sampler) -> Iterator[Terms]:
-    """Gravity, then accelerations, squares of rates, products of rates."""
+    """Terms of gravity, then of accelerations, squares of rates, products of rates."""
     n, monomials = sample.monomials.n, sample.monomials
     rest, units = np.zeros(n), np.eye(n)
     yield sample.terms(sample.per_parameter(rest, rest, 1.0), 0)
@@ -188,7 +185,7 @@ def _certified(
     names: tuple[str, ...],
     sample: _Sampler,
 ) -> SampledModel:
-    """The model, after it reproduced the function at random states and parameters."""
+    """The model, after a comparison with the function at random states and parameters; InputError where they differ."""
     pivots = tuple(int(pivot) for pivot in reduction.pivots)
     model = SampledModel(E, P, reduction.echelon, names, pivots, np.zeros(len(P)))
     rng = np.random.default_rng(PROBE_SEED)

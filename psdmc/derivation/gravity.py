@@ -27,8 +27,8 @@ def gravity_terms(
 ) -> Terms:
     """Torque terms per unit of |g|; `up` is the unit vector against gravity in the base frame.
 
-    The potential of a unit mass at r in a link's frame is direction . r + height; both are carried outward
-    from joint to joint. Its coefficient for a link's mass is the height, for mx, my, mz the direction.
+    The potential of a unit mass at r in a link's frame is direction . r + height; both are carried outward from joint
+    to joint. The coefficient of a link's mass is the height; those of mx, my, mz are the direction.
     """
     parts: list[Terms] = []
     at_base: tuple[Vector, Array] = (

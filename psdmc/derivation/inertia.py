@@ -1,9 +1,9 @@
-"""Coefficients of the mass matrix, for each standard parameter apart.
+"""Coefficients of the mass matrix, for each standard parameter separately.
 
-The part of M_ij that one parameter of link k makes, i and then j on the path from the base to that link, is a
-bilinear form in the twists that the two joints give to that link's frame. Joint i's twist is a polynomial of
-degree one in the q of each joint after i on the path, so the product has degree one in those up to j, where
-joint j's twist is constant, and degree two in those after j: only the latter need a grid.
+The part of M_ij that one parameter of link k contributes (i, then j, on the path from the base to that link) is a
+bilinear form in the twists that the two joints give to that link's frame. Joint i's twist is a polynomial of degree one
+in the q of each joint after i on the path. The product therefore has degree one in those up to j, where joint j's twist
+is constant, and degree two in those after j: only the latter need a grid.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FormalAngle:
-    """An angle at formal points: it enters the dynamics as their abstract scalar, and has only sine and cosine."""
+    """An angle at formal points: the algorithms of psdmc.dynamics use it as a scalar, and ask for its sine and cosine
+    only."""
 
     sine: Array
     cosine: Array
@@ -62,8 +63,8 @@ def moving(frame: Frame) -> Moving:
 
 
 def formal_coordinate(basis: Basis) -> Scalar:
-    """A coordinate at as many formal points as there are factors of degree one: at the first all of these but the
-    constant are zero, at each other one of them is one, so that their coefficients follow by exact differences."""
+    """A coordinate at as many formal points as there are factors of degree one. At the first point all factors but the
+    constant are zero, at each other point one of them is one, so that coefficients follow by exact differences."""
     q, sine, cosine = np.array(basis.exponents[: basis.linear], dtype=np.float64).T
     return FormalAngle(sine, cosine) if basis.has_sincos else q
 
@@ -130,7 +131,7 @@ def mass_matrix_terms(
 
 
 def _drive_term(k: int) -> Terms:
-    """The drive's inertia of joint k adds to M_kk and to nothing else."""
+    """The drive inertia of joint k, which adds to M_kk alone."""
     parameter = PARAMETERS_PER_LINK * k + DRIVE
     return Terms(np.array([k]), np.array([0]), np.array([parameter]), np.array([1.0]))
 
@@ -138,8 +139,8 @@ def _drive_term(k: int) -> Terms:
 def _link_terms(
     twists: Sequence[Array], path: Sequence[int], monomials: Monomials, tolerance: float
 ) -> Iterator[tuple[int, int, Terms]]:
-    """The parts of M_ij that the ten parameters of the link at the path's end make; twists[a] is (6, coefficients), of
-    joint path[a]."""
+    """The parts of M_ij by the ten parameters of the link at the path's end; twists[a] is (6, coefficients), of joint
+    path[a]."""
     types, k = [monomials.types[joint] for joint in path], path[-1]
     for b in range(len(path)):
         inner = types[b + 1 :]
@@ -157,7 +158,7 @@ def _link_terms(
 
 
 def _at_nodes(twist: Array, inner: Sequence[JointType]) -> Array:
-    """(6, outer, nodes): a twist's coefficients along the outer joints, its values along the inner ones."""
+    """(6, outer, nodes): coefficients along the outer joints, values along the inner ones."""
     size = int(np.prod(linear_sizes(inner), dtype=np.int64))
     batch = twist.reshape(-1, size)
     values = along_axes([evaluation(joint, twist.dtype) for joint in inner], np.ascontiguousarray(batch.T))
@@ -174,7 +175,8 @@ def _interpolated(products: Array, inner: Sequence[JointType]) -> Array:
 
 
 def mass_features(first: Array, second: Array) -> Array:
-    """(10, ...): for each standard parameter of a body, two twists' part of the mass matrix when it is one.
+    """(10, ...): for each standard parameter of a body, the part of the mass matrix by two twists for a parameter of
+    one.
 
     first, second   (6, ...) linear velocity of the frame's origin and angular velocity; broadcast
     """

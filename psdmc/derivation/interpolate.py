@@ -1,10 +1,9 @@
-"""Products of polynomials in the joint variables: evaluate on a tensor grid, multiply, interpolate axis by
-axis.
+"""Products of polynomials in the joint variables: evaluated on a tensor grid, multiplied, interpolated axis by axis.
 
-A joint type's basis (robot/joints/basis.py) says which factors its polynomials of degree one are sums
-of, and which their products: {1, s, c} and {1, s, c, s c, c^2} (s = sin q, c = cos q), or {1, q} and {1, q, q^2}. The
-search space is the tensor product over the joints, so what PSDM-2021 solves as one dense system is a Kronecker
-product: one small inverse along each axis.
+A joint type's basis (robot/joints/basis.py) has the factors of which its polynomials of degree one are sums, and those
+of their products: {1, s, c} and {1, s, c, s c, c^2} (s = sin q, c = cos q), or {1, q} and {1, q, q^2}. The search space
+is the tensor product over the joints, so that what PSDM-2021 solves as one dense system is a Kronecker product: one
+small inverse along each axis.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def quadratic_sizes(joints: Iterable[JointType]) -> list[int]:
 
 
 def nodes(joint: JointType) -> Array:
-    """Where products are sampled."""
+    """The values of q at which products are sampled."""
     return np.array(joint.basis.nodes)
 
 
@@ -55,13 +54,13 @@ def _product(powers: Sequence[int], rows: Sequence[Array]) -> Array:
 
 @cache
 def evaluation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
-    """(size, linear): coefficients of degree one to values at the nodes."""
+    """(size, linear) matrix: coefficients of degree one to values at the nodes."""
     return quadratic_basis(joint, nodes(joint).astype(precision))[:, : joint.basis.linear]
 
 
 @cache
 def interpolation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
-    """(size, size): values at the nodes to coefficients of degree two."""
+    """(size, size) matrix: values at the nodes to coefficients of degree two."""
     inverse: Array = np.asarray(np.linalg.inv(quadratic_basis(joint, nodes(joint))), dtype=np.float64)
     if precision == DOUBLE:
         return inverse
@@ -78,8 +77,7 @@ def along_axes(matrices: Sequence[Array], values: Array) -> Array:
     values   (d_1 ... d_m, batch) as any shape with that many entries in that order
     returns  (batch, e_1 ... e_m) flattened to (batch, e_1 * ... * e_m), matrices[a] being (e_a, d_a)
 
-    Each step takes the first axis off and puts its result last, so that every step is one plain matrix
-    product.
+    Each step takes the first axis off and puts its result last, so that every step is one plain matrix product.
     """
     for matrix in matrices:
         turned = values.reshape(matrix.shape[1], -1).T

@@ -1,7 +1,7 @@
-"""How far a robot's torques are known at all: what the last digit of its numbers changes.
+"""How accurately a robot's torques are determined by its numbers: the change when their last digits change.
 
-A direction that a file gives to 16 digits is uncertain by 1e-16 rad. That changes the moment about an axis of 100 N that
-act 3 m away by some 1e-14 N m: nothing, unless the axis itself moves a gram a micrometre away.
+A direction that a file gives to 16 digits is uncertain by 1e-16 rad. That changes the moment about an axis of 100 N
+that act 3 m away by some 1e-14 N m: negligible, unless the axis itself moves a gram at a micrometre.
 """
 
 from __future__ import annotations
@@ -28,13 +28,15 @@ States = Sequence[Sequence[Long]]
 
 SEED = 18_890_401
 DRAWS = 4
-"""Changed robots that are looked at."""
+"""How many robots with changed numbers are computed."""
 
 LAST = 2.0**-53
-"""Half a unit in the last place of a double between one and two: rad of a direction, and share of any other number."""
+"""Half a unit in the last place of a double between one and two: in rad for a direction, as a share for any other
+number."""
 
 STEP = 2.0**-36
-"""What is tried instead, and then scaled down: much larger than rounding, and so small that torques change in proportion."""
+"""The change that is computed and then scaled down to LAST: far above rounding, and small enough for torques to be
+linear in it."""
 
 
 class Numbers(NamedTuple):
@@ -90,8 +92,8 @@ def _numbers(
 
 
 def _changed(numbers: Numbers, rng: np.random.Generator) -> Numbers:
-    """Every number by STEP up or down. Zeros stay, but those of rotations: they are cosines of right angles. A frame that is
-    not turned at all stays parallel: nothing was rounded."""
+    """The numbers, each changed by STEP up or down. Zeros stay, except those of rotations, which are cosines of right
+    angles; a frame that is not turned at all stays so, as nothing in it was rounded."""
 
     def scaled(values: Long) -> Long:
         return np.asarray(values * (1.0 + STEP * rng.choice([-1.0, 1.0], values.shape)))

@@ -33,29 +33,32 @@ from psdmc.robot.small import times
 
 SEED = 20_210_157
 STATES = 48
-"""Sampled motions, the same for all joints; each joint's torque has at most 11 columns to tell apart."""
+"""Sampled motions, the same for all joints; each joint's torque has at most 11 columns to distinguish."""
 
 EFFECT = 1e-15
-"""What a parameter must add to a joint's torque beyond what others do, lengths in the robot's unit and the most that any
-parameter of the link does there being one. Rounding leaves 1e-18; evaluating the torque in double leaves as much as this."""
+"""Smallest effect of a parameter on a joint's torque, beyond that of other parameters, that counts; lengths in the
+robot's unit, and relative to the largest effect that a parameter of the link has there. Rounding leaves 1e-18;
+evaluating the torque in double leaves as much as this."""
 
 EXACT = 1e-16
-"""Smaller coefficients of the echelon form are zero, lengths in the robot's unit: they add less than the last digit. It
-also tells columns that assumed zeros make dependent from the others, as a share of the longest: that of a long chain is a
-thousand long, and so is its rounding."""
+"""Smaller coefficients of the echelon form are zero, lengths in the robot's unit: they add less than the last digit.
+Also the share of the longest column below which a column depends on others because of assumed zeros: the longest
+column of a long chain has a length of a thousand, and its rounding grows alike."""
 
 
 def reduction_link_by_link(robot: Scaled) -> Reduction:
-    """The base parameters within the span's columns, by graded passes over rows that hold nothing but rank."""
+    """The base parameters within the span's columns, by graded passes over rows that span the row space and nothing
+    more."""
     rows = torque_rows(extended(robot))
     links = robot.leads // PARAMETERS_PER_LINK
     return _reduced(np.asarray((sparse.csr_array(robot.span.T) @ rows.T).T), links)
 
 
 def torque_rows(robot: Scaled) -> Long:
-    """(r, 11 n) rows that span what any torque depends on, joint by joint, each joint's of length one at most.
+    """(r, 11 n) rows that span all torques' dependence on the parameters, joint by joint; each joint's rows have length
+    one at most.
 
-    r is the number of base parameters of a chain whose parameters are all free. `robot` in extended precision.
+    r is the number of base parameters of a chain whose parameters are all free. `robot` is in extended precision.
     """
     n = len(robot.types)
     own = [echelon_rows(samples) for samples in _own_torques(robot)]
@@ -109,11 +112,12 @@ def echelon_rows(samples: Long) -> Long:
 
 
 def _reduced(rows: Long, links: NDArray[np.int64]) -> Reduction:
-    """A small column is no pivot before its time: its torque would be a large parameter times small numbers, which
-    double precision knows to fewer digits. So residuals are compared as they are, not with their columns.
+    """The base parameters from rows, with residuals compared as they are and not relative to their columns.
 
-    But a link's columns come before the next link's, small or not: else a parameter of a heavy link could be taken into
-    one of a light link farther out, whose torque would then be a small difference of large numbers.
+    A small column then becomes a pivot late: earlier, its torque would be a large parameter times small numbers, which
+    double precision holds with fewer digits. A link's columns come before the next link's, small or not; otherwise a
+    parameter of a heavy link could be combined into one of a light link farther out, whose torque would be a small
+    difference of large numbers.
 
     links  (k,) which link each column belongs to
     """
@@ -131,8 +135,8 @@ def _reduced(rows: Long, links: NDArray[np.int64]) -> Reduction:
 
 
 def _solved(triangle: Long, right: Long) -> Long:
-    """The solution x of triangle @ x = right, triangle (l, l) but for what rounding left below its diagonal: that is
-    nothing in a row of length one, but much in a row of 1e-13."""
+    """The solution x of triangle @ x = right. Entries below the diagonal of `triangle` (l, l) are not exactly zero but
+    rounding, which is nothing in a row of length one and much in a row of 1e-13."""
     solution = right.copy()
     for r in reversed(range(len(triangle))):
         solution[r] /= triangle[r, r]

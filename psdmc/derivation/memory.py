@@ -1,4 +1,4 @@
-"""What an expansion will need, known before it is made."""
+"""Memory and time of an expansion, estimated before it is made, and the refusals that follow."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from psdmc.robot.joints import JointType
 WITHOUT = "base parameters, regressor and generated code then come without E and P"
 
 BYTES_PER_TERM = 280
-"""Peak of the whole expansion per velocity term: 123 to collect, sort and sum it, some 200 with the matrices
-made of them (measured on six and seven joints with oblique axes; 225 in double, 255 in extended precision)."""
+"""Peak of the whole expansion per velocity term: 123 to collect, sort and sum it, some 200 with the matrices made of
+them (measured on six and seven joints with oblique axes; 225 in double, 255 in extended precision)."""
 
 _GRID_COPIES = 5
-"""Grids of ten features held at once: twists, products, two steps of the interpolation, magnitudes. A first,
+"""Grids of ten features held at once: twists, products, two steps of the interpolation, magnitudes. For a first,
 optimistic check: with oblique axes the mass matrix keeps up to six times the largest grid (measured on seven
 joints), and only then is the number of velocity terms known."""
 
@@ -35,14 +35,14 @@ LARGEST_GRID = 5**8
 """Grid points of the mass matrix beyond which an expansion is refused: nine revolute joints, a few seconds each way."""
 
 HEADROOM = 0.75
-"""Part of the free memory that an expansion may plan for: the estimate is one, and others run on the machine, too."""
+"""Part of the free memory that an expansion may plan for, as its need is estimated and other processes run."""
 
 
 def largest_monomial_count(types: Sequence[JointType]) -> int:
     """The p of a chain of these joints with axes in general position; no such chain has more.
 
-    M_0j has degree one in q_1 ... q_j and two in what follows; every rate product qd_j qd_k (k >= j) has at
-    most that.
+    M_0j has degree one in q_1 ... q_j and two in the following joints; every rate product qd_j qd_k (k >= j) has at
+    most these degrees.
     """
     n, linear, quadratic = len(types), linear_sizes(types), quadratic_sizes(types)
     total, gravity = 0, 1
@@ -57,7 +57,7 @@ def largest_monomial_count(types: Sequence[JointType]) -> int:
 
 
 def grid_bytes(types: Sequence[JointType]) -> int:
-    """Largest grid of mass-matrix features."""
+    """Bytes of the largest grid of mass-matrix features."""
     size = 10 * 8 * _GRID_COPIES
     for points in quadratic_sizes(types[1:]):
         size *= points
@@ -76,7 +76,7 @@ def velocity_bytes(
 
 
 def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
-    """DerivationError naming p and the memory where more is needed than there is."""
+    """Raise DerivationError, naming p and the memory, where more is needed than there is."""
     if needed <= available:
         return
     raise DerivationError(
@@ -87,8 +87,8 @@ def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
 
 
 def refuse_long(terms: int, types: Sequence[JointType]) -> None:
-    """DerivationError where an expansion would take more than about a minute: too many velocity terms, or, while these
-    are unknown (0), too large a grid."""
+    """Raise DerivationError where an expansion would take more than about a minute: too many velocity terms or, while
+    their number is unknown (0), too large a grid."""
     grid = int(np.prod(quadratic_sizes(types[1:]), dtype=float))
     if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:
         return
@@ -102,7 +102,8 @@ def refuse_long(terms: int, types: Sequence[JointType]) -> None:
 
 
 def available_memory() -> int:
-    """Bytes that an expansion may plan for: most of what the machine has free, or its control group's rest."""
+    """Bytes that an expansion may plan for: most of the machine's free memory, or of what is left of its control
+    group's."""
     return int(HEADROOM * min(_machine_memory(), _group_memory()))
 
 

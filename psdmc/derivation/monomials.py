@@ -20,7 +20,7 @@ from psdmc.robot.joints import JointType
 Integers = NDArray[np.int64]
 
 RADIX = 5
-"""No basis has more digits."""
+"""Digits of the largest basis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Monomials:
         return int(RADIX**self.n)
 
     def weight(self, joint: int) -> int:
-        """What one step of a joint's digit adds to the code."""
+        """The step in the code for one step of a joint's digit."""
         return int(RADIX ** (self.n - 1 - joint))
 
     def digit(self, codes: Integers, joint: int) -> Integers:
@@ -47,7 +47,7 @@ class Monomials:
         return digits
 
     def tensor_codes(self, joints: Sequence[int], sizes: Sequence[int]) -> Integers:
-        """Codes of a coefficient tensor, flattened: an axis per joint, with that many digits each."""
+        """Codes of a flattened coefficient tensor: one axis per joint, with that many digits each."""
         codes = np.zeros(1, dtype=np.int64)
         for joint, size in zip(joints, sizes, strict=True):
             codes = (codes[:, None] + self.weight(joint) * np.arange(size)).reshape(-1)
@@ -57,7 +57,7 @@ class Monomials:
         return 1 + j
 
     def velocity_rate(self, j: int, k: int) -> int:
-        """Number of qd_j qd_k, in either order."""
+        """Number of the rate factor qd_j qd_k, in either order."""
         j, k = min(j, k), max(j, k)
         if j == k:
             return 1 + self.n + j

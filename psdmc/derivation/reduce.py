@@ -1,7 +1,7 @@
 """Base parameters: the reduced row echelon form of the coefficients, pivots in the parameters' own order.
 
-Velocity terms are derivatives of the mass matrix in coefficient space, so their coefficients are combinations
-of its: mass matrix and gravity alone span the row space.
+Velocity terms are derivatives of the mass matrix in coefficient space, so that their coefficients are combinations of
+its coefficients: mass matrix and gravity alone span the row space.
 """
 
 from __future__ import annotations
@@ -19,35 +19,34 @@ from psdmc.robot.graded import graded_pivots, halving_shares
 Array = NDArray[np.float64]
 
 PIVOT_TOLERANCE = 1e-10
-"""A column of sampled or summed doubles whose share left by earlier pivots is below this depends on them; one below
-this share of the longest column has no effect. Rounding leaves some 1e-14."""
+"""A column of sampled or summed doubles depends on earlier pivots where they leave less than this share of it, and has
+no effect where it is below this share of the longest column. Rounding leaves some 1e-14."""
 
 CLEAR = 0.5**10
-"""Share that a pivot of a well-conditioned robot leaves at least."""
+"""Share of its column that each pivot of a well-conditioned robot leaves at least."""
 
 NOISE = 1e-13
-"""Share that rounding alone can leave, in double. What lies between this and CLEAR is a nearly dependent column."""
+"""Share that rounding alone can leave, in double. A share between this and CLEAR means a nearly dependent column."""
 
 FAIR_ENTRY = 1e4
-"""Entries of the echelon form, lengths in the robot's unit, of a well-conditioned robot are smaller. A column that is small
-as a whole can be independent by all of itself, and others are then large multiples of it."""
+"""Bound of the echelon form's entries for a well-conditioned robot, lengths in the robot's unit. A column that is small
+as a whole can be independent, and other columns are then large multiples of it."""
 
 ECHELON_TOLERANCE = 1e-12
-"""Smaller entries of the echelon form are zero, lengths in the robot's unit. Rounding leaves less than
-1e-13."""
+"""Smaller entries of the echelon form are zero, lengths in the robot's unit. Rounding leaves less than 1e-13."""
 
 
 _BLOCK_ROWS = 8192
-"""Rows reduced at once, so that the stack is never held dense as a whole."""
+"""Rows reduced at once, so that the whole stack is never held as a dense matrix."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduction:
     """Which columns are base parameters, and what they stand for.
 
-    pivots   (l,)     column indices, ascending
-    echelon  (l, k)   base parameters = echelon @ columns' parameters; a unit vector at each pivot
-    is_clear          no column was nearly dependent: double precision has decided, and well
+    pivots    (l,)     column indices, ascending
+    echelon   (l, k)   base parameters = echelon @ columns' parameters; a unit vector at each pivot
+    is_clear           whether no column was nearly dependent, so that double precision is enough
     """
 
     pivots: NDArray[np.int64]
@@ -56,8 +55,7 @@ class Reduction:
 
 
 def row_space(blocks: Iterable[Terms], columns: int) -> Array:
-    """(k, k) triangular factor R of all rows (row, monomial) of the blocks: R^T R = A^T A, found by blocked
-    QR."""
+    """(k, k) triangular factor R of all rows (row, monomial) of the blocks: R^T R = A^T A, by blocked QR."""
     factor: Array = np.zeros((0, columns))
     for block in blocks:
         for rows in _dense_rows(block, columns):
@@ -86,9 +84,10 @@ def _dense_rows(terms: Terms, columns: int) -> Iterable[Array]:
 
 
 def reduced(rows: Array) -> Reduction:
-    """Reduced row echelon form of rows (m, k), the next column in order a pivot where its residual says so.
+    """Reduced row echelon form of rows (m, k), the next column in order being a pivot where its residual is large
+    enough.
 
-    Never "the largest first": between equal residuals rounding would choose.
+    The largest residual is not taken first: between equal residuals rounding would decide.
     """
     work = np.array(rows, order="C")
     norms = np.linalg.norm(work, axis=0)

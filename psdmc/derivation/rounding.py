@@ -1,8 +1,7 @@
-"""Numbers that differ by rounding alone become one number, and the simplest one in reach.
+"""Numbers that differ by rounding alone are made one number, the simplest within rounding.
 
-The same product of link lengths reaches P by many paths and arrives with different last bits; the expanded
-lowering shares sub-expressions only where coefficients are equal. This happens before certification, and
-nowhere else.
+The same product of link lengths enters P by many paths, with different last bits, while the expanded lowering shares
+sub-expressions only where coefficients are equal. Numbers are rounded here, before certification, and nowhere else.
 """
 
 from __future__ import annotations
@@ -16,12 +15,12 @@ DIGITS = 12
 """Decimal digits of a simple number: products of two lengths given to 0.1 mm have fewer."""
 
 SIMPLE = 2e-13
-"""Relative distance of a simple number that its computation can have moved. A small coefficient may stand beside a large
-parameter: moved by the noise of larger ones, it would cost digits of the torque."""
+"""Largest relative change of a number to a simple one. A small coefficient may multiply a large parameter: changed by
+the noise of larger coefficients, it would cost digits of the torque."""
 
 
 def merged(values: Array, noise: Array) -> Array:
-    """The same numbers with those equal up to `noise` made equal in magnitude; none moves by more than its
+    """The numbers, with those that are equal up to `noise` made equal in magnitude; none changes by more than its
     noise.
 
     values, noise   (count,), noise the absolute uncertainty of each value

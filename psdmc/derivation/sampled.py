@@ -1,5 +1,4 @@
-"""Base parameters without E and P: the echelon form of the regressor at sampled states, for chains of any
-length."""
+"""Base parameters without E and P: the echelon form of the regressor at sampled states, for chains of any length."""
 
 from __future__ import annotations
 
@@ -17,10 +16,10 @@ from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 Array = NDArray[np.float64]
 
 SEED = 20_210_156
-"""Of the sampled states: any seed gives the same pivots, this one gives the same bytes."""
+"""Seed of the sampled states. Any seed gives the same pivots; a fixed one gives the same bytes."""
 
 STATES_PER_JOINT = 24
-"""Sampled states for each joint; n rows each. Eleven would do for the rank, more condition it."""
+"""Sampled states for each joint, n rows each. Eleven are enough for the rank, more improve its condition."""
 
 
 SAMPLED_JOINTS = 10
@@ -28,8 +27,9 @@ SAMPLED_JOINTS = 10
 
 
 def reduction_of(scaled: Scaled) -> Reduction:
-    """The base parameters: from sampled rows of doubles where these are few, of one scale, without small angles or
-    lengths, whose squares are no rounding, and no column is nearly dependent, else link by link in extended precision."""
+    """The base parameters. They are found from sampled rows of doubles where those are few and of one scale, angles and
+    lengths are not so small that their squares are rounding, and no column is nearly dependent; else link by link in
+    extended precision."""
     is_plain = not is_of_many_scales(scaled) and not has_small_entries(scaled)
     if is_plain and len(scaled.types) <= SAMPLED_JOINTS:
         reduction = sampled_reduction(scaled)

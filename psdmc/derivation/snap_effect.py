@@ -1,4 +1,4 @@
-"""What snapping changed: torques of the snapped chain against the file's own."""
+"""The effect of snapping: torques of the snapped chain compared with those of the file's own numbers."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Sparse lists of terms: which monomial multiplies which parameter in which joint's torque, and by how
-much."""
+"""Sparse lists of terms: which monomial multiplies which parameter in which joint's torque, and the factor."""
 
 from __future__ import annotations
 
@@ -52,7 +51,7 @@ def selected(terms: Terms, chosen: NDArray[np.bool_] | Integers) -> Terms:
 
 
 def summed(terms: Terms, tolerance: float) -> Terms:
-    """Sorted by row, monomial and column, each once; sums within the tolerance of zero left out."""
+    """The terms sorted by row, monomial and column, equal ones added; sums within the tolerance of zero are left out."""
     if not len(terms.value):
         return terms
     columns = int(terms.column.max()) + 1
@@ -69,8 +68,7 @@ def summed(terms: Terms, tolerance: float) -> Terms:
 
 
 def times_matrix(terms: Terms, matrix: Array, tolerance: float) -> Terms:
-    """The same monomials on other parameters: columns replaced by their combinations in `matrix` (old,
-    new)."""
+    """The terms on other parameters: columns replaced by their combinations in `matrix` (old, new)."""
     right = sparse.csr_array(matrix)
     counts = np.diff(right.indptr)[terms.column]
     source = np.repeat(np.arange(len(counts)), counts)

@@ -1,7 +1,6 @@
-"""A unit of length near the robot's size, so that one absolute tolerance means the same for every
-coefficient.
+"""A unit of length near the robot's size, so that one absolute tolerance means the same for every coefficient.
 
-The unit is a power of two: going to it and back changes no bit of any number.
+The unit is a power of two: converting to it and back changes no bit of any number.
 """
 
 from __future__ import annotations
@@ -89,7 +88,7 @@ class Scaled:
 
 
 def scaled(chain: Mechanism) -> Scaled:
-    """The chain in a unit of length near its size."""
+    """The chain in a unit of length near its size, for derivation."""
     unit = length_unit(chain)
     units = parameter_units(chain.types, unit)
     leads = leading_rows(chain.parameter_span)

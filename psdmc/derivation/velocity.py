@@ -1,7 +1,6 @@
 """Centrifugal and Coriolis terms from the mass matrix, in coefficient space.
 
-tau_i = sum over j, k of (dM_ij/dq_k - 1/2 dM_jk/dq_i) qd_j qd_k: Christoffel's formula before it is made
-symmetric.
+tau_i = sum over j, k of (dM_ij/dq_k - 1/2 dM_jk/dq_i) qd_j qd_k: Christoffel's formula before it is made symmetric.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from psdmc.derivation.terms import Integers, Terms, joined, selected, summed
 
 
 def derivative(terms: Terms, monomials: Monomials, joint: int) -> Terms:
-    """d/dq of one joint; monomials are codes."""
+    """The terms' derivative by q of one joint; monomials are codes."""
     digits = monomials.digit(terms.monomial, joint)
     weight = monomials.weight(joint)
     parts: list[Terms] = []
@@ -35,7 +34,7 @@ def velocity_terms(
 ) -> Terms:
     """Torque terms (row the joint, monomial the key) of all products of joint rates.
 
-    carried   the joints beyond each joint, of which alone its row of the mass matrix may depend
+    carried   the joints beyond each joint: its row of the mass matrix depends on no others
     """
     parts: list[Terms] = []
     for (a, b), terms in mass_matrix.items():
@@ -65,7 +64,7 @@ def acceleration_terms(mass_matrix: Mapping[tuple[int, int], Terms], monomials: 
 
 
 def slope_count(terms: Terms, monomials: Monomials, joint: int) -> int:
-    """How many terms `derivative` makes."""
+    """Number of terms that `derivative` makes."""
     images = [len(images) for images in monomials.types[joint].basis.derivatives]
     counts = np.bincount(monomials.digit(terms.monomial, joint), minlength=len(images))
     return int(counts[: len(images)] @ np.array(images))
