@@ -1,4 +1,4 @@
-"""The arrays of an .npz file from anywhere: sizes are judged before memory is taken, and nothing is unpickled."""
+"""The arrays of an untrusted .npz file: sizes are checked before memory is allocated, and nothing is unpickled."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 ALWAYS_ALLOWED = 64 << 20
-"""Bytes that any file may unpack to."""
+"""Bytes that every file may unpack to."""
 LARGEST = 2 << 30
-"""Bytes that none may exceed."""
+"""Bytes that no file may unpack to more than."""
 LARGEST_RATIO = 200
-"""Bytes per byte of the file beyond ALWAYS_ALLOWED; models have 10 to 40, zip's own limit is 1032."""
+"""Bytes unpacked per byte of the file, beyond ALWAYS_ALLOWED; models have 10 to 40, zip's own limit is 1032."""
 
 _BROKEN = (
     zipfile.BadZipFile,
@@ -34,15 +34,15 @@ _BROKEN = (
     UnicodeDecodeError,
     Warning,
 )
-"""What zipfile and NumPy's header parser raise on altered bytes; found by altering every byte of a file."""
+"""Exceptions of zipfile and NumPy's header parser on altered bytes, found by altering every byte of a file."""
 
 
 class BrokenArchiveError(ValueError):
-    """The file began well and is damaged."""
+    """The file begins as an archive and is damaged."""
 
 
 def opened(data: bytes) -> zipfile.ZipFile:
-    """The archive in a file's bytes; ValueError where it is none, BrokenArchiveError where it is none any more."""
+    """The archive in a file's bytes; ValueError where it is none, BrokenArchiveError where it is a damaged one."""
     if not data.startswith(b"PK"):
         raise ValueError("no zip archive")
     try:
@@ -54,7 +54,7 @@ def opened(data: bytes) -> zipfile.ZipFile:
 def read_arrays(archive: zipfile.ZipFile, names: Iterable[str], size: int) -> dict[str, NDArray[Any]]:
     """Named arrays of an archive in a file of `size` bytes.
 
-    ValueError where one is missing, larger than files of that size have, or holds objects; BrokenArchiveError
+    ValueError where one is missing, is larger than a file of that size can hold, or holds objects; BrokenArchiveError
     where it cannot be unpacked.
     """
     members = {info.filename: info for info in archive.infolist()}
@@ -84,7 +84,8 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
 
 
 def _header(content: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
-    """Shape, whether columns come first, type, and where the data begin; NumPy's parser evaluates literals only."""
+    """Shape, whether it is stored column by column, type, and the position of the data; NumPy's parser evaluates
+    literals only."""
     stream = io.BytesIO(content)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

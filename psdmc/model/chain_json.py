@@ -17,11 +17,12 @@ from psdmc.robot.joints import joint_type
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Limits, Mechanism, NamedFrame, Placement
 
 MOST_JOINTS = 256
-"""Joints of a model file: its span alone takes 0.5 kB times the square of that, 64 MB."""
+"""Largest number of joints in a model file: the span alone takes 0.5 kB times its square, 64 MB."""
 MOST_FRAMES = 1000
 MOST_NOTES = 100_000
 ORTHONORMAL = 1e-6
-"""Largest entry of R R^T - 1 of a rotation: rounding leaves 1e-15, and files' own matrices are made exact."""
+"""Largest entry of R R^T - 1 that is accepted for a rotation. Rounding leaves 1e-15, and matrices of robot files are
+made exact."""
 
 _NO_LIMIT = {"lower": -math.inf, "upper": math.inf, "speed": math.inf, "acceleration": math.inf}
 _NO_LIMIT["effort"] = math.inf
@@ -52,7 +53,7 @@ def chain_to_json(chain: Mechanism) -> dict[str, Any]:
 
 
 def _frames(data: object) -> Sequence[object]:
-    """None in files of models without."""
+    """The named frames' entries; empty in files of earlier versions."""
     return (
         entries(data["frames"], "the chain's frames", MOST_FRAMES)
         if isinstance(data, dict) and "frames" in data
@@ -61,7 +62,7 @@ def _frames(data: object) -> Sequence[object]:
 
 
 def _is_tip_alone(chain: Mechanism) -> bool:
-    """Whether the frames are those of every model file before there were any."""
+    """Whether the only frame is the tip, as in all model files of earlier versions."""
     return [frame.name for frame in chain.frames] == [chain.tip_name]
 
 
@@ -76,7 +77,7 @@ def _frame_from_json(data: object, joints: int) -> NamedFrame:
 
 
 def chain_from_json(data: object) -> Mechanism:
-    """The chain; ValueError says which value is not a chain's."""
+    """The chain; ValueError names the value that is wrong."""
     listed = entries(part(data, "joints", "the chain"), "the chain's joints", MOST_JOINTS)
     if not listed:
         raise ValueError("the chain has no joints")

@@ -91,18 +91,18 @@ class DynamicsModel:
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """For each base parameter the first standard parameter (index into x) that enters it alone, and as
-        itself."""
+        """For each base parameter the first standard parameter (index into x) that only this base parameter contains,
+        with factor one."""
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
     @property
     def is_reduced(self) -> bool:
-        """Whether every base parameter has such a pivot, as derivation makes them."""
+        """Whether every base parameter has such a pivot, as those from the derivation do."""
         return bool(self._leads.any(axis=1).all())
 
     @property
     def _leads(self) -> NDArray[np.bool_]:
-        """(l, 11n) where a standard parameter enters one base parameter alone, and as itself."""
+        """(l, 11n) true where a standard parameter is contained in one base parameter alone, with factor one."""
         is_alone = (self.B != 0.0).sum(axis=0) == 1
         return np.asarray(is_alone & (self.B == 1.0))
 
@@ -110,8 +110,7 @@ class DynamicsModel:
     def representative(self) -> Array:
         """(11n, l) standard parameters from base parameters, within the chain's parameter_span.
 
-        Each base parameter sits on its pivot, the first column of B that belongs to it alone; the span's
-        other coordinates are zero. B @ representative = 1.
+        Each base parameter is placed on its pivot; the span's other coordinates are zero. B @ representative = 1.
         """
         leads = np.argmax(self.mechanism.parameter_span != 0.0, axis=0)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -142,8 +141,8 @@ class DynamicsModel:
         return found
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """tau (..., n), N m or N, straight from E, P and theta_b: slow and obvious, the reference. Without E and P
-        by Newton-Euler on the same base parameters."""
+        """tau (..., n), N m or N, directly from E, P and theta_b: slow, and the reference for faster code. Without E
+        and P, by Newton-Euler on the same base parameters."""
         return self.torques_for(self.known_theta_b(), q, qd, qdd)
 
     def torques_for(self, theta_b: Array, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -205,14 +204,14 @@ class DynamicsModel:
     ) -> DynamicsModel:
         """The model with a rigid load fixed to the link that carries its tip, or another named frame.
 
-        mass      kg
-        com       (3,) m, centre of mass in `frame`
-        inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
-        frame     where the load's numbers are given: the name of the tip or of another of the model's frames, or a
-                  Placement in the tip frame; None: the tip
+            mass      kg
+            com       (3,) m, centre of mass in `frame`
+            inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
+            frame     where the load's numbers are given: the name of the tip or of another of the model's frames, or a
+                      Placement in the tip frame; None: the tip
 
-        InputError where the numbers are no rigid body's, beyond the ranges of robot files, or the model's assumptions
-        do not admit the load.
+        InputError where the numbers are those of no rigid body, are beyond the ranges of robot files, or where the
+        model's assumptions exclude the load.
         """
         load = payload.load_parameters(self.mechanism, mass, com, inertia, frame)
         body = payload.carrying_frame(self.mechanism, frame).joint

@@ -18,10 +18,10 @@ from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Joint, M
 Array = NDArray[np.float64]
 
 RECOGNITION = 1e-9
-"""Relative difference up to which a coefficient is taken for a named one. Display only: the numbers stay."""
+"""Relative difference up to which a coefficient is written by a name. For display only: the numbers stay."""
 
 DIGITS = 6
-"""Significant digits of the coefficients that have no name."""
+"""Significant digits of coefficients that have no name."""
 
 SHORTEST = 1e-100
 """m; shorter ones have no name in equations: their squares would leave the range of doubles."""
@@ -46,7 +46,7 @@ class BaseParameter:
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """A number with a name; `order` is its exponent of metre."""
+    """A number with a name; `order` is its exponent of the metre."""
 
     value: float
     order: int

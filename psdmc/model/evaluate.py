@@ -1,4 +1,4 @@
-"""Inverse dynamics in NumPy straight from E, P and theta_b: slow, obvious, and the reference for everything faster."""
+"""Inverse dynamics in NumPy directly from E, P and theta_b: slow and simple, the reference for everything faster."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 CHUNK_BYTES = 64 * 2**20
-"""Values of monomials held at once."""
+"""Bytes of monomials' values held at once."""
 BLOCK_BYTES = 2**18
-"""Values of monomials multiplied at once: a share of a core's own cache."""
+"""Bytes of monomials' values multiplied at once: a share of a core's own cache."""
 
 
 def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
-    """The broadcast leading shape, and each vector as (states, n) float64; InputError where a shape does not
-    fit."""
+    """The broadcast leading shape, and each vector as (states, n) float64; InputError where a shape does not fit."""
     n = len(chain)
     arrays = {name: np.asarray(value, dtype=np.float64) for name, value in vectors.items()}
     for name, array in arrays.items():
@@ -43,9 +42,9 @@ def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], lis
 
 
 class _Monomials:
-    """The monomials y of an expansion, ready to be evaluated: products of the rows of E, those of gravity times |g|.
+    """The monomials y of an expansion, prepared for evaluation: products of the rows of E, those of gravity times |g|.
 
-    Monomials share the part that the position decides, and few factors come after it: each part is computed once.
+    Many monomials have the same part in q, times few other factors: each such part is computed once.
     """
 
     def __init__(self, expansion: Expansion, chain: Mechanism) -> None:
@@ -77,7 +76,7 @@ class _Monomials:
 
 
 def _alike(columns: NDArray[np.uint8]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Which column's equal each one is, as (p,) numbers, and one column of each number."""
+    """The number of each column's class of equal columns, (p,), and one column of each class."""
     number = np.zeros(columns.shape[1], dtype=np.int64)
     for row in columns:
         _, first, number = np.unique(number * 3 + row, return_index=True, return_inverse=True)
@@ -85,7 +84,8 @@ def _alike(columns: NDArray[np.uint8]) -> tuple[NDArray[np.intp], NDArray[np.int
 
 
 def _factors(exponents: NDArray[np.uint8]) -> Iterator[NDArray[np.intp]]:
-    """(p,) each: which of 1, the rates, their squares is a monomial's first factor, its second, and so on.
+    """(p,) arrays: the index among 1, the rates and their squares of each monomial's first factor, then of its second,
+    and so on.
 
     exponents  (2n, p) of qd and qdd, at most 2
     """
@@ -115,7 +115,7 @@ def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Ar
 
 
 def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) -> Array:
-    """M (states, n, n) at q (states, n): column j is what the monomials with qdd_j give for qdd_j = 1."""
+    """M (states, n, n) at q (states, n): column j is the value of the monomials with qdd_j for qdd_j = 1."""
     n, weights = expansion.n, _weights(expansion, theta)
     columns = [np.flatnonzero(expansion.E[4 * n + j]) for j in range(n)]
     parts = [weights[:, own] for own in columns]
@@ -127,8 +127,7 @@ def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) 
 
 
 def _weights(expansion: Expansion, theta: Array) -> sparse.csr_array:
-    """(n, p) the weight of each monomial in each torque; sparse, whose sums do not hang on the number of
-    threads."""
+    """(n, p) weight of each monomial in each torque; sparse, as its sums do not depend on the number of threads."""
     from scipy import sparse
 
     return sparse.csr_array(np.stack([matrix @ theta for matrix in expansion.P]))
@@ -137,7 +136,7 @@ def _weights(expansion: Expansion, theta: Array) -> sparse.csr_array:
 def _by_chunks(
     expansion: Expansion, chain: Mechanism, arrays: list[Array], result: Callable[[Array], Array]
 ) -> Array:
-    """result(values of monomials) for few enough states at a time, put together along the states."""
+    """result(values of monomials), evaluated for few states at a time and concatenated along the states."""
     count = len(arrays[0])
     size = max(1, CHUNK_BYTES // (8 * max(1, expansion.p)))
     pieces = ([a[start : start + size] for a in arrays] for start in range(0, max(count, 1), size))

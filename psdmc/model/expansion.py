@@ -1,4 +1,4 @@
-"""The monomials of a model and what each contributes: E and P, which only come together."""
+"""The monomials of a model and their coefficients: E and P, which belong together."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A model from the arrays and the manifest of a file, each held against the others: the file may be forged.
+"""A model from the arrays and the manifest of a file, checked against each other: the file may be forged.
 
-What is checked is what every stage relies on without looking: kinds, shapes, ranges, finite numbers, and that
-the base parameters have pivots within the chain's span.
+All that the stages rely on is checked: kinds, shapes, ranges, finite numbers, and that the base parameters have pivots
+within the chain's span.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ KINDS = {
 """Type and axes of each array."""
 
 MOST_ROWS = 1_000_000
-"""Rows of a table in the provenance; a campaign's friction has seven per joint."""
+"""Largest number of rows of a table in the provenance; a campaign's friction has seven per joint."""
 
 
 def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
@@ -104,7 +104,7 @@ def _expansion(arrays: Arrays, n: int, l: int) -> Expansion:
 
 
 def _provenance(value: object, n: int) -> dict[str, Any]:
-    """Where the model came from, as far as psdmc reads it again."""
+    """The model's origin, checked as far as psdmc reads it again."""
     found = json.record(value, "the provenance")
     for name in ("source_text", "source_sha256", "source_name"):
         if found.get(name) is not None:
@@ -124,7 +124,7 @@ def _provenance(value: object, n: int) -> dict[str, Any]:
 
 
 def _check_options(options: dict[str, Any], n: int) -> None:
-    """Keyword arguments of load_robot: their names, and kinds that it takes or refuses in words."""
+    """ValueError unless these are keyword arguments of load_robot, of kinds that it takes or refuses with a message."""
     foreign = [name for name in options if name not in {field.name for field in fields(LoadOptions)}]
     if foreign:
         raise ValueError(f"the provenance has an option '{foreign[0]}'")

@@ -1,4 +1,4 @@
-"""Values of a JSON text that somebody may have forged, each of the kind and size that it must have.
+"""Values of an untrusted JSON text, each checked for kind and size.
 
 Every function returns its value, or raises ValueError that names it, says what was found and what was expected.
 """

@@ -1,4 +1,4 @@
-"""Read a model file: what store.py writes, or anything that somebody calls so."""
+"""Read a model file: one that store.py wrote, or any file that is passed for one."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from psdmc.model.from_parts import model_from
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
 
 _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
-"""By schema: what makes its manifest one of the next schema. Empty while there is only one."""
+"""By schema, the function that turns a manifest into one of the next schema. Empty while there is only one."""
 
 LARGEST_MANIFEST = 64 << 20
-"""Bytes of the manifest's text, at four a letter; a nine-joint arm's has 0.1 MB beside its source."""
+"""Largest size in bytes of the manifest's text, at four bytes a letter; a nine-joint arm's has 0.1 MB besides its
+source."""
 
 
 def load(path: str | Path) -> DynamicsModel:
-    """Read a model file; InputError where it is missing, damaged, forged, foreign or of a newer psdmc."""
+    """The model in a file; InputError where it is missing, damaged, forged, foreign or of a newer psdmc."""
     source = Path(path)
     try:
         arrays, manifest = _read(source)
@@ -39,7 +40,7 @@ def load(path: str | Path) -> DynamicsModel:
 
 
 def _read(source: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Arrays and manifest, the manifest known to be psdmc's and of no newer schema."""
+    """Arrays and manifest; the manifest is psdmc's and not of a newer schema."""
     data = _bytes_of(source)
     try:
         archive = opened(data)

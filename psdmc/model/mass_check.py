@@ -1,7 +1,7 @@
-"""Whether the mass matrix is positive definite wherever the joints may stand: without that, no forward dynamics.
+"""Whether the mass matrix is positive definite in all poses within the joint limits, which forward dynamics needs.
 
-A measured or published theta_b need not belong to any distribution of mass. Then some accelerations carry negative
-kinetic energy, and a controller that divides by the mass matrix pushes the wrong way.
+A measured or published theta_b need not belong to any distribution of mass. Then some accelerations have negative
+kinetic energy, and a controller that divides by the mass matrix acts in the wrong direction.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint
 Array = NDArray[np.float64]
 
 POSES = 2000
-"""Poses tried, each joint drawn evenly within its limits."""
+"""Number of poses, each joint drawn evenly within its limits."""
 SEED = 88_061
 ROUNDING = 64 * float(np.finfo(float).eps)
-"""Share of the magnitudes summed in an inertia below which it is rounding, and counts as zero; and of a matrix's largest
-eigenvalue, every joint in its own unit, below which the smallest one is."""
+"""Share below which a number is rounding and counts as zero: of the magnitudes that are summed in an inertia, and of a
+matrix's largest eigenvalue, every joint in its own unit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MassCheck:
     """The mass matrix over `poses` poses within the joint limits.
 
-    failing   in how many it is not positive definite
-    smallest  eigenvalue of them all, kg m^2 (kg where only sliding joints take part)
-    pose      (n,) where that is, rad or m
+    failing   number of poses in which it is not positive definite
+    smallest  smallest eigenvalue of all poses, kg m^2 (kg where only sliding joints take part)
+    pose      (n,) pose of that eigenvalue, rad or m
     joint     name of the joint that its eigenvector moves most
     """
 
@@ -48,7 +48,7 @@ class MassCheck:
 
     @property
     def reason(self) -> str:
-        """What is wrong, or that nothing is, in words."""
+        """A sentence about what is wrong, or that nothing is."""
         pose = ", ".join(f"{value:.3g}" for value in self.pose)
         found = f"smallest eigenvalue {self.smallest:.3g} at q = [{pose}], mostly joint {self.joint!r}"
         if self.passed:
@@ -74,8 +74,9 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
 
 
 def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:
-    """(poses,) whether M is positive definite, each joint in the unit in which its own inertia is one: a finger's inertia
-    is no rounding of its arm's. `smallest` (n,) is what counts as no inertia at all."""
+    """(poses,) whether M is positive definite, each joint in the unit in which its own inertia is one, so that a
+    finger's inertia does not count as rounding of its arm's. `smallest` (n,) is the inertia below which a joint has
+    none."""
     inertias = np.einsum("pii->pi", mass)
     roots = np.sqrt(np.where(inertias > 0.0, inertias, 1.0))
     values = np.linalg.eigvalsh(mass / roots[:, :, None] / roots[:, None, :])
@@ -84,8 +85,8 @@ def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:
 
 
 def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
-    """(n,) at most what the parameters add up to in each joint's own inertia, whatever their signs. `travel` (n,), how far
-    sliding joints go."""
+    """(n,) sum of the magnitudes that the parameters contribute to each joint's own inertia. `travel` (n,) is how far
+    sliding joints move."""
     mechanism = model.mechanism
     x = np.abs(model.standard_parameters()).reshape(model.n, PARAMETERS_PER_LINK)
     masses, firsts, seconds, result = x[:, 0], x[:, 1:4].sum(axis=1), x[:, 4:10].sum(axis=1), x[:, 10].copy()

@@ -1,4 +1,4 @@
-"""A rigid load on a frame, as standard parameters of its link: theta_b = B x then follows, E, P and B stay."""
+"""A rigid load on a frame, as standard parameters of its link. theta_b = B x follows; E, P and B stay."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from psdmc.robot.small import times
 Array = NDArray[np.float64]
 
 ROTATION_SLACK = 1e-6
-"""By which products of a rotation's rows may miss zero and one: a matrix written with seven digits."""
+"""Largest error of the products of a rotation's rows: that of a matrix written with seven digits."""
 
 SPAN_TOLERANCE = 1e-9
-"""Share of the load by which it may miss the parameters that the model admits: rounding only."""
+"""Largest share of the load outside the parameters that the model admits: rounding only."""
 
 
 def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
@@ -38,7 +38,7 @@ def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
 
 
 def body_parameters(body: int) -> NDArray[np.int64]:
-    """(10,) where the body parameters of the link that moves with a joint are in x."""
+    """(10,) indices in x of the body parameters of the link that moves with a joint."""
     return PARAMETERS_PER_LINK * body + np.arange(BODY_PARAMETERS)
 
 
@@ -60,7 +60,7 @@ def load_parameters(
 
 
 def load_map(chain: Mechanism, B: Array, frame: NamedFrame) -> Array:
-    """(l, 10) what a load at a frame adds to theta_b = B x, by its mass, first moment and inertia about that frame's origin.
+    """(l, 10): theta_b that a load at a frame adds, from its mass, first moment and inertia about that frame's origin.
 
     InputError where the chain's assumptions do not admit every load there.
     """
@@ -72,7 +72,7 @@ def load_map(chain: Mechanism, B: Array, frame: NamedFrame) -> Array:
 
 
 def carrying_frame(chain: Mechanism, frame: Placement | str | None) -> NamedFrame:
-    """Where a load's numbers are given, in the joint frame of the link that carries it."""
+    """The frame in which a load's numbers are given, in the joint frame of the link that carries it."""
     tip = chain.tip_frame
     if isinstance(frame, Placement):
         return replace(tip, placement=tip.placement @ _checked_frame(frame))
@@ -144,7 +144,7 @@ _SHAPES = {(): "a finite number", (3,): "three finite numbers", (3, 3): "3 x 3 f
 
 
 def _check_admitted(chain: Mechanism, load: Array, body: int) -> None:
-    """The load must lie in the span: a link whose mx is assumed zero cannot carry one off its axis."""
+    """InputError unless the load lies in the span: a link whose mx is assumed zero cannot carry one off its axis."""
     x = np.zeros(PARAMETERS_PER_LINK * len(chain))
     x[body_parameters(body)] = load
     span = chain.parameter_span

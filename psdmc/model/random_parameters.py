@@ -1,4 +1,4 @@
-"""Parameters of another robot of the same shape: what stands in where a robot's own are unknown."""
+"""Random physical parameters for a robot whose own are unknown."""
 
 from __future__ import annotations
 

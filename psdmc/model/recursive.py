@@ -1,4 +1,4 @@
-"""The model's functions by the recursions of psdmc.dynamics: quick for any p, E and P are not used."""
+"""The model's torques, mass matrix and regressor by the recursions of psdmc.dynamics: fast for any p, without E and P."""
 
 from __future__ import annotations
 

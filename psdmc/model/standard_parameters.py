@@ -1,4 +1,4 @@
-"""Whether a model's links are known one by one, which torques alone do not show."""
+"""Whether the parameters of every single link are known, which torques alone do not determine."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import numpy as np
 from psdmc.model.dynamics_model import DynamicsModel
 
 BELONGS = 1e-9
-"""Share of the largest base parameter by which those of the links may miss theta_b: both were rounded."""
+"""Share of the largest base parameter by which B x may differ from theta_b: both were rounded."""
 
 
 def lack_of_standard_parameters(model: DynamicsModel) -> str | None:
-    """Why mass, centre and inertia of every link cannot be taken from the model's chain; None where they can."""
+    """The reason why mass, centre and inertia of every link cannot be taken from the model's chain; None where they
+    can."""
     parameters = model.mechanism.parameters
     if np.isnan(parameters).any():
         return "it needs mass and inertia of every link, and some are unknown"

@@ -30,13 +30,13 @@ FORMAT = "psdmc model"
 ARRAYS = ("E", "theta_b", "P_joint", "P_row", "P_col", "P_value", "B")
 
 _NO_DATE = (1980, 1, 1, 0, 0, 0)
-"""Zip's earliest date: a file's bytes must not tell when it was written."""
+"""The earliest date of zip: a file's bytes must not depend on when it was written."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
 class Model(Protocol):
-    """What a file holds, by the names of DynamicsModel: it is imported there, and does not import it."""
+    """The parts of a model that a file holds. A protocol with the names of DynamicsModel, which imports this file."""
 
     @property
     def expansion(self) -> Expansion | None: ...
@@ -58,8 +58,8 @@ class Model(Protocol):
 
 
 def save(model: Model, path: str | Path) -> None:
-    """Write a model file, whole or not at all; InputError where the place does not admit it, ToolchainError
-    where the disk does not."""
+    """Write a model file, whole or not at all. Raises InputError where the path cannot be written, ToolchainError where
+    the disk fails."""
     n = len(model.mechanism)
     if n > MOST_JOINTS:
         raise InputError(
@@ -106,7 +106,7 @@ def _arrays(model: Model) -> dict[str, NDArray[Any]]:
 
 
 def _nothing(n: int, l: int) -> Expansion:
-    """What a file holds where the model has no E and P."""
+    """The empty expansion that a file holds where the model has no E and P."""
     return Expansion(np.zeros((5 * n, 0), np.uint8), Entries(*np.zeros((4, 0))), l)
 
 

@@ -1,4 +1,4 @@
-"""What a robotics engineer wants to know about a model, as plain data for whoever prints it."""
+"""The facts about a model that `psdmc show` prints, as plain data."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from psdmc.robot.mechanism import Joint
 
 
 class Sizes(NamedTuple):
-    """How many monomials each kind of acceleration has."""
+    """Number of monomials by kind of acceleration."""
 
     gravity: int
     acceleration: int
