@@ -1,4 +1,4 @@
-"""What arithmetic costs on a machine, as lowering's search and the passes count it."""
+"""Costs of arithmetic on a machine, for lowering's search and the passes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Cycles until a result can be used; only their order of size matters.
+    """Cycles until a result can be used; only their order of magnitude matters.
 
     fused   of a multiply-add; where there is none, of a product and a sum
     sincos  of the inline sine and cosine
@@ -24,19 +24,19 @@ class Latency:
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """Figures that choose among equal programs. Weights are in additions.
+    """Figures for choosing among equal programs. Weights are in additions.
 
-    latency             what orders sums (fuse_sums)
+    latency             for the order of sums (fuse_sums)
     div, neg            weight of a division, of a change of sign
-    fused               weight that a multiply-add takes off its product and its sum
+    fused               weight that a multiply-add saves on its product and its sum
     sincos              weight of one inline sincos, which serves `angles_per_sincos` angles
     angle               weight of each further angle: to put it in and to take sine and cosine out
     angles_per_sincos   in code for one state; 1 where the target has no vectors
-    registers           for reals; read where `spills_wait`
+    registers           for reals; used where `spills_wait`
     spills_wait         whether a spilled value delays the code (one instruction after the other); other machines hide it
-    crowded             lanes take the order for one state unless it keeps this much more alive
-    worth_two_bodies    lanes get a body of their own where it saves them this much
-    longest_of_two      additions; with parameters at run time a longer one is not written twice: it is tens of kilobytes
+    crowded             lanes take the order for one state unless it keeps this many times more values alive
+    worth_two_bodies    lanes get a body of their own where it saves this factor
+    longest_of_two      additions; with parameters at run time a longer body is not written twice: it is tens of kilobytes
     """
 
     latency: Latency

@@ -1,4 +1,4 @@
-"""The default target: fixed figures, and C that takes the vectors of whatever machine its compiler is told of."""
+"""The default target: fixed figures, and C that uses the vectors of whatever machine the compiler builds for."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ COSTS = Costs(
     worth_two_bodies=1.03,
     longest_of_two=1500.0,
 )
-"""About a current x86 or Arm core with 64-byte vectors. Never detected, so that every machine lowers alike. `crowded`
-lets forward dynamics alone have an order for lanes (KR6: 21 % more alive in the other; 8 lanes take 13.7 ns a state so,
-12.8 ns in their own); `worth_two_bodies` weighs the length of the C, `longest_of_two` too: KR6's package
-with derivatives has 626 KiB of source instead of 662, and 3 % more arithmetic in one function's `_theta_batch`."""
+"""For a current x86 or Arm core with 64-byte vectors. Never detected, so that lowering gives the same result on every
+machine. With this `crowded`, forward dynamics alone has an order for lanes (KR6: the other order keeps 21 % more
+values alive; 8 lanes take 13.7 ns a state with it and 12.8 ns with their own). `worth_two_bodies` and
+`longest_of_two` limit the length of the C: KR6's package with derivatives has 626 KiB of source instead of 662, and
+3 % more arithmetic in one function's `_theta_batch`."""
 
 NATIVE = Target(
     name="native",
@@ -40,5 +41,5 @@ NATIVE = Target(
     host_flags=("-march=native", "-mcpu=native"),
     costs=COSTS,
 )
-"""The package's bytes are the same on every machine: it is psdmc.compile, and a package's user, who ask the compiler for
-the machine at hand."""
+"""The package's bytes are the same on every machine. psdmc.compile, or a package's user, asks the compiler for the
+machine at hand."""

@@ -46,7 +46,7 @@ X86_64_V4 = replace(
     flags=("-march=x86-64-v4",),
     host_flags=(),
 )
-"""The default's figures are this machine's: the same arithmetic, shorter C."""
+"""The default's figures are those of this machine: the same arithmetic, shorter C."""
 
 AARCH64 = replace(
     NATIVE,
@@ -72,7 +72,7 @@ SCALAR = replace(
     host_flags=(),
     costs=replace(COSTS, sincos=60.0, angles_per_sincos=1, registers=16),
 )
-"""Each angle pays a sincos of its own: some 60 operations and moves."""
+"""Each angle has a sincos of its own: some 60 operations and moves."""
 
 CORTEX_M4F = replace(
     SCALAR,
@@ -96,7 +96,7 @@ CORTEX_M4F = replace(
     ),
 )
 """Cycles from Arm's reference manual: VADD and VMUL 1, VFMA 3, VDIV 14, VLDR 2, one more where the next instruction
-waits for the result. So a multiply-add saves code, not time."""
+uses the result. So a multiply-add saves code, not time."""
 
 CORTEX_M7 = replace(
     CORTEX_M4F,

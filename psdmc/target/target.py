@@ -1,4 +1,4 @@
-"""What machine and form generated code is for. Nothing else in psdmc knows machines."""
+"""The machine and form that generated code is for. All that psdmc knows about machines is in this folder."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class Target:
     """A machine, and the form of code for it.
 
     about          for people: what it is and what differs from the default
-    real, trig     precision, and sines, where the user chooses none
-    vectors        registers that the C is written for, widest first: the first whose macro is defined, else the last;
-                   none: plain C
+    real, trig     precision, and source of sines, where the user chooses none
+    vectors        registers that the C is written for, widest first: the first whose macro is defined is used, else the
+                   last; none: plain C
     forms          of each function
     texts          whether joints' names, units and parameters' equations are tables in the library
     hosted         whether there is an operating system: shared libraries, position-independent code, threads
-    cache_line     bytes that one prefetch asks for
-    blocks_ahead   how far before their use a batch asks for its inputs
+    cache_line     bytes of one prefetch
+    blocks_ahead   how many blocks before their use a batch prefetches its inputs
     flags          for the compiler, which must take them
-    host_flags     the first of these that a compiler takes means the machine at hand; in a package only where its user asks
-    costs          what the search and the passes choose by
+    host_flags     the first of these that a compiler takes means the machine at hand; in a package only if its user asks
+    costs          figures for the search and the passes
     """
 
     name: str

@@ -1,15 +1,16 @@
-"""Vector registers that a target may have, and how C asks compilers for them."""
+"""Vector registers that a target may have, and the macros and types by which C uses them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 HAS_VECTORS = "defined(__GNUC__) && (!defined(__i386__) || defined(__SSE2_MATH__))"
-"""C condition: the compiler has GCC's vector extension, x87 aside: its excess precision would break the rounding of
+"""C condition: the compiler has GCC's vector extension and no x87, whose excess precision would break the rounding of
 the inline sine."""
 
 LANE_BLOCK_BYTES = 64
-"""Of one variable in a block of the lane-by-lane layout. The same for every target: R_LANES is part of the interface."""
+"""Bytes of one variable in a block of the lane-by-lane layout. The same for every target: R_LANES is part of the
+interface."""
 
 
 @dataclass(frozen=True, slots=True)
