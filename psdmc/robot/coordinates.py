@@ -1,4 +1,5 @@
-"""How joints follow the robot's coordinates: q_joint = ratio q_leader + offset, or a constant."""
+"""Coordinates of joints: each joint's q is a coordinate of its own, follows another's (q_joint = ratio q_leader +
+offset), or is constant."""
 
 from __future__ import annotations
 
@@ -9,9 +10,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:
-    """What one joint's q is: ratio * q[leader] + offset.
+    """One joint's q as ratio * q[leader] + offset.
 
-    leader   the joint whose q is meant, which has a coordinate of its own; None: the joint is held at `offset`
+    leader   number of the joint that has the coordinate; None: the joint is held at `offset`
     ratio    of the two rates, in the joint's unit per the leader's
     offset   rad or m
     """
@@ -26,7 +27,7 @@ class Coordinate:
 
 
 def own_coordinates(n: int) -> tuple[Coordinate, ...]:
-    """Of n joints that follow no other."""
+    """The coordinates of n joints that follow no other."""
     return tuple(Coordinate(i) for i in range(n))
 
 
@@ -36,7 +37,8 @@ def leaders(coordinates: Sequence[Coordinate]) -> tuple[int, ...]:
 
 
 def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coordinate, ...]:
-    """As they are, each joint's own where none are given; ValueError where a joint follows one that follows another."""
+    """The coordinates, each joint's own where none are given; ValueError where a joint follows one that follows
+    another."""
     if not coordinates:
         return own_coordinates(n)
     if len(coordinates) != n:

@@ -1,4 +1,4 @@
-"""Which mechanisms psdmc derives, lowers and keeps in model files: serial chains, so far."""
+"""Which mechanisms psdmc derives, lowers and keeps in model files: serial chains only, so far."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FREE = "make it a fixed joint, or leave out what it follows"
 
 
 def require_derivable(chain: Mechanism) -> None:
-    """InputError where the robot is no serial chain, each joint with a coordinate of its own; the hint is the remedy."""
+    """InputError with a remedy unless the robot is a serial chain whose joints have a coordinate each."""
     fault = _fork(chain) or _inner_tip(chain)
     if fault is not None:
         raise InputError(f"{shown(chain.name)}: {fault}, and psdmc derives serial chains only", CUT)
@@ -38,7 +38,7 @@ def _inner_tip(chain: Mechanism) -> str | None:
 
 
 def _follower(chain: Mechanism) -> str | None:
-    """The first joint without a coordinate of its own."""
+    """A sentence about the first joint without a coordinate of its own; None where all have one."""
     for i, coordinate in enumerate(chain.coordinates):
         name = f"joint {shown(chain.joints[i].name)}"
         if coordinate.leader is None:

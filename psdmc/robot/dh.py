@@ -76,7 +76,7 @@ def read_dh(text: str, source: str) -> DhRobot:
 
 
 def _parsed(text: str, source: str) -> object:
-    """What TOML's parser makes of it; ValueError is its word for integers of thousands of digits."""
+    """The parsed TOML; ValueError also for integers of thousands of digits, which the parser raises."""
     hint = "give a URDF or a DH .toml file"
     try:
         return tomllib.loads(text)
@@ -88,7 +88,7 @@ def _parsed(text: str, source: str) -> object:
 
 
 def angle(value: object, accepted: Range = limits.ANGLE) -> float:
-    """rad, from a number (rad) or a text such as "90 deg" or "1.5 rad"; ValueError on anything else."""
+    """An angle in rad, from a number (rad) or a text such as "90 deg" or "1.5 rad"; ValueError on anything else."""
     if not isinstance(value, str):
         return within(accepted)(value)
     plain = value.strip(WHITE_SPACE)
@@ -99,7 +99,7 @@ def angle(value: object, accepted: Range = limits.ANGLE) -> float:
 
 
 def finite(value: object) -> float:
-    """A number that is one, and neither infinite nor beyond what 64 bits hold; ValueError on anything else."""
+    """A finite number within the range of 64 bits; ValueError on anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"found {shown(value)}, expected a finite number")
     if not abs(value) <= sys.float_info.max:
@@ -108,7 +108,7 @@ def finite(value: object) -> float:
 
 
 def within(accepted: Range) -> Callable[[object], float]:
-    """A reader of finite numbers whose magnitude is in the range; ValueError says which is."""
+    """A reader of finite numbers whose magnitude is in the range; its ValueError names the range."""
 
     def convert(value: object) -> float:
         number = finite(value)
@@ -121,7 +121,7 @@ def within(accepted: Range) -> Callable[[object], float]:
 
 
 class _Table:
-    """One TOML table that is read key by key; what is wrong goes to `problems`, under the table's name."""
+    """One TOML table, read key by key; faults go to `problems`, under the table's name."""
 
     def __init__(self, value: object, where: str, keys: tuple[str, ...], problems: list[str]) -> None:
         self.where, self.problems = where, problems
@@ -219,7 +219,7 @@ LENGTH = within(limits.LENGTH)
 
 
 def _plain(name: str) -> str:
-    """A short name as it stands, another as messages show texts."""
+    """A short name as it is; another one quoted, as in messages."""
     return name if name.isidentifier() and len(name) < limits.SHOWN else shown(name)
 
 

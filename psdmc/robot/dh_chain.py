@@ -55,7 +55,7 @@ def _frame(joints: Sequence[Joint], name: str, source: str) -> NamedFrame:
 
 
 def link_name(number: int) -> str:
-    """Links have no names in a DH table; they are counted from 1."""
+    """Name of a link of a DH table, which has none of its own: link1, link2 and so on."""
     return f"link{number}"
 
 
@@ -86,7 +86,7 @@ def _exact(rotation: Array, where: str, snap: float, snaps: list[Snap], segment:
 
 
 def _parameters(row: DhJoint) -> Array:
-    """(11,) about the link's frame, with what the file says to be zero zero before it meets an unknown."""
+    """(11,) parameters about the link's frame; zeros that the file states are applied before unknown values."""
     mass, com, inertia = settled(row.link)
     drive = 0.0 if row.drive_inertia is None else row.drive_inertia
     return np.append(standard_parameters(mass, com, inertia), drive)

@@ -1,9 +1,9 @@
-"""A DH table read a second time, to check the first: the textbook's 4 x 4 matrices, and nothing of the chain.
+"""A DH table read a second time, independently, to check the first reading: the textbook's 4 x 4 matrices.
 
 Standard (Denavit, Hartenberg 1955; Spong, Hutchinson, Vidyasagar, Robot Modeling and Control, eq. 3.10) and modified
 (Craig, Introduction to Robotics, eq. 3.6). The joint variable is added to theta, or to d; either leaves a rotation
-about z (a way along z) that commutes to the outer end of a standard row and to the inner end of a modified one, where
-Pinocchio's joint stands.
+about z (a displacement along z) that commutes to the outer end of a standard row and to the inner end of a modified
+one, where Pinocchio's joint is.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ import pinocchio
 from psdmc.robot.mechanism import Array
 
 MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelPZ}
-"""Pinocchio's joints by a row's type; written down here, because this reader shares nothing with the other."""
+"""Pinocchio's joints by a row's type. Written here again, because this reader shares nothing with the other."""
 
 
 def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
     """Pinocchio's model of a table that read_dh has accepted, links called link1, link2 and so on.
 
-    gravity   m/s^2 in the base frame instead of the table's; bodies of which the table leaves something open are zero
+    gravity   m/s^2 in the base frame instead of the table's; bodies that the table leaves open in part are zero
     """
     table = tomllib.loads(text)
     is_modified = table.get("convention", "standard") == "modified"

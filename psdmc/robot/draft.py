@@ -1,4 +1,4 @@
-"""What a reader hands over: a chain whose assumptions are not settled yet."""
+"""What a reader returns: a chain whose assumptions are not applied yet."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 
 @dataclass(frozen=True, slots=True)
 class Snap:
-    """One rotation that was replaced by a near one with exact zeros: where, and by what angle (rad).
+    """One rotation that was replaced by a near one with exact zeros: where, and the angle between them (rad).
 
-    segment   the way it lies on, counted by the joint at its end: 0 from the base to the first link and so on; n from
-              the last link to the tip; BASE from the root to the base
+    segment   its place, counted by the joint at its end: 0 from the base to the first link and so on; n from the last
+              link to the tip; BASE from the root to the base
     """
 
     where: str

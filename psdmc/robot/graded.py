@@ -1,7 +1,7 @@
-"""Independent columns of a matrix in a given order, but none that is barely independent before its time.
+"""Independent columns of a matrix in a given order, those that are barely independent last.
 
-The same on every processor and in whatever precision the matrix has; between equal residuals the order decides, never
-rounding.
+The result is the same on every processor and in whatever precision the matrix has; between equal residuals the order
+decides, never rounding.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 
 def halving_shares(last: float) -> tuple[float, ...]:
-    """1/2, 1/4, ... down to `last`: the parameters are gone through once for each of these, in their own order, and one
-    becomes a pivot where what earlier pivots leave of its column exceeds this share of it. One pass with `last` alone
-    would find as many, but would divide by small residuals where large ones are to be had."""
+    """1/2, 1/4, ... down to `last`. The parameters are gone through once for each of these shares, in their own order,
+    and one becomes a pivot where what earlier pivots leave of its column exceeds the share. One pass with `last`
+    alone would find as many pivots, but would divide by small residuals where larger ones exist."""
     count = math.ceil(-math.log2(last))
     return (*(0.5**k for k in range(1, count)), last)
 
@@ -25,12 +25,12 @@ def halving_shares(last: float) -> tuple[float, ...]:
 def graded_pivots(
     work: NDArray[Any], norms: NDArray[Any], shares: Sequence[float], groups: NDArray[Any] | None = None
 ) -> tuple[list[int], float, float]:
-    """Columns of `work` (m, k) in the order they become pivots, the smallest share at which one did, and the largest
-    share left of any other. Turns `work` in place so that its first rows are triangular in them.
+    """Columns of `work` (m, k) in the order in which they become pivots, the smallest share of a pivot, and the largest
+    share left of any other column. Changes `work` in place: its first rows become triangular in the pivots.
 
     norms   (k,)  the columns' lengths beforehand
-    groups  (k,)  ascending; the columns of one are gone through with all shares before the next one's are looked at.
-                  None: all are one group
+    groups  (k,)  ascending; the columns of one group are gone through with all shares before the next group's. None: all
+                  are one group
     """
     pivots: list[int] = []
     taken = 1.0
@@ -58,10 +58,10 @@ def lengths(rows: NDArray[Any]) -> NDArray[Any]:
 
 
 def _reflect(rows: NDArray[Any], column: int, length: Any) -> None:
-    """Turn the rows, in place, so that the column keeps its first entry only (Householder). Rows that the column does
-    not reach stay as they are: a long chain's rows are zero for all links before their own.
+    """Reflect the rows, in place, so that the column keeps its first entry only (Householder). Rows in which the column
+    is zero stay as they are: a long chain's rows are zero for all links before their own.
 
-    einsum and no BLAS: its sums do not hang on the number of threads.
+    einsum instead of BLAS: its sums do not depend on the number of threads.
     """
     mirror = rows[:, column].copy()
     mirror[0] += np.copysign(length, mirror[0])

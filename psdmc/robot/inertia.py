@@ -1,4 +1,4 @@
-"""One link's inertia: standard parameters about its frame, and what no real body could have."""
+"""One link's inertia: standard parameters about its frame, and the conditions that a real body fulfils."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ INERTIA_NAMES = ("xx", "xy", "yy", "xz", "yz", "zz")
 """Order of the six inertia components within the standard parameters."""
 
 PRODUCT_NOISE = 1e-15
-"""Relative to a link's largest first moment or inertia: smaller entries are rounding of changing frames."""
+"""Relative to a link's largest first moment or inertia: smaller entries are rounding of changes of frames."""
 
 PHYSICAL_TOLERANCE = 1e-6
-"""Relative: files round inertias, so a triangle inequality may fail by this much without a word."""
+"""Relative violation of a triangle inequality that is accepted, as files round inertias."""
 
 
 def standard_parameters(mass: float, com: Array, inertia_com: Array) -> Array:
@@ -59,10 +59,11 @@ def six_of(matrix: Array) -> Array:
 
 
 def physical_fault(mass: float, inertia_com: Array) -> str | None:
-    """What forbids a body with this mass (kg) and inertia (6,) about its centre, or None; unknowns pass.
+    """The condition that a body with this mass (kg) and inertia (6,) about its centre violates, or None; unknown values
+    pass.
 
-    A body exists where the mass is positive (or all is zero) and the principal moments obey the triangle
-    inequality: equivalent to a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018).
+    A body exists where the mass is positive (or all is zero) and the principal moments obey the triangle inequality:
+    equivalent to a positive semidefinite pseudo-inertia (Wensing, Kim, Slotine 2018).
     """
     if np.isnan(mass) or np.isnan(inertia_com).any():
         return None

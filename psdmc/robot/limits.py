@@ -1,7 +1,7 @@
-"""What a robot file may hold: declared bounds of sizes and magnitudes, said in every message that refuses one.
+"""Limits of a robot file: sizes and magnitudes. Every message that refuses one states it.
 
-Numbers beyond them are no robot's; below and above, squares and products of lengths and masses would leave what
-64-bit numbers hold, and the first thing to notice would be a sum far from its cause.
+No robot has numbers beyond them. With such numbers, squares and products of lengths and masses would exceed the range
+of 64-bit numbers, and the error would show far from its cause.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ MAX_BYTES = 4 * 2**20
 """Bytes of a robot file: the largest one known to us has 0.2 MB."""
 
 MAX_LINKS = 1000
-"""Links of a URDF: urdfdom and Pinocchio go down the tree by recursion and end the process beyond a few thousand."""
+"""Links of a URDF: urdfdom and Pinocchio descend the tree by recursion and crash beyond a few thousand."""
 
 MAX_UNKNOWN = 100
-"""Different elements of a URDF that it does not know; each is compared with those that it does."""
+"""Unknown kinds of elements in a URDF; each is compared with those that are known."""
 
 MAX_JOINTS = 200
 """Movable joints of a chain: the longest serial robots have a few dozen."""
 
 MAX_CHARACTERS = 100
-"""Characters of a number: 17 digits tell every 64-bit number from the next."""
+"""Characters of a number: 17 digits distinguish any two 64-bit numbers."""
 
 MAX_NAME = 1000
 """Characters of a name."""
@@ -35,7 +35,7 @@ SHOWN = 60
 """Characters of a file's text that a message repeats."""
 
 TINIEST = 1e-300
-"""A number nearer to zero than this, but not zero, is about to lose digits (denormal) or lost them all."""
+"""Smallest magnitude besides zero: below it, numbers lose digits (denormal)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,20 +57,20 @@ class Range:
 
 
 LENGTH = Range(1e-60, 1e4, "m")
-"""Files hold remains of rounding as small as (1e-16)^3; a chain of 200 joints of 10 km stays far from overflow."""
+"""Files hold remains of rounding as small as (1e-16)^3; a chain of 200 joints of 10 km is far from overflow."""
 
 ANGLE = Range(TINIEST, 1e3, "rad")
 """Beyond, sine and cosine would turn the number's last digit into 1e-13 and more."""
 
 MASS = Range(1e-12, 1e6, "kg")
-"""Pinocchio takes masses below 2e-16 kg for none when it merges bodies."""
+"""Pinocchio takes masses below 2e-16 kg for zero when it merges bodies."""
 
 INERTIA = Range(1e-60, 1e16, "kg m^2")
 
 DRIVE_INERTIA = Range(1e-18, 1e8, "kg m^2 (kg)")
 
 DIRECTION = Range(TINIEST, 1e6, "")
-"""Components of an axis; what counts is their ratio."""
+"""Components of an axis; only their ratio matters."""
 
 AXIS_LENGTH = Range(1e-6, 2e6, "")
 """Length of an axis as written: a shorter one is more likely a mistake than a direction."""
@@ -83,14 +83,14 @@ GRAVITY_LENGTH = Range(1e-6, 2e3, "m/s^2")
 QUATERNION = Range(TINIEST, 2.0, "")
 
 ANY = Range(TINIEST, 1.8e308, "")
-"""Joint limits: only copied; files write the largest number for none."""
+"""Joint limits are copied, not computed with; files write the largest number where there is none."""
 
 LONGEST_LENGTH = Range(1e-6, 1e4, "m")
-"""The longest length of a robot, of which the others may be any fraction."""
+"""The longest length of a robot; the others may be any fraction of it."""
 
 
 def shown(value: object) -> str:
-    """A file's text or value as a message repeats it: quoted as Python quotes it, cut off where it is long."""
+    """A file's text or value for a message: quoted as Python quotes it, shortened where it is long."""
     try:
         text = repr(value)
     except ValueError:
@@ -100,7 +100,7 @@ def shown(value: object) -> str:
 
 
 def joined(faults: Sequence[str]) -> str:
-    """Faults in one line, cut off where there are many."""
+    """Faults in one line, shortened where there are many."""
     more = [f"and {len(faults) - MOST_FAULTS} more"] if len(faults) > MOST_FAULTS else []
     return "; ".join([*faults[:MOST_FAULTS], *more])
 

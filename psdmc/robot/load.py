@@ -1,4 +1,4 @@
-"""A robot file read, with the options that decide what it means: the first stage, in one call."""
+"""Read a robot file with its options: the first stage, in one call."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ DRIVE = PARAMETERS_PER_LINK - 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRobot:
-    """A mechanism and what it was made from.
+    """A mechanism and its source.
 
-    source_name   how the file is called in messages
-    snap_report   every rotation that was replaced by a near exact one, with the angle between (rad)
+    source_name   the file's name in messages
+    snap_report   every rotation that was replaced by a near exact one, with the angle between them (rad)
     """
 
     mechanism: Mechanism
@@ -48,7 +48,7 @@ class LoadedRobot:
         return self.mechanism
 
     def unsnapped(self) -> LoadedRobot:
-        """The same robot with the file's own rotations, to see what snapping changed."""
+        """The same robot with the file's own rotations, to compute the effect of snapping."""
         keywords = self.options.as_json() | {"snap": 0.0}
         return load_robot_text(self.source_text, self.source_format, source_name=self.source_name, **keywords)
 
@@ -118,7 +118,7 @@ def _refuse_size(size: int, source: str) -> None:
 
 
 def robot_text(file: Path) -> str:
-    """The file's text; InputError where it cannot be read or is no text of a robot's size."""
+    """The file's text; InputError where it cannot be read, is no text, or is larger than robot files are."""
     try:
         with file.open("rb") as opened:
             data = opened.read(limits.MAX_BYTES + 1)
@@ -143,7 +143,7 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
 
 
 def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
-    """The chain with drive inertias and zeros decided."""
+    """The chain with drive inertias and assumed zeros applied."""
     link_names = [joint.link_name for joint in draft.joints]
     joint_names = [joint.name for joint in draft.joints]
     said = parse_statements(options.assume_zero, link_names, joint_names, source)

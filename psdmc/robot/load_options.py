@@ -1,4 +1,4 @@
-"""What, besides its file, decides a robot, every value checked."""
+"""The options that define a robot together with its file, every value checked."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ MAX_SNAP = 0.1
 
 @dataclass(frozen=True, slots=True)
 class LoadOptions:
-    """What, besides the file, decides the chain; plain values, so that a saved model can be read again.
+    """The options that define the chain together with the file; plain values, so that a saved model can be read again.
 
     base, tip      link names of a URDF; None: the root, the end of the longest chain
     gravity        m/s^2 in the URDF's root or the DH base frame; None: the file's own, or (0, 0, -9.81)
     drive_inertia  True: drive inertias are parameters; numbers: with these values, one a joint, kg m^2 (kg)
     assume_zero    texts such as "link5:mx" or "link5:Ixz@com"
     snap           rad; 0 keeps the file's rotations but for floating-point noise
-    frames         names of links that functions are about; empty: the tip
-    tool           x y z (m), roll pitch yaw (rad) of a frame 'tool' in the tip frame, beside them; None: no such frame
+    frames         names of the links that kinematic functions are about; empty: the tip
+    tool           x y z (m), roll pitch yaw (rad) of a further frame 'tool' in the tip frame; None: no such frame
     """
 
     base: str | None = None
@@ -41,8 +41,8 @@ class LoadOptions:
     tool: tuple[float, ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Keyword arguments of load_robot_text as plain JSON values; frames only where there are any, so that models
-        without them keep the hash that they had before frames were."""
+        """Keyword arguments of load_robot_text as plain JSON values. Frames are included only where there are any, so
+        that models without them keep the hash of earlier versions."""
         plain = asdict(self)
         return {name: value for name, value in plain.items() if name not in ("frames", "tool") or value}
 
@@ -57,7 +57,7 @@ def checked_options(
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
 ) -> LoadOptions:
-    """The options; InputError names the first that is wrong."""
+    """The options as LoadOptions; InputError names the first that is wrong."""
     for name, value in (("base", base), ("tip", tip)):
         if value is not None and not isinstance(value, str):
             raise InputError(f"{name} is {shown(value)}, expected a link's name", "give a text")

@@ -1,4 +1,4 @@
-"""The robot as psdmc sees it: bodies in a tree, each on a joint that moves about or along its own z."""
+"""The robot as psdmc holds it: bodies in a tree, each on a joint that moves about or along its own z."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedFrame:
-    """A frame that functions are about: fixed to one of the chain's links.
+    """A frame that kinematic functions are about: fixed to one of the chain's links.
 
     name       a link's of the file, or a user's own: untrusted text
     joint      number of the joint whose frame it moves with; 0 is the first
@@ -79,8 +79,8 @@ class Mechanism:
     joints           n, parents before their children; a serial chain's from base to tip
     parameters       (n, 11)   standard parameters x about the link frames (PARAMETER_NAMES), SI; NaN where unknown
     parameter_span   (11 n, k) columns span the parameters that the assumptions allow (assume-zero, no drive inertia,
-                               links without inertia), in reduced column echelon form: each column leads with a one,
-                               in a row where all others are zero
+                               links without inertia), in reduced column echelon form: each column leads with a one, in
+                               a row where all others are zero
     gravity          (3,)      m/s^2, acceleration of gravity in the base frame
     tip              tip frame in the joint frame of `tip_body`
     notes            what was snapped, merged, locked, assumed or found odd, one sentence each, for `show`
@@ -158,7 +158,7 @@ class Mechanism:
 
 
 def serial_parents(n: int) -> tuple[int, ...]:
-    """Of a serial chain of n bodies: each hangs on the one before, the first on the base."""
+    """The parents of a serial chain of n bodies: each is the body before, the first one's is the base."""
     return tuple(range(BASE, n - 1))
 
 

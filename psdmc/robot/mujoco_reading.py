@@ -1,5 +1,5 @@
-"""MuJoCo's reading of a URDF, where MuJoCo is installed: a second oracle, which shares neither parser nor algorithm
-with Pinocchio."""
+"""MuJoCo's reading of a URDF, where MuJoCo is installed: a second reference, whose parser and algorithm are not
+Pinocchio's."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ COMPILER = {
     "fusestatic": "true",
     "discardvisual": "true",
 }
-"""What MuJoCo must not do to the file's numbers; bodies without a joint are merged into those that they hang on."""
+"""Settings by which MuJoCo keeps the file's numbers; bodies without a joint are merged into those that they hang on."""
 
 DRIVE = PARAMETERS_PER_LINK - 1
 REASON = 160
-"""Characters of MuJoCo's own words that a message repeats."""
+"""Characters of MuJoCo's own message that an error repeats."""
 
 
 class NotCompared(Exception):
-    """MuJoCo cannot say what it makes of this robot; the message says why."""
+    """MuJoCo cannot read this robot; the message says why."""
 
 
 def mujoco_version() -> str:

@@ -1,4 +1,4 @@
-"""Names of links and joints are any text that fits on a line; each is used once."""
+"""Checks of names of links and joints: any text that fits on a line, each used once."""
 
 from __future__ import annotations
 

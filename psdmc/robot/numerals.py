@@ -1,7 +1,7 @@
-"""Numbers as robot files write them: plain decimals in ASCII, and nothing else.
+"""Numbers in robot files: plain decimals in ASCII, and nothing else.
 
-Python's float also takes underscores, other alphabets' digits and exotic spaces, C++'s streams take none of them and
-urdfdom then reads zero without a word. One grammar for all readers leaves nothing to chance.
+Python's float also takes underscores, digits of other alphabets and further kinds of spaces. C++'s streams take none of
+them, and urdfdom then reads zero without a message. With one grammar, all readers agree.
 """
 
 from __future__ import annotations
@@ -35,5 +35,5 @@ def decimal(word: str) -> float | None:
 
 
 def _has_digits(word: str) -> bool:
-    """Whether the digits before the exponent say something else than zero."""
+    """Whether the digits before the exponent are other than zero."""
     return bool(_NOT_ZERO.search(word.lower().partition("e")[0]))

@@ -1,8 +1,8 @@
-"""A URDF's text as Pinocchio is to read it: links, inertials and joints only, in the author's own digits.
+"""A URDF's text for Pinocchio: links, inertials and joints only, in the author's own digits.
 
-What has nothing to do with dynamics is left out (a missing mesh is none of our business, and urdfdom complains on
-standard error about much that psdmc has accepted or refused by then), and white space around numbers goes, which
-urdfdom takes for a fault and reads as zero.
+Elements without meaning for dynamics are left out: a mesh may be missing, and urdfdom prints errors about many things
+that psdmc has accepted or refused by then. White space around numbers is removed, because urdfdom takes it for a fault
+and reads zero.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ JOINT_PREFIX = "joint\t"
 has a tab in it."""
 
 VERSION = "1.1"
-"""The first one with quat_xyzw, which urdfdom ignores before; 1.2 asks for limits that older files need not have."""
+"""The first version with quat_xyzw, which urdfdom ignores in older ones; 1.2 requires limits that older files need not
+have."""
 
 
 def pinocchio_model(
@@ -33,8 +34,8 @@ def pinocchio_model(
     movable   names of joints; every other one is fixed, so that its bodies are merged (None: all stay)
     kinds     types of joints that replace the file's, by type
 
-    A continuous joint becomes a revolute one (Pinocchio would give it a cosine and a sine). InputError where
-    Pinocchio refuses the text all the same.
+    A continuous joint becomes a revolute one (Pinocchio would give it a cosine and a sine). InputError where Pinocchio
+    refuses the text.
     """
     root = parse_xml(text, source, "robot")
     wanted = tostring(
@@ -48,8 +49,7 @@ def pinocchio_model(
 
 
 def dynamics_of(root: Element, movable: Collection[str] | None, kinds: Mapping[str, str]) -> Element:
-    """The elements and attributes of a <robot> that carry dynamics, numbers trimmed; arguments as pinocchio_model has
-    them."""
+    """The elements and attributes of a <robot> that carry dynamics, numbers trimmed; arguments as of pinocchio_model."""
     robot = Element("robot", name=root.get("name") or "robot", version=VERSION)
     for link in root.findall("link"):
         copy = SubElement(robot, "link", name=link.get("name", ""))

@@ -1,4 +1,4 @@
-"""Where a frame sits in another."""
+"""The placement of one frame in another."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
-"""Pinocchio's own reading of a robot's source, to check everything else against.
+"""Pinocchio's own reading of a robot's source, as the reference for everything else.
 
-It shares the file's text with the chain and as little code as it can: a URDF is read, merged and locked by
-Pinocchio, a DH table is read by dh_textbook. From the chain come names only: of its joints, links, base and tip. Where
-the snapped robot is asked for, the joints' placements come from the chain too, because the file has none such; the
-bodies are still Pinocchio's.
+It shares the file's text with the chain and as little code as possible: a URDF is read, merged and locked by Pinocchio,
+a DH table is read by dh_textbook. Only names come from the chain: of its joints, links, base and tip. For the snapped
+robot the joints' placements come from the chain too, because the file does not have them; the bodies are still
+Pinocchio's.
 
-The models have one coordinate per joint (a continuous joint is an angle), the chain's joints in the chain's
-order, the chain's base as their universe, and a frame for the tip: use them with any Pinocchio function and
-plain q, qd, qdd (n,).
+The models have one coordinate per joint (a continuous joint is an angle), the chain's joints in the chain's order, the
+chain's base as their universe, and a frame for the tip: they work with any function of Pinocchio and plain q, qd, qdd
+(n,).
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ def reference_model(
 ) -> pinocchio.Model:
     """Pinocchio's model of the robot.
 
-    snapped      joints placed as the chain's are; False: as the file says, roundings included
+    snapped      joints placed as the chain's are; False: as in the file, rounding included
     parameters   (n, 11) standard parameters about the link frames instead of the source's own
 
-    Bodies with parameters assumed zero get the chain's values, which the source does not know. ValueError
-    where parameters are needed and unknown.
+    Bodies with parameters assumed zero get the chain's values, which the source does not have. ValueError where
+    parameters are needed and unknown.
     """
     chain = loaded.mechanism
     model = as_written(loaded)
@@ -56,7 +56,7 @@ def reference_model(
 
 
 def as_written(loaded: LoadedRobot) -> pinocchio.Model:
-    """Pinocchio's own model of the file, nothing of the chain in it but names; bodies as far as the file gives them."""
+    """Pinocchio's own model of the file, with nothing of the chain but names; bodies as far as the file gives them."""
     is_urdf = loaded.source_format == "urdf"
     model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
     if loaded.options.tool is not None:
@@ -77,7 +77,7 @@ def _add_tool(model: pinocchio.Model, tip: str, tool: tuple[float, ...]) -> None
 class Reference:
     """Pinocchio's dynamics of one model on arrays of states: q, qd, qdd, tau (..., n), SI.
 
-    tip_name     the frame whose Jacobian is meant
+    tip_name     the frame of `jacobian`
     frame_names  the named frames; empty: the tip alone
     """
 
@@ -166,7 +166,7 @@ class Reference:
 
     @property
     def path_length(self) -> float:
-        """Way from the base to the tip over every frame between, m, at q = 0; with every fixed joint's detour."""
+        """Length of the path from the base to the tip over every frame between, fixed joints included, m, at q = 0."""
         model, data = self.model, self.model.createData()
         pinocchio.framesForwardKinematics(model, data, np.zeros(model.nq))
         frame, length = model.getFrameId(self.tip_name), 0.0
@@ -177,7 +177,7 @@ class Reference:
         return length
 
     def each(self, function: Callable[..., Array], *states: Array) -> Array:
-        """A function of Pinocchio's (model, data, state ...) at every state of broadcast arrays."""
+        """Values of a function of Pinocchio's (model, data, state ...) at every state of broadcast arrays."""
         data = self.model.createData()
         rows = [np.asarray(state, dtype=float) for state in states]
         lead = np.broadcast_shapes(*(row.shape[:-1] for row in rows))
@@ -187,7 +187,7 @@ class Reference:
 
 
 def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None) -> Reference:
-    """reference_model with its functions at hand."""
+    """The Reference of reference_model."""
     model = reference_model(loaded, snapped=snapped, parameters=parameters)
     names = tuple(frame.name for frame in loaded.mechanism.frames)
     return Reference(model, loaded.mechanism.tip_name, names)
@@ -219,7 +219,7 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
 def body_of(parameters: Array) -> pinocchio.Inertia:
     """Pinocchio's body with ten standard parameters, physical or not.
 
-    Pinocchio divides by the mass: without any, the smallest one stands in, and first moments cannot be had.
+    Pinocchio divides by the mass. A body without mass gets the smallest one, and loses its first moments.
     """
     if not parameters[:DRIVE].any():
         return pinocchio.Inertia.Zero()
@@ -241,12 +241,12 @@ def pinocchio_version() -> str:
 
 
 def has_assumptions(loaded: LoadedRobot) -> bool:
-    """Whether some bodies cannot be had from the file alone: assumed zeros and unknowns."""
+    """Whether some bodies are not determined by the file alone: assumed zeros and unknown values."""
     return bool(_assumed(loaded.mechanism))
 
 
 def _assumed(chain: Mechanism) -> list[int]:
-    """Joints whose bodies have zeros that the span, not the source, knows of; and those with unknowns."""
+    """Joints whose bodies have zeros that only the span has; and joints whose bodies have unknown values."""
     span = chain.parameter_span.reshape(len(chain), PARAMETERS_PER_LINK, -1)[:, :DRIVE]
     return [
         k
@@ -256,7 +256,7 @@ def _assumed(chain: Mechanism) -> list[int]:
 
 
 def _placed_as(chain: Mechanism, model: pinocchio.Model) -> pinocchio.Model:
-    """The model's bodies on joints that sit as the chain's do, about their z."""
+    """The model's bodies on joints that are placed as the chain's are, about their z."""
     placed = pinocchio.Model()
     placed.name = model.name
     for k, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True)):

@@ -22,7 +22,7 @@ def about(axis: int, angle: float) -> Array:
 
 
 def roll_pitch_yaw(angles: tuple[float, float, float], snap: float = 0.0) -> Array:
-    """(3, 3) Rz(yaw) Ry(pitch) Rx(roll), each turn snapped for itself: each is a number that a file rounded.
+    """(3, 3) Rz(yaw) Ry(pitch) Rx(roll), each turn snapped separately, as each is a number that a file rounded.
 
     angles, snap   rad
     """

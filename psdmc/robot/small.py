@@ -1,5 +1,5 @@
-"""Products of small matrices, the same on every processor and in whatever precision the arrays have: BLAS fuses and
-orders its sums as each machine likes it."""
+"""Products of small matrices, the same on every processor and in whatever precision the arrays have. (BLAS fuses and
+orders its sums differently from machine to machine.)"""
 
 from __future__ import annotations
 

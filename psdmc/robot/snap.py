@@ -1,10 +1,9 @@
-"""Rotations with exact zeros and ones where a file rounds them away.
+"""Rotations with exact zeros and ones in place of a file's rounded ones.
 
-Files write pi/2 as 1.5708, and even sin(pi) is 1.2e-16: either turns an exact zero of the dynamics into a
-tiny number that no later stage can tell from a small one. A rotation matrix has six zeros (axes map to axes),
-four (it turns about an axis and maps it to one), one, or none: two zeros in different rows and columns force
-a third in one of their rows, because the rows are orthogonal. So those three patterns are all there is to
-try, sparsest first.
+Files write pi/2 as 1.5708, and even sin(pi) is 1.2e-16: either turns an exact zero of the dynamics into a tiny number
+that no later stage can distinguish from a small one. A rotation matrix has six zeros (axes map to axes), four (it turns
+about an axis and maps it to one), one, or none: two zeros in different rows and columns force a third in one of their
+rows, because the rows are orthogonal. So only these three patterns are tried, the sparsest first.
 """
 
 from __future__ import annotations

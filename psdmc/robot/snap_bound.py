@@ -1,7 +1,7 @@
-"""How far torques may move when rotations are snapped: measured on Pinocchio's model of the file as written.
+"""Bound of the change of torques by snapping, from Pinocchio's model of the file as written.
 
-Nothing of the snapped chain is used but the angles that it says it turned by. Each is put, one after the other, on every
-degree of freedom that it could have acted on, and what the torques change by is added up: a bound to first order.
+Of the snapped chain only the angles that it reports are used. Each one is applied to every degree of freedom that it
+could have acted on, and the changes of the torques are added up: a bound to first order.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from psdmc.robot.mechanism import Array
 from psdmc.robot.reference import Reference
 
 MARGIN = 2.0
-"""For what is of second order in the angles, up to --snap 0.1."""
+"""Factor for terms of second order in the angles, up to --snap 0.1."""
 
 
 def angles_by_segment(snaps: Sequence[Snap], n: int, largest: float) -> Array:
-    """(n + 2,) rad: what was snapped between joints (0 to n - 1), to the tip (n) and, last, from root to base.
+    """(n + 2,) rad: snapped angles between joints (0 to n - 1), to the tip (n) and, last, from root to base.
 
-    largest   rad: no single angle counts for more, whatever it says
+    largest   rad: no single angle counts for more, whatever its report says
     """
     angles = np.zeros(n + 2)
     for snap in snaps:
@@ -61,7 +61,7 @@ def _disturbances(reference: Reference, angles: Array) -> Iterator[tuple[Disturb
 
 
 def _motions(angle: float, reach: float) -> list[pinocchio.SE3]:
-    """Turns by the angle about each axis, and shifts along each by what it moves a point `reach` away."""
+    """Turns by the angle about each axis, and shifts along each by the displacement of a point `reach` away."""
     turns = [pinocchio.SE3(pinocchio.exp3(angle * axis), np.zeros(3)) for axis in np.eye(3)]
     return turns + [pinocchio.SE3(np.eye(3), angle * reach * axis) for axis in np.eye(3)]
 

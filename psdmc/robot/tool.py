@@ -1,4 +1,4 @@
-"""A tool frame: given by numbers, in the tip frame."""
+"""A tool frame, given by numbers in the tip frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from psdmc.robot.urdf import Origin
 from psdmc.robot.urdf_bodies import placement_of
 
 TOOL = "tool"
-"""What the frame is called."""
+"""Name of the frame."""
 
 
 def tool_in_tip(tool: Sequence[float]) -> Placement:

@@ -1,4 +1,4 @@
-"""Which joints of a URDF's tree are the robot: from the base link to the tip link."""
+"""Which joints of a URDF's tree belong to the robot: those from the base link to the tip link."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from psdmc.robot.urdf import LOCKABLE, MOVABLE, UrdfJoint, UrdfRobot
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """to_base: joints from the root to the base link; path: from there to the tip, fixed ones included."""
+    """Joints of a URDF, fixed ones included: `to_base` from the root to the base link, `path` from there to the tip."""
 
     base: str
     tip: str
@@ -84,8 +84,8 @@ def joints_between(robot: UrdfRobot, start: str, end: str) -> tuple[UrdfJoint, .
 def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[str, ...]]:
     """The end of the path with most movable joints, and a note where there was a choice.
 
-    Several such paths (the fingers of a gripper): the link where they part, if the way there moves more
-    joints than each goes on with; else nobody can tell which arm is meant, and InputError lists the ends.
+    Where several paths have equally many (the fingers of a gripper), it is the link where they part, if the way there
+    has more movable joints than each has beyond. Otherwise the arm is ambiguous, and InputError lists the ends.
     """
     depth = _movable_depths(robot, base)
     most = max(depth.values())
@@ -106,7 +106,7 @@ def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[st
 
 
 def listed(names: Iterable[str], most: int = 12) -> str:
-    """Names in quotes for a message, cut off where there are many."""
+    """Names in quotes for a message, shortened where there are many."""
     quoted = [f"'{name}'" for name in names]
     return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
 
@@ -128,7 +128,7 @@ def _below(robot: UrdfRobot, base: str) -> list[str]:
 
 
 def _fixed_end(robot: UrdfRobot, link: str) -> str:
-    """The far end of the longest way over fixed joints (tool flanges); of equals, the file's first."""
+    """The far end of the longest sequence of fixed joints (tool flanges); of equally long ones the file's first."""
     distance = {link: 0}
     queue = [link]
     while queue:

@@ -1,4 +1,4 @@
-"""A URDF as plain data, every number checked: what it says, before any of it is a chain."""
+"""A URDF as plain data with every number checked, before a chain is chosen in it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ LOCKABLE = (*MOVABLE, "fixed", "floating", "planar")
 """Joint types that have a neutral position, where those beside the chain are locked."""
 
 UNIT_SLACK = 1e-2
-"""A quaternion of two digits, such as 0.71 0 0 0.71, has a length that far from one; it is made one."""
+"""Accepted deviation of a quaternion's length from one, for quaternions of two digits such as 0.71 0 0 0.71; they are
+normalized."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +69,8 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """One <joint>. origin places the child link in the parent at q = 0; axis in the child; mimic: the joint that it
-    follows, if any; has_dynamics: it writes of friction, damping or a spring."""
+    """One <joint>. `origin` places the child link in the parent at q = 0; `axis` is in the child; `mimic` is the joint
+    that it follows, if any; `has_dynamics` whether it has friction, damping or a spring."""
 
     name: str
     type: str
@@ -94,7 +95,7 @@ class UrdfJoint:
 class UrdfRobot:
     """A tree of links. `inertials` has every link in the file's order, None where it has no <inertial>.
 
-    notes   what the file says and no chain holds, one sentence each
+    notes   contents of the file that no chain holds, one sentence each
     """
 
     name: str
@@ -140,7 +141,7 @@ Made = TypeVar("Made")
 
 
 def _each(root: Element, tag: str, read: Callable[[Element], Made], problems: list[str]) -> list[Made]:
-    """Every element of that name read; what is wrong goes to `problems`, under the element's name."""
+    """Every element of that name; faults go to `problems`, under the element's name."""
     found = []
     for element in root.findall(tag):
         try:
@@ -270,7 +271,8 @@ def _mimic(joint: Element) -> Mimic | None:
 
 
 def _limits(joint: Element, kind: str) -> Limits:
-    """Position limits only where the file writes one: URDF's default, 0 to 0, would be a joint stuck."""
+    """The joint's limits; position limits only where the file gives one, as URDF's default, 0 to 0, would be a joint
+    that cannot move."""
     element = only(joint, "limit")
     if element is None:
         return Limits()

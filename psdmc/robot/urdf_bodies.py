@@ -1,4 +1,4 @@
-"""Bodies of a URDF, merged into the links of a chain: psdmc's own sum, held against Pinocchio's."""
+"""Bodies of a URDF, merged into the links of a chain by psdmc and compared with Pinocchio's merging."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from psdmc.robot.tree import Route
 from psdmc.robot.urdf import LOCKABLE, Origin, UrdfInertial, UrdfJoint, UrdfRobot
 
 AGREEMENT = 1e-11
-"""Relative to the largest parameter of the body's mass, moments or inertias: rounding of angles up to 1e3 rad leaves
-1e-13, any other reading of a number far more."""
+"""Allowed difference relative to the largest parameter of the body's mass, moments or inertias: rounding of angles up
+to 1e3 rad leaves 1e-13, another reading of a number far more."""
 
 
 def placement_of(origin: Origin, snap: float = 0.0) -> Placement:
-    """Where an <origin> puts its frame; turns about axes are snapped one by one (rad)."""
+    """The placement of an <origin>'s frame; turns about axes are snapped one by one (rad)."""
     if origin.quaternion is None:
         return Placement(roll_pitch_yaw(origin.rpy, snap), np.array(origin.xyz))
     return Placement(snap_rotation(from_quaternion(*origin.quaternion), snap)[0], np.array(origin.xyz))
@@ -38,7 +38,7 @@ def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
 
 
 def merged_onto(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[Array]:
-    """The same for any movable joints; all others are locked at neutral."""
+    """Merged parameters as above for any movable joints; all others are locked at neutral."""
     below: dict[str, list[tuple[str, Placement]]] = {}
     moves = {joint.name for joint in movable}
     for joint in robot.joints:
@@ -59,9 +59,10 @@ def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
 def hold_against_pinocchio(
     robot: UrdfRobot, route: Route, merged: Sequence[Array], text: str, source: str
 ) -> None:
-    """InputError that names the first link whose body Pinocchio reads, or merges, otherwise.
+    """InputError that names the first link whose body Pinocchio reads or merges differently.
 
-    Each link is compared alone (every joint made a revolute one, so that nothing is merged), then what was merged.
+    Each link is first compared alone (every joint made a revolute one, so that nothing is merged), then the merged
+    bodies.
     """
     alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word))
     for joint in robot.joints:

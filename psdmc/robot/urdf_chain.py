@@ -1,4 +1,4 @@
-"""From a URDF to a serial robot: joints placed and bodies merged by the file's own numbers."""
+"""From a URDF to a serial robot: joints placed and bodies merged with the file's own numbers."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ def _tip(route: Route, joints: Sequence[Joint], place: Placement) -> NamedFrame:
 def link_rotation(axis: Array) -> Array:
     """(3, 3) from a link's frame into a joint frame whose z is the unit axis given in the link.
 
-    x is the coordinate axis that the joint's axis is most square to, made square: coordinate axes thus give
-    exact signed permutations, and parallel axes parallel frames.
+    x is the coordinate axis that is most perpendicular to the joint's axis, made perpendicular: coordinate axes thus
+    give exact signed permutations, and parallel axes parallel frames.
     """
     k = int(np.argmin(np.abs(axis)))
     x = np.eye(3)[k] - axis[k] * axis
@@ -81,10 +81,10 @@ def link_rotation(axis: Array) -> Array:
 
 
 def _placed_joints(route: Route, snap: float) -> tuple[tuple[Joint, ...], Placement, list[Snap]]:
-    """Joint frames one in the other, the tip in the last, and what was snapped on the way.
+    """Joint frames in their parents', the tip in the last, and the snapped rotations.
 
-    Each turn is snapped as it is read, so that products of exact rotations stay exact; then once more what
-    several merged ones came to.
+    Each turn is snapped as it is read, so that products of exact rotations stay exact; then the product of several
+    merged turns is snapped once more.
     """
     snaps: list[Snap] = []
     reach = sum(math.hypot(*joint.origin.xyz) for joint in route.path)
@@ -131,7 +131,7 @@ def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap], segment: int) -> P
 def merged_placement(
     place: Placement, where: str, snap: float, snaps: list[Snap], segment: int, reach: float
 ) -> Placement:
-    """What several merged placements came to, snapped; what was turned goes to `snaps`."""
+    """The product of several merged placements, snapped; the change is added to `snaps`."""
     rotation, angle = snap_rotation(place.rotation, snap)
     _record(snaps, where, angle, segment)
     return Placement(rotation, snap_translation(place.translation, reach))
@@ -143,7 +143,8 @@ def _record(snaps: list[Snap], where: str, angle: float, segment: int) -> None:
 
 
 def _unmodelled(route: Route) -> list[str]:
-    """A note that names the chain's joints with friction, damping or springs: rigid bodies have none of them."""
+    """A note that names the chain's joints with friction, damping or springs, which the model of rigid bodies leaves
+    out."""
     names = [joint.name for joint in route.movable if joint.has_dynamics]
     return [f"<dynamics> (damping, friction) of joints is not modelled: {listed(names)}"] if names else []
 

@@ -1,4 +1,4 @@
-"""Links of a URDF as named frames: which of the chain's links each is fixed to, and where it sits there."""
+"""Links of a URDF as named frames: the link of the chain that each is fixed to, and its place there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def urdf_frames(
     names: Iterable[str],
     source: str,
 ) -> tuple[NamedFrame, ...]:
-    """The named links, placed by the file's own numbers; the tip as the chain has it.
+    """The named links, placed by the file's own numbers; the tip as in the chain.
 
     InputError where a link does not exist, does not move, or is not rigidly on one of the chain's links.
     """
@@ -60,7 +60,7 @@ def _placed(
 
 
 def _carried_by(robot: UrdfRobot, link: str) -> tuple[list[UrdfJoint], UrdfJoint | None]:
-    """Fixed joints from the link that a joint moves down to this one, and that joint; None at the root."""
+    """Fixed joints from the link that a joint moves down to this link, and that joint; None at the root."""
     above = {joint.child: joint for joint in robot.joints}
     fixed: list[UrdfJoint] = []
     while link in above and not above[link].is_movable:
@@ -70,7 +70,7 @@ def _carried_by(robot: UrdfRobot, link: str) -> tuple[list[UrdfJoint], UrdfJoint
 
 
 def _rigid(robot: UrdfRobot, carriers: dict[str, int]) -> list[str]:
-    """Links that can be frames."""
+    """The links that may be frames."""
     found = []
     for link in robot.inertials:
         _, carrier = _carried_by(robot, link)

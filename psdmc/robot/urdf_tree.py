@@ -10,11 +10,11 @@ Ends = tuple[str, str, str]
 """A joint's name, its parent link and its child link."""
 
 LISTED = 12
-"""Links that a message names at most."""
+"""Largest number of links in a message."""
 
 
 def tree_faults(links: Sequence[str], joints: Sequence[Ends]) -> list[str]:
-    """What keeps the links from being one tree, one sentence each."""
+    """The reasons why the links are not one tree, one sentence each."""
     known = dict.fromkeys(links)
     faults = []
     parents: dict[str, list[str]] = {}
@@ -34,7 +34,7 @@ def tree_faults(links: Sequence[str], joints: Sequence[Ends]) -> list[str]:
 
 
 def _cycle_faults(links: Sequence[str], joints: Sequence[Ends], roots: Sequence[str]) -> list[str]:
-    """Links that no root reaches hang in a ring."""
+    """Faults of links that no root reaches: they form a ring."""
     below: dict[str, list[str]] = {}
     for _, parent, child in joints:
         below.setdefault(parent, []).append(child)

@@ -1,4 +1,5 @@
-"""A whole URDF as data: every movable joint with its body, mimic joints as coordinates. Nothing of it is derived yet."""
+"""A whole URDF as data: every movable joint with its body, mimic joints as coordinates. Such trees are shown, not
+derived."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ from psdmc.robot.zeros import block_diagonal, link_span
 
 
 def whole_robot(path: str | Path) -> Mechanism:
-    """All that a robot file holds: a URDF's whole tree, or the chain of a DH table. InputError names what is wrong."""
+    """The whole content of a robot file: a URDF's tree, or the chain of a DH table. InputError names what is wrong."""
     file = Path(path)
     if file.suffix.lower() == ".toml":
         return load_robot(file).chain
@@ -61,7 +62,7 @@ def urdf_mechanism(text: str, source: str, snap: float = DEFAULT_SNAP) -> Mechan
 
 
 def _outward(robot: UrdfRobot, root: str) -> Iterator[UrdfJoint]:
-    """All joints, each branch in a row, joints on one link by name."""
+    """All joints, branch by branch; joints on one link are sorted by name."""
     stack = [root]
     above = {joint.child: joint for joint in robot.joints}
     while stack:

@@ -1,8 +1,8 @@
-"""The words of a URDF: which elements and attributes are read, which may stand beside them, and which are refused.
+"""The words of a URDF: which elements and attributes are read, which are allowed besides, and which are refused.
 
-A word that is misspelt or misplaced is not read, and a robot without it has other dynamics without anybody being told:
-within the elements that carry dynamics every word must be known; beside them, what looks like one of them is refused,
-and what does not is noted.
+A word that is misspelt or misplaced is not read, and the robot silently gets other dynamics. Within the elements that
+carry dynamics every word must therefore be known; outside them, a word that looks like one of them is refused, and any
+other is noted.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ ATTRIBUTES = {
 """Elements that carry dynamics, each with all the attributes that it may have."""
 
 READ = {"link": ("inertial",), "joint": ("origin", "parent", "child", "axis", "limit", "mimic", "dynamics")}
-"""Children of links and joints that say something about dynamics; each stands once at most."""
+"""Children of links and joints that concern dynamics; each occurs once at most."""
 
 BESIDE = {
     "robot": ("link", "joint", "material", "gazebo", "transmission", "ros2_control", "sensor", "mujoco"),
@@ -45,7 +45,7 @@ BESIDE = {
     ),
     "joint": ("calibration", "safety_controller"),
 }
-"""Children that have nothing to say about a serial arm's dynamics."""
+"""Known children that do not concern a serial arm's dynamics."""
 
 CARRIERS = (
     "link",
@@ -60,26 +60,26 @@ CARRIERS = (
     "mimic",
     "dynamics",
 )
-"""A child elsewhere that is called so, or nearly so, is misspelt or misplaced."""
+"""Elements that carry dynamics: a child elsewhere with such a name, or a similar one, is misspelt or misplaced."""
 
 LIKENESS = 0.75
-"""Ratio of difflib above which a word is taken for a slip of the pen: 'inertail' and 'inertial' have 0.88."""
+"""Ratio of difflib above which a word counts as a misspelling: 'inertail' and 'inertial' have 0.88."""
 
 LONGER = 4
-"""Letters by which a word may be longer or shorter than the one that it is taken for."""
+"""Largest difference in letters between a word and the one that it is taken for."""
 
 MOST_NOTED = 12
-"""Kinds of unread elements that notes name."""
+"""Largest number of kinds of unread elements in notes."""
 
 
 def link_faults(link: Element) -> list[str]:
-    """Words of one <link> that must not stand there, one sentence each."""
+    """Words of one <link> that are not allowed there, one sentence each."""
     inertial = link.find("inertial")
     return [*_children_faults(link, "link"), *([] if inertial is None else _strict_faults(inertial))]
 
 
 def joint_faults(joint: Element) -> list[str]:
-    """Words of one <joint> that must not stand there, one sentence each."""
+    """Words of one <joint> that are not allowed there, one sentence each."""
     inside = [child for child in joint if child.tag in ("origin", "axis", "parent", "child")]
     return [
         *_children_faults(joint, "joint"),
@@ -88,7 +88,7 @@ def joint_faults(joint: Element) -> list[str]:
 
 
 def robot_faults(root: Element) -> list[str]:
-    """Words directly in <robot> that must not stand there, and a version that is not known."""
+    """Words directly in <robot> that are not allowed there, and an unknown version."""
     version = " ".join(words(root.get("version", "1.0")))
     faults = [] if version in VERSIONS else [f"version {shown(version)} is not supported"]
     if len(_unknown(root)) > MAX_UNKNOWN:
@@ -122,7 +122,7 @@ def _unknown(root: Element) -> list[tuple[str, str]]:
 
 
 def has_dynamics(joint: Element) -> bool:
-    """Whether a joint's <dynamics> say something: damping, friction, a spring."""
+    """Whether a joint's <dynamics> contain damping, friction or a spring."""
     return any(
         letter in "123456789"
         for dynamics in joint.findall("dynamics")
@@ -146,14 +146,14 @@ def _children_faults(parent: Element, kind: str) -> list[str]:
 
 @lru_cache(maxsize=4 * MAX_UNKNOWN)
 def _meant(tag: str, kind: str) -> str | None:
-    """The word that carries dynamics which this one is like; <origin> matters in joints and inertials only."""
+    """The word that carries dynamics and is similar to this one; <origin> counts in joints and inertials only."""
     words_known = (*CARRIERS, "origin") if kind == "joint" else CARRIERS
     near = [word for word in words_known if abs(len(word) - len(tag)) <= LONGER]
     return next(iter(get_close_matches(tag.lower(), near, 1, LIKENESS)), None) if near else None
 
 
 def _strict_faults(element: Element) -> list[str]:
-    """Attributes and children of an element that carries dynamics which are none of its own, at any depth."""
+    """Unknown attributes and children of an element that carries dynamics, at any depth."""
     faults = []
     known = ATTRIBUTES.get(element.tag, ())
     for name in element.attrib:
@@ -174,5 +174,5 @@ def _short(name: str) -> str:
 
 
 def _is_foreign(name: str) -> bool:
-    """Of another vocabulary: what a name space marks, and comments."""
+    """Whether a name belongs to another vocabulary (it has a name space), or to a comment."""
     return not isinstance(name, str) or name.startswith("{") or ":" in name

@@ -1,4 +1,4 @@
-"""XML that is looked at before anything else reads it, and numbers in its attributes."""
+"""XML that is checked before anything else reads it, and numbers in its attributes."""
 
 from __future__ import annotations
 
@@ -89,6 +89,7 @@ def _is_long(text: str) -> bool:
 
 
 def _quoted(text: str) -> str:
-    """Printable ASCII as it stands; else with escapes, because what is wrong may be what cannot be seen."""
+    """A text quoted for a message: printable ASCII as it is, else with escapes, because the fault may be a character
+    that cannot be seen."""
     plain = text.isascii() and text.isprintable() and "'" not in text
     return shown(text) if len(text) > MAX_CHARACTERS else f"'{text}'" if plain else ascii(text)

@@ -1,14 +1,13 @@
-"""Parameters assumed zero: what stays of a link's values, and which parameter vectors remain possible.
+"""Parameters assumed zero: the values that a link keeps, and the parameter vectors that remain possible.
 
-A zero about the link frame ("Ixz") strikes a coordinate. A zero about the centre of mass ("rx", "Ixz@com")
-does not: the frame's Ixz is Ixz@com - m rx rz, and survives while rx and rz do. What counts is the span of
-all parameter vectors that obey the statement. They are polynomials in m, r and the inertia about the centre
-of mass,
+A zero about the link frame ("Ixz") removes a coordinate. A zero about the centre of mass ("rx", "Ixz@com") does not:
+the frame's Ixz is Ixz@com - m rx rz, and remains while rx and rz do. The result is the span of all parameter vectors
+that fulfil the statement. They are polynomials in m, r and the inertia about the centre of mass,
 
     (m, m r, I_com + sum over i, j of m r_i r_j V_ij),
 
-and distinct monomials are linearly independent functions, so that span is the span of the coefficient vectors
-of the monomials that the zeros leave: exact, without sampling.
+whose monomials are linearly independent, so that the span is that of the coefficient vectors of the monomials that the
+zeros leave: exact, without sampling.
 """
 
 from __future__ import annotations
@@ -24,14 +23,15 @@ from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Array
 
 COM_NAMES = ("rx", "ry", "rz", *(f"I{name}@com" for name in INERTIA_NAMES))
 ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)
-"""What may be said to be zero of one link."""
+"""Parameters of one link that may be assumed zero."""
 
 BODY = PARAMETERS_PER_LINK - 1
 """Parameters of the body alone; the drive inertia comes after them."""
 
 
 def canonical(names: Collection[str]) -> tuple[str, ...]:
-    """The same statement in full, in a fixed order: no mass is no body, no first moment centres the body."""
+    """The same statement in full, in a fixed order: no mass means no body, no first moment puts the centre of mass at
+    the origin."""
     said = set(names)
     if "m" in said:
         said |= set(PARAMETER_NAMES[:BODY]) | set(COM_NAMES)
@@ -125,7 +125,7 @@ def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
 
 
 def _vanishing_at(columns: Array, rows: Sequence[int]) -> Array:
-    """Columns that span those combinations of the given ones whose entries at `rows` are zero."""
+    """Columns that span the combinations of the given ones whose entries at `rows` are zero."""
     order = [*rows, *(k for k in range(columns.shape[0]) if k not in rows)]
     reordered = column_echelon(columns[order])
     kept = reordered[:, ~np.any(reordered[: len(rows)] != 0.0, axis=0)]
@@ -152,7 +152,7 @@ def _moments(zero: Collection[str]) -> list[Array]:
 
 
 def _second_moments(zero: Collection[str]) -> list[Array]:
-    """Coefficients of m r_i r_j: on the diagonal both other moments of inertia, off it minus the product."""
+    """Coefficients of m r_i r_j: on the diagonal the two other moments of inertia, off it minus the product."""
     free = [axis for axis in "xyz" if f"r{axis}" not in zero]
     vectors = []
     for a, b in combinations_with_replacement(free, 2):

@@ -1,7 +1,7 @@
-"""What a joint type is: all that any stage asks of the way a joint moves.
+"""What a joint type is: everything that any stage needs to know about the way a joint moves.
 
-A new type is one file beside this one and a line in the table of types (__init__.py). Nothing outside this folder asks
-which type a joint has: it uses what the type gives.
+A new type is one file beside this one and a line in the table of types (__init__.py). Code outside this folder never
+distinguishes types; it uses the properties below.
 """
 
 from __future__ import annotations
@@ -23,18 +23,19 @@ Twist = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 class JointType(ABC):
-    """One way to move: a turn about z, a way along z, or both in a fixed ratio.
+    """One way to move: a turn about z, a slide along z, or both in a fixed ratio.
 
     word           in robot files, model files and tables
     urdf_words     types of a URDF's <joint> that move so
     nq, nv         numbers of coordinates and of rates
-    twists         nv of them, the motion subspace: what the joint frame does per unit rate, in itself
+    twists         nv of them, the motion subspace: the joint frame's velocity per unit rate, along its own axes
     basis          the factors in q that its transform is made of
-    length_order   exponent of metre in the coordinate: 0 for an angle
-    position_unit  of q; effort_unit of the joint's torque or force
-    free_range     where a joint without limits is looked at, plus or minus, in the unit of q
+    length_order   exponent of the metre in the coordinate: 0 for an angle
+    position_unit  unit of q
+    effort_unit    unit of the joint's torque or force
+    free_range     range of q for a joint without limits, plus or minus, in the unit of q
     ordinary       largest position, rate and acceleration of an ordinary arm's joint
-    verb           what the joint does, in a sentence about it
+    verb           the verb for its motion, for sentences about it
     pinocchio      Pinocchio's short name of it: JointModel...
     mujoco         MuJoCo's word for it
     """
@@ -58,11 +59,12 @@ class JointType(ABC):
 
     @abstractmethod
     def turn(self, x: Scalar) -> Scalar | None:
-        """Angle about z at coordinate x, or its rate or acceleration at that of x (all are linear); None: none ever."""
+        """Angle about z at coordinate x, or its rate or acceleration at that of x (all are linear); None: it never
+        turns."""
 
     @abstractmethod
     def slide(self, x: Scalar) -> Scalar | None:
-        """Way along z, m, or its rate or acceleration, likewise."""
+        """Displacement along z in m at coordinate x, or its rate or acceleration; None: it never slides."""
 
     def transform(self, q: float) -> Placement:
         """The moved joint frame in the one at q = 0."""
@@ -73,7 +75,7 @@ class JointType(ABC):
 
     @property
     def comes_round(self) -> bool:
-        """Whether a whole turn of q changes nothing."""
+        """Whether q and q plus a whole turn are the same position."""
         return self.basis.has_sincos and not any(power for power, _, _ in self.basis.exponents)
 
     @property

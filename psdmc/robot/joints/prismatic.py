@@ -9,7 +9,7 @@ from psdmc.robot.joints.joint_type import JointType, Scalar, Twist
 
 
 class Prismatic(JointType):
-    """q is the way along z, m."""
+    """q is the displacement along z, m."""
 
     __slots__ = ()
 
