@@ -1,7 +1,6 @@
-"""The straight-line body of one PROGRAM: what the body template prints, line by line.
+"""The straight-line body of one PROGRAM, line by line, for the body template.
 
-Sines and cosines are taken in groups, as early as their angles are known, so that one state's angles share
-vectors.
+Sines and cosines are taken in groups, as early as their angles are known, so that one state's angles share vectors.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """`const <V or real> name = text;`"""
+    """A statement `const <V or real> name = text;`"""
 
     name: str
     text: str
@@ -44,7 +43,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """`vector[index] = text`, where a uniform text must be spread over the lanes first; `macro` is what stores it."""
+    """A statement `vector[index] = text`, where a uniform text must be spread over the lanes first; `macro` stores it."""
 
     vector: str
     index: int
@@ -59,8 +58,8 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class GroupStore:
-    """`vector[index ...] = texts`: a group of outputs that have been stored one by one already, for the form
-    that writes rows."""
+    """A statement `vector[index ...] = texts`: a group of outputs that are also stored one by one, for the form that
+    writes rows."""
 
     vector: str
     index: int
@@ -76,7 +75,7 @@ Line = Step | Store | GroupStore
 
 @dataclass(frozen=True, slots=True)
 class Angle:
-    """One angle of a group, and the names that its sine and cosine get (None: not needed)."""
+    """One angle of a group, and the names of its sine and cosine (None: not needed)."""
 
     text: str
     sine: str | None
@@ -85,9 +84,11 @@ class Angle:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Loads, steps, then the sines and cosines of the angles that they made known. What no angle needs is loaded behind
-    the sines, so that nothing has to be kept while they call libm. Stores come with the last steps, behind all loads: an
-    output may overwrite an input."""
+    """Lines in the order: loads, steps, sines and cosines of the angles that these steps compute, further loads.
+
+    Inputs that no angle of the section needs are loaded after the sines, so that they need not be kept while libm is
+    called. Stores come with the last steps, after all loads: an output may overwrite an input.
+    """
 
     loads: tuple[Load, ...]
     steps: tuple[Line, ...]
@@ -159,7 +160,7 @@ class _Writer:
         return (*sections, Section(loads, rest, (), len(sections)))
 
     def _loads(self, wanted: range | list[int]) -> tuple[Load, ...]:
-        """Inputs among these values that no section before has loaded."""
+        """The inputs among these values that no earlier section has loaded."""
         slots = {self.program.body[i].slot for i in wanted if not self.done[i]}
         return tuple(
             Load(_load_name(slot), slot.vector, slot.index, slot.vector in UNIFORM_VECTORS)
@@ -223,7 +224,7 @@ class _Writer:
         return Angle(spread(self._value(a).text, self.names.uniform[a]), sine, cosine)
 
     def _value(self, i: int) -> Expr:
-        """A value as an operand: its name, or its own expression where nothing else uses it."""
+        """A value as an operand: its name, or its expression where nothing else uses it."""
         instr = self.program.body[i]
         if instr.slot is not None:
             return Expr(_load_name(instr.slot))
@@ -243,7 +244,7 @@ def _load_name(slot: Slot) -> str:
 
 
 def _angle_groups(program: Program) -> list[list[int]]:
-    """Angles by how many sines lie beneath them: each group depends on the groups before it only."""
+    """Angles by the number of nested sines they depend on: each group depends on earlier groups only."""
     level: list[int] = []
     groups: dict[int, dict[int, None]] = {}
     for instr in program:
@@ -256,7 +257,7 @@ def _angle_groups(program: Program) -> list[list[int]]:
 
 
 def _cone(program: Program, roots: list[int]) -> list[int]:
-    """Everything that the roots depend on, themselves included, in the PROGRAM's order."""
+    """All values that the roots depend on, the roots included, in the PROGRAM's order."""
     needed = [False] * len(program)
     for root in roots:
         needed[root] = True

@@ -1,8 +1,7 @@
-"""PROGRAM -> C expressions: single-use values are written into their use, the rest get names.
+"""PROGRAM -> C expressions: a value that is used once is written at its use, other values get names.
 
-The texts hold for one state and for one state per lane alike: a value is `V` (a real, or a vector of them)
-or uniform (the same for all states: constants and what is made of parameters alone), and C lets a scalar
-stand beside a vector.
+The texts are the same for one state and for one state per lane: a value is `V` (a real, or a vector of them) or uniform
+(the same for all states: constants and what is computed from parameters alone), and C combines scalars with vectors.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from psdmc.emit.reals import rounded_out
 from psdmc.program.program import Instr, Op, Program
 
 DEEPEST = 4
-"""Operations nested in one expression: more saves no instruction and reads badly."""
+"""Deepest nesting of operations in one expression: deeper nesting saves no instruction and is hard to read."""
 
 UNIFORM_VECTORS = frozenset({"theta_b"})
 
@@ -23,21 +22,21 @@ _SYMBOL = {Op.ADD: ("+", _LOOSE), Op.SUB: ("-", _LOOSE), Op.MUL: ("*", _TIGHT), 
 
 @dataclass(frozen=True, slots=True)
 class Expr:
-    """C text of a value, how tightly its outermost operator binds and how deep it is nested."""
+    """C text of a value, the binding strength of its outermost operator, and its depth of nesting."""
 
     text: str
     binding: int = _ATOM
     depth: int = 0
 
     def beside(self, binding: int, is_right: bool) -> str:
-        """The text as an operand: in brackets unless C would read the same tree without them."""
+        """The text as an operand: in brackets unless C would parse the same tree without them."""
         loose = self.binding < binding or (is_right and self.binding in (binding, _UNARY))
         return f"({self.text})" if loose else self.text
 
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """How a PROGRAM's values are called in C, decided before any text is made.
+    """Names of a PROGRAM's values in C, decided before any text is made.
 
     named    values that get a name: outputs, and whatever is used more than once
     uniform  values that are the same for all states
@@ -68,7 +67,7 @@ def _is_uniform(instr: Instr, known: list[bool]) -> bool:
 
 
 def _cut_deep_trees(program: Program, named: list[bool]) -> None:
-    """Name the values at which an expression would nest deeper than DEEPEST."""
+    """Also name the values at which an expression would nest deeper than DEEPEST."""
     depth = [0] * len(program)
     for i, instr in enumerate(program):
         if not instr.args or instr.op in (Op.SIN, Op.COS):

@@ -29,7 +29,7 @@ class CppMethod:
 
 @dataclass(frozen=True, slots=True)
 class CppArrayMethod:
-    """The same on std::array.
+    """A member function on std::array.
 
     output  what is returned, of type result_type; '' where several results, or a result beside a status, are parameters
     """
@@ -56,12 +56,12 @@ class CppClass:
 
     @property
     def qualifier(self) -> str:
-        """Before a member function."""
+        """Qualifier before a member function."""
         return "" if self.theta else "static "
 
     @property
     def suffix(self) -> str:
-        """Behind a member function's parameters."""
+        """Text after a member function's parameters."""
         return " const noexcept" if self.theta else " noexcept"
 
 
@@ -109,7 +109,7 @@ def _cpp_type(kind: str) -> str:
 
 
 def _array_method(kernel: KernelView, n: int) -> CppArrayMethod:
-    """Of one state; several results are left in the last parameters, as is one that comes with a status."""
+    """The member function for one state; several results, or one with a status, are written to the last parameters."""
     inputs = [f"const {_array(vector.size, n)} &{vector.name}" for vector in kernel.inputs]
     outputs = [f"{_array(output.size)} &{output.name}" for output in kernel.outputs]
     status = "int" if kernel.positive else "void"

@@ -1,4 +1,4 @@
-"""The robot in words: the lines that open the header."""
+"""The robot in words, for the first lines of the header."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def description(
 
 
 def _forms(target: Target) -> tuple[str, ...]:
-    """What a call may overlap, and what the variants' names mean."""
+    """What a call may overlap, and the meaning of the variants' names."""
     if not target.has_batches:
         return ("input.", "  _theta      with the base parameters theta_b given at run time")
     return (
@@ -59,7 +59,7 @@ def _forms(target: Target) -> tuple[str, ...]:
 
 
 def _target(target: Target) -> tuple[str, ...]:
-    """What a target that was chosen is, and how compilers are told of it; nothing for the default."""
+    """A chosen target, and how compilers build for it; empty for the default."""
     if target == NATIVE:
         return ()
     flags = f"; compile with {' '.join(target.flags)}" if target.flags else ""
@@ -87,13 +87,13 @@ def uses_frames(functions: Iterable[FunctionView]) -> bool:
 
 
 def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
-    """What was chosen, by name; the target only where it is not the default."""
+    """The user's choices by name; the target only where it is not the default."""
     target = {} if options.target == NATIVE else {"target": options.target.name}
     return {"real": options.real, "trig": options.trig, **info.options, **target}
 
 
 def joint_line(joint: JointInfo) -> str:
-    """A joint and its limits; those that are unknown are left out."""
+    """A joint and its limits; unknown limits are left out."""
     parts = [f"{joint.name} ({joint.kind})"]
     if math.isfinite(joint.lower) or math.isfinite(joint.upper):
         parts.append(f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}")

@@ -1,4 +1,4 @@
-"""What the emitted package says about its robot, apart from arithmetic."""
+"""The facts about its robot in the emitted package, other than arithmetic."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ class PackageInfo:
     model_hash  content hash of the MODEL
     options     what the user chose, as printed in header and manifest
     frames      names of the named frames, untrusted text; empty: the tip alone
-    payload     (l, 10) what a load adds to theta_b, at the tip and, where there are others, at each named frame; empty
-                where the package has no function for loads
+    payload     (l, 10) maps of a load to the change of theta_b, at the tip and, where there are others, at each named
+                frame; empty where the package has no function for loads
     """
 
     name: str
@@ -94,8 +94,8 @@ def package_info(
     options: Mapping[str, str] | None = None,
     payload: bool = False,
 ) -> PackageInfo:
-    """Metadata of a MODEL; `name` replaces the robot's own; `payload`: with what functions for loads need, InputError
-    where the model's assumptions do not admit every load."""
+    """Metadata of a MODEL. `name` replaces the robot's own. With `payload` it has what functions for loads need;
+    InputError where the model's assumptions do not admit every load."""
     chain = model.mechanism
     joints = tuple(
         JointInfo(

@@ -1,4 +1,4 @@
-"""Kernels as the templates see them: names, sizes and bodies, everything decided."""
+"""Kernels in the form that templates print: names, sizes and bodies, with all decisions made."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class OutputView(VectorView):
 
 @dataclass(frozen=True, slots=True)
 class KernelView:
-    """One kernel: the file(s) that hold its body, its C functions and their signatures.
+    """One kernel: the file(s) with its body, its C functions and their signatures.
 
-    single_file  body file, included once per instantiation; lanes_file, too, where one order serves both
+    single_file  body file, included once per instantiation; also `lanes_file` where one order serves both
     positive     what must be positive and is not put out; None where there is no such thing
     pivot_order  its entries in the order in which they are found
     """
@@ -68,18 +68,18 @@ class KernelView:
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some outputs are written so and others are not."""
+        """Whether some outputs are written from registers and others are not."""
         return self.direct and not all(output.direct for output in self.outputs)
 
     @property
     def fails_alone(self) -> bool:
-        """Whether what becomes NaN is one vector as long as what must be positive."""
+        """Whether the outputs that become NaN are one vector, as long as what must be positive."""
         sizes = {output.size for output in self.outputs}
         return self.positive is not None and len(self.outputs) == 1 and sizes == {self.positive.size}
 
     @property
     def mark_rows(self) -> str:
-        """C: the first row of a block that fails."""
+        """C expression for the first row of a block that fails."""
         assert self.positive is not None
         block = f"{self.positive.name}_block"
         if self.fails_alone:
@@ -138,12 +138,12 @@ class KernelView:
 
     @property
     def cost_text(self) -> str:
-        """Operations of one state, as the header states them."""
+        """Operations of one state, as text for the header."""
         return f"{self.name}: {self.cost}, {self.lowering}"
 
     @property
     def blocks(self) -> tuple[VectorView, ...]:
-        """Buffers of a batch call: every vector lane by lane, but those whose rows are written directly."""
+        """Buffers of a batch call: every vector lane by lane, except those whose rows are written directly."""
         outputs = (output for output in self.outputs if not output.direct)
         return (*self.inputs, *outputs, *((self.positive,) if self.positive else ()))
 
@@ -152,7 +152,7 @@ class KernelView:
 class FunctionView:
     """A function with its kernels, baked first: one C file.
 
-    shape  of what it puts out, and of inputs that are no vectors of all joints, in words
+    shape  of its outputs, and of inputs that are no vectors of all joints, in words
     """
 
     name: str
@@ -240,11 +240,11 @@ TAKEN = {
     ),
     *("theta_b", "count", "block", "blocks", "lane", "first", "rows", "failed", "bad"),
 }
-"""What the emitted C calls something else wherever a quantity's name stands."""
+"""Names that mean something else in the emitted C where a quantity's name would stand."""
 
 
 def _checked(function: Signature) -> Signature:
-    """InternalError where a quantity's name means something else in the emitted C."""
+    """The function's signature; InternalError where a quantity's name means something else in the emitted C."""
     for quantity in (*function.inputs, *function.stored):
         if quantity.name in TAKEN:
             raise InternalError(f"{function.name}: C takes {quantity.name!r} for something else")
@@ -268,7 +268,7 @@ def _lengths(shape: tuple[int, ...]) -> str:
 
 
 def _body(kernel: Kernel, program: Program, outputs: tuple[OutputView, ...], options: EmitOptions) -> Body:
-    """Large outputs are stored as they are found: keeping them all until the end would spill them first."""
+    """The body. Large outputs are stored as they are computed, as keeping them all until the end would spill them."""
     sizes = {output.name: output.size for output in outputs}
     suffix = "" if options.real == "float64" else "f"
     has_matrix = any(len(output.shape) > 1 for output in outputs)
@@ -277,7 +277,7 @@ def _body(kernel: Kernel, program: Program, outputs: tuple[OutputView, ...], opt
 
 
 def _zero(output: Quantity, program: Program, sizes: Sizes) -> tuple[int, ...]:
-    """Entries that the PROGRAM leaves out or stores as the constant zero."""
+    """Entries that the PROGRAM does not store, or stores as the constant zero."""
     values = {slot.index: program.body[i].value for slot, i in program.outputs if slot.vector == output.name}
     return tuple(index for index in range(sizes.size(output)) if values.get(index, 0.0) == 0.0)
 
@@ -287,7 +287,7 @@ def _is_direct(output: Quantity, sizes: Sizes) -> bool:
 
 
 def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:
-    """By form, those that the target has."""
+    """Prototypes by form, for the forms that the target has."""
     variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
     made = (prototype(function, variant, robot, options.c_real) for variant in variants)
     return dict(zip(options.target.forms, made, strict=False))

@@ -19,7 +19,7 @@ from psdmc.errors import InputError
 
 MANIFEST = "manifest.json"
 JOURNAL = ".psdmc-emission.json"
-"""What an emission is about to write; there only while it writes, or where it was killed."""
+"""Lists what an emission is about to write. It exists while it writes, and after it was killed."""
 
 LARGEST_LIST = 16 << 20
 """Bytes of a manifest or journal that are read; a nine-joint arm's manifest has 0.1 MB."""
@@ -34,13 +34,13 @@ OWN_NAME = re.compile(
 """Every name that a package can have beside its manifest's own."""
 
 NOT_REGULAR = "no regular file of this folder"
-"""Stands for the digest of a folder, a device or anything behind a symbolic link."""
+"""Takes the place of the digest of a folder, a device or anything behind a symbolic link."""
 
 Digests = Mapping[str, frozenset[str]]
 
 
 def listed(path: Path) -> Digests:
-    """Path -> digests as a manifest or journal lists them; empty where there is none, or not one of psdmc's."""
+    """Path -> digests as listed in a manifest or journal; empty where there is none, or it is not psdmc's."""
     return {
         name: frozenset([value] if isinstance(value, str) else map(str, value))
         for name, value in _entries(path).items()
@@ -49,7 +49,7 @@ def listed(path: Path) -> Digests:
 
 
 def digest_of(root: Path, path: str) -> str | None:
-    """SHA-256 of a file below root; None where there is nothing."""
+    """SHA-256 of a file below root; None where there is none."""
     try:
         if link_in(root, path) or not stat.S_ISREG((root / path).lstat().st_mode):
             return NOT_REGULAR
@@ -66,7 +66,7 @@ def link_in(root: Path, path: str) -> bool:
 
 
 def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
-    """Paths of a package that are missing or not as psdmc wrote them; None where the folder holds no package.
+    """Paths of a package that are missing or differ from what psdmc wrote; None where the folder holds no package.
 
     The manifest lists all files but itself. InputError where one cannot be read.
     """

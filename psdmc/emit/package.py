@@ -1,4 +1,4 @@
-"""The emitted package: every file's text, from metadata and kernels. Nothing is written here."""
+"""The text of every file of the emitted package, from metadata and kernels. This module writes nothing to disk."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from psdmc.target.vectors import HAS_VECTORS, LANE_BLOCK_BYTES
 
 @dataclass(frozen=True, slots=True)
 class PackageView:
-    """One package as the templates see it.
+    """One package, in the form that templates print.
 
     robot     identifier that every symbol starts with
     adapters  names of psdmc.emit.adapters
@@ -74,7 +74,7 @@ class PackageView:
 
     @property
     def block_bytes(self) -> int:
-        """Of one variable in a block of lanes."""
+        """Bytes of one variable in a block of lanes."""
         return LANE_BLOCK_BYTES
 
     @property
@@ -84,7 +84,7 @@ class PackageView:
 
     @property
     def gcc_flags(self) -> str:
-        """Those for GCC alone."""
+        """Further flags for GCC alone."""
         return " ".join(GCC_ONLY)
 
     @property
@@ -151,7 +151,7 @@ class PackageView:
 
     @property
     def payload_rows(self) -> tuple[tuple[str, ...], ...]:
-        """Rows of the constant matrices that they multiply with."""
+        """Rows of the constant matrices of those functions."""
         return tuple(
             tuple(", ".join(number(value, self.real) for value in row) for row in matrix.tolist())
             for matrix in self.info.payload
@@ -169,7 +169,7 @@ class PackageView:
 
     @property
     def pivot_size(self) -> int:
-        """Entries that must be positive, where what becomes NaN is one vector as long."""
+        """Number of entries that must be positive, where the outputs that become NaN are one vector of that length."""
         found = (k.positive.size for k in self.kernels if k.positive and k.fails_alone)
         return next(found, self.n)
 
@@ -179,13 +179,13 @@ class PackageView:
 
     @property
     def self_checks(self) -> tuple[SelfCheck, ...]:
-        """The self-test's calls: every kernel, those without a reference value marked as such."""
+        """The self-test's calls: every kernel; those without a reference value are marked."""
         known = () if self.references is None else self.references.expected
         return self_checks(self.kernels, self.n, self.options, known)
 
     @property
     def checked_kernels(self) -> int:
-        """How many of them are compared."""
+        """Number of kernels whose values are compared."""
         return len({check.kernel for check in self.self_checks if check.expected})
 
     @property
@@ -204,7 +204,7 @@ class PackageView:
 
     @property
     def fails_in_several(self) -> bool:
-        """Whether some kernel that fails has more to spoil than one vector of all joints."""
+        """Whether some kernel that fails sets more than one vector of all joints to NaN."""
         return any(kernel.positive and not kernel.fails_alone for kernel in self.kernels)
 
     @property
@@ -217,7 +217,7 @@ class PackageView:
 
     @property
     def given_otherwise(self) -> bool:
-        """Whether some input is no vector of all joints."""
+        """Whether some input is not a vector with one entry per joint."""
         return not all(vector.of_joints for vector in self.given_vectors)
 
     @property
@@ -232,7 +232,7 @@ class PackageView:
 
     @property
     def cdef(self) -> str:
-        """What cffi needs to know: tables and functions, without macros."""
+        """The declarations for cffi: tables and functions, without macros."""
         macros = {f"{self.robot}_DOF": str(self.n), f"{self.robot}_BASE_PARAMETERS": str(self.l)}
         macros[f"{self.robot}_FRAMES"] = str(len(self.info.frames))
         lines = list(self.table_declarations)
@@ -252,7 +252,7 @@ def package_view(
     references: ReferenceStates | None = None,
     adapters: Sequence[str] = (),
 ) -> PackageView:
-    """Everything decided; InputError where there is nothing to emit, or where an adapter cannot be."""
+    """The package with all decisions made. InputError where there is nothing to emit, or an adapter is not possible."""
     if not kernels:
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
     if info.l == 0:

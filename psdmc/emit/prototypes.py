@@ -59,7 +59,7 @@ def payload_prototypes(robot: str, real: str) -> tuple[Prototype, Prototype]:
 
 
 def _returns(function: Signature, variant: Variant) -> str:
-    """A function that can fail says which entry failed (one state), or which row (many)."""
+    """C's return type. A function that can fail returns which entry failed (one state), or which row (many)."""
     if function.positive is None:
         return "void"
     return "size_t" if variant.is_batch else "int"

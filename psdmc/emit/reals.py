@@ -1,4 +1,5 @@
-"""Which numbers the package's reals can hold: what float32 cannot is rounded as C would, without warnings, or refused."""
+"""Numbers that the package's real type cannot hold: float32 rounds small ones as C would, without warnings, and large
+ones are refused."""
 
 from __future__ import annotations
 
@@ -14,11 +15,11 @@ SMALLEST_FLOAT = math.ldexp(1.0, -149)
 """The subnormal one; half of it and less rounds to zero."""
 
 TOO_LARGE = LARGEST_FLOAT + math.ldexp(1.0, 103)
-"""From here on numbers round to infinity: half a last digit beyond the largest."""
+"""From this number on, numbers round to infinity: half a last digit beyond the largest."""
 
 
 def rounded_out(value: float, real: str) -> float:
-    """The value itself where C's `real` has one near it, else the infinity or the zero that it rounds to."""
+    """The value where C's `real` has a number near it, else the infinity or the zero that it rounds to."""
     if real == "double" or math.isnan(value):
         return value
     if abs(value) >= TOO_LARGE:
@@ -31,7 +32,7 @@ def rounded_out(value: float, real: str) -> float:
 def check_range(info: PackageInfo, kernels: Mapping[str, Kernel], real: str) -> None:
     """InputError where a parameter, gravity or a constant of the code is too large for `real`.
 
-    Limits are not looked at: one beyond every float is none, and is written as infinite.
+    Limits are not checked: one beyond every float is no limit, and is written as infinite.
     """
     numbers = [("gravity", value) for value in info.gravity]
     numbers += [

@@ -1,4 +1,4 @@
-"""A few states and what every generated function must give there, by the functions' references: no lowering is involved.
+"""A few states and the values of every generated function there, by the functions' NumPy references, without lowering.
 
 An emitted package's self-test compares with them on the user's machine.
 """
@@ -23,17 +23,19 @@ from psdmc.robot.small import times
 Array = NDArray[np.float64]
 
 COUNT = 4
-"""States kept: the self-test repeats them to fill batches, so that four show every entry without swelling the package."""
+"""States kept. The self-test repeats them to fill batches, so that four cover every entry without making the package
+large."""
 
 CANDIDATES = 32
-"""States drawn; those whose mass matrices are best conditioned are kept, because forward dynamics loses digits with it."""
+"""States drawn. Those whose mass matrices are best conditioned are kept, because forward dynamics loses digits with the
+condition number."""
 
 SEED = 2021
 LOAD = 0.25
 """Share of another physical robot's parameters that the check of run-time parameters adds to the robot's own."""
 
 WORST_CONDITION = 1e7
-"""Condition number of M beyond which a state says nothing about forward dynamics."""
+"""Condition number of M beyond which a state is no test of forward dynamics."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,8 +45,9 @@ class ReferenceStates:
     given     quantity's name -> (k, its size): q, qd, qdd and what else functions read; tau and tau_theta, the torques of
               (q, qd, qdd) with the compiled-in parameters and with theta_b
     expected  Signature.label of an output (a kernel's name, where it has one) -> (k, its size), matrices row by row
-    theta_b   (l,) the run-time parameters of the _theta kernels; not the robot's own, so that a kernel that
-              ignored them would be seen
+    theta_b   (l,) the run-time parameters of the _theta kernels; not the robot's own, so that the test notices a kernel
+              that ignores them
+
     Where M(q) is not positive definite at the states, forward dynamics has no entry.
     """
 
@@ -91,7 +94,7 @@ def reference_states(
 
 
 def _drawn(model: DynamicsModel) -> dict[str, Array]:
-    """(CANDIDATES, size) of everything that functions read but torques, drawn in the functions' order."""
+    """(CANDIDATES, size) of everything that functions read except torques, drawn in the functions' order."""
     sizes, rng = Sizes.of_chain(model.n, model.l, len(model.mechanism.frames)), np.random.default_rng(SEED)
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
     return {q.name: q.largest * rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q))) for q in read.values()}

@@ -1,4 +1,4 @@
-"""Reference states as C text: what the package's own test compares with."""
+"""Reference states as C text, for the package's own test."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ReferenceTable:
 class ReferenceView:
     """References as C text.
 
-    tables    the states' vectors, then what each output must be
+    tables    the states' vectors, then each output's expected values
     expected  labels of the outputs that have such a table
     theta_b   the run-time parameters, one constant each; empty where no kernel takes any
     """
@@ -44,7 +44,7 @@ def reference_view(
     labels: Collection[str],
     takes_theta: bool,
 ) -> ReferenceView:
-    """The states as C constants: the vectors that the package's kernels take, and what their outputs (by label) must be.
+    """The states as C constants: the vectors that the package's kernels take, and the expected outputs (by label).
 
     ValueError where the states are of another robot.
     """

@@ -1,4 +1,4 @@
-"""Jinja, set up once: undefined names are errors, and every template is read from the installed package."""
+"""The Jinja environment: undefined names are errors, and every template is read from the installed package."""
 
 from __future__ import annotations
 

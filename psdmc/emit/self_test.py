@@ -1,4 +1,4 @@
-"""What the package's own test calls: every function in every layout, against what the reference states say."""
+"""The calls of the package's own test: every function in every layout, compared with the reference states."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from psdmc.program.signature import TAU
 
 TOLERANCES = {"float64": "1e-10", "float32": "1e-3"}
 FORWARD_TOLERANCES = {"float64": "1e-7", "float32": "1e-1"}
-"""Relative to a joint's largest value: loose enough for badly conditioned mass matrices, tight for wrong
+"""Relative to a joint's largest value: large enough for badly conditioned mass matrices, small enough to detect wrong
 code."""
 
 ROWS = ("6", "nv")
-"""First axes of outputs whose rows are compared each with its own largest value; of others, all entries with one."""
+"""First axes of outputs of which each row is compared relative to its own largest value; other outputs are compared
+relative to the largest of all entries."""
 
 
 @dataclass(frozen=True, slots=True)
 class GivenVector:
-    """An input by the reference states' name, `size` reals per state; `of_joints`: one a joint."""
+    """An input by the reference states' name, `size` reals per state; `of_joints`: one entry per joint."""
 
     name: str
     size: int
@@ -29,7 +30,7 @@ class GivenVector:
 
     @property
     def length(self) -> str:
-        """Its size as the test's C says it."""
+        """Its size as C text."""
         return "N" if self.of_joints else str(self.size)
 
     @property
@@ -46,10 +47,10 @@ class SelfCheck:
     """One output of a kernel that is called state by state, row by row and, where it has that form, lane by lane.
 
     rows, columns  of the output per state
-    single, batch  C calls, `row` being the state's number and `count` the batch's size; batch, lanes: '' where there is
-                   no such form
+    single         C call for one state, `row` being its number
+    batch, lanes   C calls for `count` states, row by row and lane by lane; '' where there is no such form
     status         whether the calls return one
-    expected       array that it should reproduce; '' where no reference state has a value
+    expected       array of the expected values; '' where no reference state has any
     """
 
     kernel: str
@@ -71,7 +72,7 @@ class SelfCheck:
 def self_checks(
     kernels: Iterable[KernelView], n: int, options: EmitOptions, known: Collection[str]
 ) -> tuple[SelfCheck, ...]:
-    """One check per output of each kernel; `known`: labels of those whose values the reference states hold."""
+    """One check per output of each kernel. `known` are the labels of outputs whose values the reference states hold."""
     return tuple(
         _check(kernel, k, n, options, known) for kernel in kernels for k in range(len(kernel.outputs))
     )
@@ -89,7 +90,7 @@ def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, .
 
 
 def labels(kernels: Iterable[KernelView]) -> tuple[str, ...]:
-    """What the values of all outputs of these kernels are called."""
+    """Labels of all outputs of these kernels."""
     return tuple(_label(kernel, k) for kernel in kernels for k in range(len(kernel.outputs)))
 
 
@@ -98,7 +99,7 @@ def _label(kernel: KernelView, k: int) -> str:
 
 
 def _check(kernel: KernelView, k: int, n: int, options: EmitOptions, known: Collection[str]) -> SelfCheck:
-    """Of output number k; the others go where nobody looks."""
+    """The check of output number k; the kernel's other outputs are written to an array that is not compared."""
     quantity, output, label = kernel.function.outputs[k], kernel.outputs[k], _label(kernel, k)
     rows = output.shape[0] if quantity.axes and quantity.axes[0] in ROWS else 1
     prototypes = kernel.prototypes
@@ -134,5 +135,5 @@ def _call(prototype: Prototype, arguments: list[str]) -> str:
 
 
 def _given(kernel: KernelView, vector: str) -> str:
-    """The reference states' name of an input: torques depend on the parameters that they belong to."""
+    """The reference states' name of an input: torques have one with the compiled-in parameters and one with theta_b."""
     return f"{vector}_theta" if kernel.theta and vector == TAU.name else vector

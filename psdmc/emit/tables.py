@@ -79,7 +79,8 @@ def _cpp_number(value: float | None, real: str) -> str:
 
 
 def number(value: float | None, real: str) -> str:
-    """A real constant; None (unknown) is NaN, what `real` has no number for is the infinity or zero it rounds to."""
+    """A real constant. None (unknown) is written as NaN; a number that `real` cannot hold as the infinity or zero it
+    rounds to."""
     if value is None or math.isnan(value):
         return f"({real})NAN"
     value = rounded_out(value, real)

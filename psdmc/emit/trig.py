@@ -26,10 +26,10 @@ from psdmc.emit.trig_numbers import NUMBERS, Constants, Real, constants, plain_n
 from psdmc.target.vectors import VectorUnit
 
 Far = Literal["libm", "nan"]
-"""What an angle beyond the limit gives: libm's sine and cosine on a rare branch, or NaN (freestanding)."""
+"""The result for an angle beyond the limit: libm's sine and cosine on a rare branch, or NaN (freestanding)."""
 
 SIGNED: dict[Real, str] = {"double": "long long", "float": "int"}
-"""Signed integer as wide as a real, as C spells it and as GCC's builtins want it."""
+"""Signed integer as wide as a real, in C's spelling for GCC's builtins."""
 
 
 @dataclass(frozen=True, slots=True)

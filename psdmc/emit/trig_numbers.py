@@ -1,4 +1,4 @@
-"""The numbers of the inline sincos, and their C text; derived by tests/trig/minimax.py, and held to it by a test."""
+"""The numbers of the inline sincos, and their C text. tests/trig/minimax.py derives them, and a test compares."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def plain_number(value: float, real: Real) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ReductionStep:
-    """C names of one subtraction `to = of - turn`, turn = k part; what it rounds away goes to `lost`."""
+    """C names of one subtraction `to = of - turn`, turn = k part; its rounding error is added to `lost`."""
 
     to: str
     of: str

@@ -1,8 +1,7 @@
-"""A package written to a folder: only what changed, and never over what psdmc did not write.
+"""Write a package to a folder: only files that changed, and no file over one that psdmc did not write.
 
-A file is psdmc's own if the folder's manifest.json, or the journal of an emission that was killed, lists it
-with the digest that it has. Everything else that stands in the way is foreign: another program's, or psdmc's
-own but edited since.
+A file is psdmc's own if the folder's manifest.json, or the journal of an emission that was killed, lists it with the
+digest that it has. Every other file is foreign: another program's, or psdmc's own but edited since.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ def write_package(
 ) -> list[str]:
     """Write `files` (path -> text) under `directory`; returns the paths that changed, removed ones included.
 
-    Unchanged files are not touched; files of an earlier emission that are no longer part of it are removed.
-    InputError where a foreign file stands in the way and `force` is not set, where a symbolic link does, and
-    where the folder does not admit files; ToolchainError where the disk does not. Nothing is written before
-    all files were looked at; all content is on disk before the first file is replaced; what is killed between
-    two files is known again from its journal, and finished or replaced by the next emission.
+    Unchanged files are not touched; files of an earlier emission that are no longer part of it are removed. InputError
+    where a foreign file is in the way and `force` is not set, where a symbolic link is, and where the folder cannot
+    take files; ToolchainError where the disk fails. Nothing is written before all files were checked; all content is on
+    disk before the first file is replaced; an emission that is killed between two files is recognized by its journal,
+    and finished or replaced by the next one.
     """
     root = Path(directory)
     with system_errors_at(root):
@@ -63,7 +62,7 @@ def _refuse_links(root: Path, paths: Mapping[str, str]) -> None:
 
 
 def _is_own(path: str, found: str | None, manifest: Digests, journal: Digests) -> bool:
-    """Whether this path is free, or holds what psdmc put there."""
+    """Whether this path is free, or holds a file that psdmc wrote."""
     if found is None or (path == MANIFEST and manifest):
         return True
     return found in manifest.get(path, ()) or found in journal.get(path, ())
@@ -79,7 +78,7 @@ def _stale(root: Path, files: Mapping[str, str], manifest: Digests, journal: Dig
 
 
 def _replace(root: Path, files: Mapping[str, str], stale: list[str], journal: Digests) -> None:
-    """The journal first, so that a killed emission's files are known again."""
+    """Replace the files; the journal is written first, so that a killed emission's files are recognized."""
     root.mkdir(parents=True, exist_ok=True)
     known = {path: sorted(digests) for path, digests in journal.items()}
     for path, text in files.items():
@@ -96,7 +95,7 @@ def _replace(root: Path, files: Mapping[str, str], stale: list[str], journal: Di
 
 
 def _tidy(root: Path, files: Mapping[str, str]) -> None:
-    """Without what a killed emission left."""
+    """Remove what a killed emission left."""
     for folder in dict.fromkeys((root / path).parent for path in files):
         remove_leftovers(folder)
     (root / JOURNAL).unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Other programs' ways of calling the emitted functions, chosen by `emit-c --with`: one file each."""
+"""Adapters: files by which other programs call the emitted functions, chosen by `emit-c --with`; one module each."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from psdmc.emit.kernel_view import KernelView
 from psdmc.errors import InputError
 
 ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView]], str]] = {"casadi": casadi.source}
-"""Name to what makes its C file, <name>/<robot>_<name>.c, of the robot's identifier, the package's real type and its
-kernels. The file includes the library's sources and becomes a shared library of its own, lib<robot>_<name>."""
+"""By name, the function that makes an adapter's C file, <name>/<robot>_<name>.c, from the robot's identifier, the
+package's real type and its kernels. The file includes the library's sources and becomes a shared library of its own,
+lib<robot>_<name>."""
 
 NEEDS = {"casadi": casadi.needed}
-"""Name to the functions that it wants in the package beside those that are asked for."""
+"""By name, the function that returns which functions an adapter needs in the package besides those asked for."""
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
@@ -25,7 +26,7 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def with_needed(functions: Sequence[str], adapters: Sequence[str]) -> list[str]:
-    """The functions and those that the adapters want beside them."""
+    """The functions, followed by those that the adapters need besides."""
     found = dict.fromkeys(functions)
     for adapter in adapters:
         found |= dict.fromkeys(NEEDS[adapter](functions))

@@ -17,13 +17,13 @@ from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 
 DERIVATIVES, GRADIENT = "_derivatives", "_vjp"
-"""Behind a function's name: the function that puts out d output / d input as d<output>_d<input>, and that which reads a
+"""Endings of function names: a function that puts out d output / d input as d<output>_d<input>, and one that reads a
 cotangent last and puts out grad_<input>."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Sparsity as CasADi takes it: rows, columns, then 1 (dense), or starts of columns and rows of the nonzeros."""
+    """Sparsity in CasADi's form: rows, columns, then 1 (dense), or starts of columns and rows of the nonzeros."""
 
     name: str
     numbers: tuple[int, ...]
@@ -31,7 +31,7 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An input or output as CasADi sees it; `at`: where it stands among the called function's outputs, in reals."""
+    """An input or output in CasADi's order; `at` is its place among the called function's outputs, in reals."""
 
     name: str
     pattern: str
@@ -43,10 +43,11 @@ class External:
     """One external function.
 
     name     that CasADi looks for
-    inputs   all of them; those with the numbers `read` are handed to
-    called   the emitted function, whose outputs start at
-    starts   these places of
-    work     as many reals
+    inputs   all of them
+    read     numbers of those that are passed on to the called function
+    called   the emitted function
+    starts   place of each output among the called function's outputs, in reals
+    work     number of reals for those
     fails    whether it returns a status
     """
 
@@ -78,12 +79,12 @@ class CasadiView:
 
 
 def needed(functions: Sequence[str]) -> list[str]:
-    """Functions that give derivatives of these."""
+    """Functions that compute derivatives of these."""
     return [name + DERIVATIVES for name in functions if _has_blocks(name)]
 
 
 def _has_blocks(name: str) -> bool:
-    """Whether a function gives all derivatives of this one."""
+    """Whether some function computes all derivatives of this one."""
     other = RECIPES.get(name + DERIVATIVES)
     if other is None:
         return False
@@ -119,13 +120,13 @@ def casadi_view(robot: str, real: str, every: Sequence[KernelView]) -> CasadiVie
 
 
 class _Patterns:
-    """Every pattern once."""
+    """Every sparsity pattern once."""
 
     def __init__(self) -> None:
         self._names: dict[tuple[int, ...], str] = {}
 
     def of(self, shape: Sequence[int], zero: Iterable[int] = ()) -> str:
-        """The name of a pattern for a row-major array whose entries `zero` are never anything else."""
+        """The name of a pattern for a row-major array whose entries `zero` are always zero."""
         return self._named(_numbers(shape, frozenset(zero)))
 
     def unread(self, shape: Sequence[int]) -> str:
@@ -174,7 +175,7 @@ def _externals(
 
 
 def _reverse(kernel: KernelView, gradient: KernelView, patterns: _Patterns) -> External:
-    """One cotangent to the gradients by all inputs; those are added nowhere: CasADi does."""
+    """The function that takes one cotangent to the gradients by all inputs. CasADi adds them up."""
     (output,) = kernel.outputs
     unread = Argument(f"out_{output.name}", patterns.unread(output.shape))
     seed = Argument(f"adj_{output.name}", patterns.of(output.shape))
@@ -184,7 +185,7 @@ def _reverse(kernel: KernelView, gradient: KernelView, patterns: _Patterns) -> E
 
 
 def _given(kernel: KernelView, patterns: _Patterns) -> tuple[Argument, ...]:
-    """Inputs; a matrix is one column per row of ours, so that the numbers lie alike."""
+    """The inputs. A matrix has one column per row of ours, so that the numbers have the same order in memory."""
     return tuple(Argument(i.name, patterns.of(tuple(reversed(_matrix(i.shape))) if len(i.shape) > 1 else (i.size,)))
                  for i in kernel.inputs)  # fmt: skip
 
