@@ -1,4 +1,4 @@
-"""An emitted package, built by its own build files and put through its own test."""
+"""Build an emitted package with its own build files and run its own test."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ SHOWN = 3
 """Failed checks that a message names."""
 
 UNFINISHED = ".psdmc-unfinished"
-"""Stands in a build folder while psdmc builds there, and after it was killed or failed."""
+"""Marks a build folder while psdmc builds there, and after it was killed or failed."""
 
 
 def build_package(directory: str | Path, edited: bool = False) -> str:
     """Build under DIR/build, run the self-test, and return what the tools printed.
 
-    edited  build although files are missing or not as emit-c wrote them
+    edited  build although files are missing or differ from what emit-c wrote
 
-    CMake where there is one, else make. InputError where DIR holds no package, or an edited one; ToolchainError
+    With CMake where there is one, else make. InputError where DIR holds no package, or an edited one; ToolchainError
     where a tool is missing or fails.
     """
     root = Path(directory)
@@ -43,7 +43,8 @@ def build_package(directory: str | Path, edited: bool = False) -> str:
 
 
 def _check_files(root: Path, edited: bool) -> None:
-    """The manifest says what the files were when they were checked against the model."""
+    """InputError where files differ from the manifest, which has their digests from when they were checked against the
+    model."""
     found = edited_files(root)
     if found is None:
         raise InputError(
@@ -58,7 +59,7 @@ def _check_files(root: Path, edited: bool) -> None:
 
 @contextlib.contextmanager
 def _own_build(folder: Path) -> Iterator[None]:
-    """Nothing is built on what an interrupted build left: it may hold half an object file."""
+    """Hold the build folder, emptied first where an interrupted build left it: it may hold half an object file."""
     with system_errors_at(folder):
         if (folder / UNFINISHED).is_file() and not folder.is_symlink():
             shutil.rmtree(folder)
@@ -69,7 +70,7 @@ def _own_build(folder: Path) -> Iterator[None]:
 
 
 def _with_cmake(root: Path) -> str:
-    """CMake honours CC on its own."""
+    """Build with CMake, which reads CC itself; returns its output."""
     build = str(root / "build")
     steps = [
         ["cmake", "-S", str(root), "-B", build, "-DCMAKE_BUILD_TYPE=Release"],
@@ -86,7 +87,7 @@ def _with_make(root: Path, compiler: tuple[str, ...]) -> str:
 
 
 def _self_test(words: list[str], root: Path) -> str:
-    """What the self-test printed; ToolchainError with the checks that failed, or with how it ended otherwise."""
+    """The self-test's output; ToolchainError with the checks that failed, or how it ended otherwise."""
     done = attempt(words, str(root))
     if done.returncode == 0:
         return done.stdout
@@ -103,6 +104,6 @@ def _self_test(words: list[str], root: Path) -> str:
 
 
 def failed_checks(report: str) -> list[str]:
-    """The checks that a self-test's report calls failed, each once: ctest numbers its lines, and repeats them."""
+    """The failed checks of a self-test's report, each once: ctest numbers its lines, and repeats them."""
     lines = (re.sub(r"^\d+: ", "", line.strip()) for line in report.splitlines())
     return list(dict.fromkeys(line.removesuffix(FAILED) for line in lines if line.endswith(FAILED)))

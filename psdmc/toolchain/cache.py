@@ -1,9 +1,9 @@
-"""Compiled libraries by content: what was compiled once is found again.
+"""Compiled libraries by content: each is compiled once.
 
-The key holds everything that decides the binary: sources, flags, compiler, CPU features, psdmc's version and
-the platform. An entry is believed while its files have the digests that they were sealed with, and is built
-again where they do not. Two processes may race: each builds in a folder of its own and renames it into place,
-and the loser takes the winner's.
+The key covers everything that the binary depends on: sources, flags, compiler, CPU features, psdmc's version and the
+platform. An entry is used while its files have the digests that they were sealed with, and is built again otherwise.
+Two processes may build the same entry: each builds in a folder of its own and renames it into place; the later one uses
+the earlier one's.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from psdmc.toolchain.cache_room import hold, make_room, new_folder, remove, swee
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
-    """Hex digest of file names, texts and everything else that decides the binary."""
+    """Hex digest of file names, texts and everything else that the binary depends on."""
     platform = (sys.platform, sysconfig.get_platform(), str(sysconfig.get_config_var("SOABI")))
     digest = hashlib.sha256()
     for part in (*platform, *parts, *(item for path in sorted(files) for item in (path, files[path]))):
@@ -39,7 +39,7 @@ def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()
 
     products  files that it must have made
 
-    ToolchainError where the cache cannot be written or is not this user's alone, or where a product is missing.
+    ToolchainError where the cache cannot be written or other users may write it, or where a product is missing.
     """
     place = open_cache()
     final = place / key
@@ -80,7 +80,7 @@ def _build(place: Path, final: Path, build: Callable[[Path], None], products: Se
 
 
 def _install(own: Path, final: Path) -> None:
-    """Into place, over whatever is damaged or foreign there; a sound entry of another process stays."""
+    """Move a folder into place, over a damaged or foreign one; a sound entry of another process stays."""
     with hold(final.parent):
         if is_sound(final):
             return

@@ -1,4 +1,4 @@
-"""One entry of the compile cache: a folder with the digests of its files, believed only while they agree."""
+"""One entry of the compile cache: a folder with the digests of its files, used only while they agree."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LARGEST_SEAL = 1 << 20
 
 
 def seal(folder: Path) -> None:
-    """List every file with its digest, and let nobody else write them."""
+    """List every file with its digest, and make all of them writable by nobody but this user."""
     files: dict[str, str] = {}
     size = 0
     for path in sorted(folder.rglob("*")):
@@ -36,7 +36,7 @@ def seal(folder: Path) -> None:
 
 
 def is_sound(folder: Path) -> bool:
-    """Whether an entry is whole, unaltered and nobody else's: what may be opened."""
+    """Whether an entry is complete, unaltered and writable by this user alone, and so safe to open."""
     try:
         if not _is_own(folder, stat.S_ISDIR):
             return False
@@ -50,13 +50,13 @@ def is_sound(folder: Path) -> bool:
 
 
 def touch(folder: Path) -> None:
-    """Note that an entry was used now; a cache that cannot be written does without."""
+    """Note that an entry was used now; ignored where the cache cannot be written."""
     with contextlib.suppress(OSError):
         os.utime(folder / SEAL)
 
 
 def used_and_size(folder: Path) -> tuple[float, int]:
-    """When an entry was last used (s since 1970) and its bytes; of one without seal, when it was made."""
+    """When an entry was last used (s since 1970) and its bytes; for one without seal, when it was made."""
     try:
         return (folder / SEAL).lstat().st_mtime, int(_sealed(folder)["bytes"])
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -65,7 +65,7 @@ def used_and_size(folder: Path) -> tuple[float, int]:
 
 
 def _is_own(path: Path, kind: object) -> bool:
-    """Whether there is a file or folder of that kind, not a link to one, that no other user may write."""
+    """Whether the path is a file or folder of that kind, no link, that no other user may write."""
     status = path.lstat()
     return bool(kind(status.st_mode)) and is_private(status)  # type: ignore[operator]
 

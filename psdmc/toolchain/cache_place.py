@@ -1,7 +1,7 @@
-"""Where the compile cache is, how large it may grow, and whom it is shared with: nobody.
+"""The compile cache's folder and size limit. It is not shared with other users.
 
-What is found there runs inside the caller's process. So only folders and files count that belong to this user
-or to root and that no other user may write.
+Libraries in it run inside the caller's process. Only folders and files that belong to this user or to root, and that no
+other user may write, are used.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ def cache_limit() -> int:
 
 
 def open_cache() -> Path:
-    """The cache's folder, made where it is missing; ToolchainError where it cannot be made or others could put
-    libraries there."""
+    """The cache's folder, made where it is missing; ToolchainError where it cannot be made or other users could write
+    into it."""
     place = cache_directory()
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -70,7 +70,7 @@ def open_cache() -> Path:
 
 
 def check_place(place: Path) -> None:
-    """ToolchainError where others own the cache's folder or may write it, or may put another in its place."""
+    """ToolchainError where other users own the cache's folder, may write it, or may replace it."""
     resolved = Path(os.path.realpath(place))
     status = resolved.stat()
     if not is_private(status):

@@ -1,4 +1,5 @@
-"""What the compile cache holds, and how it is kept small: old entries go first, and what killed builds left."""
+"""The compile cache's contents, and how its size is limited: leftovers of killed builds and the oldest entries are
+removed."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from psdmc.toolchain.cache_entry import used_and_size
 from psdmc.toolchain.cache_place import cache_directory, cache_limit, check_place, unusable
 
 IN_USE = 600.0
-"""s after its last use during which an entry stays whatever the limit: a process may be about to open it."""
+"""Seconds after its last use during which an entry is kept whatever the limit: a process may be about to open it."""
 
 _KEY = re.compile(r"[0-9a-z]{64}")
 _PASSING = re.compile(r"\.(build|gone)-[0-9a-f]{16}|\.[0-9a-z]{16}-[0-9a-z_]{8}")
@@ -27,7 +28,7 @@ _PASSING = re.compile(r"\.(build|gone)-[0-9a-f]{16}|\.[0-9a-z]{16}-[0-9a-z_]{8}"
 
 @dataclass(frozen=True, slots=True)
 class CacheContents:
-    """The cache at a glance: its folder, how many entries and bytes it has, and how many bytes it may have."""
+    """The cache's folder, its number of entries and bytes, and how many bytes it may have."""
 
     place: Path
     entries: int
@@ -36,14 +37,14 @@ class CacheContents:
 
 
 def cache_contents() -> CacheContents:
-    """What is there now; ToolchainError where the place is not to be trusted."""
+    """The present contents; ToolchainError where other users may write the folder."""
     place = cache_directory()
     entries = _entries(place)
     return CacheContents(place, len(entries), sum(size for _, size, _ in entries), cache_limit())
 
 
 def clear_cache() -> int:
-    """Remove every entry and what killed builds left, nothing else; returns how many entries went."""
+    """Remove every entry and what killed builds left, nothing else; returns the number of entries removed."""
     place = cache_directory()
     entries = _entries(place)
     with hold(place):
@@ -54,7 +55,7 @@ def clear_cache() -> int:
 
 
 def make_room(place: Path, keep: Path, limit: int) -> None:
-    """Remove the least recently used entries beyond `limit` bytes, but for `keep` and those just used."""
+    """Remove the least recently used entries beyond `limit` bytes, except `keep` and those just used."""
     entries = _entries(place)
     total = sum(size for _, size, _ in entries)
     old = time.time() - IN_USE
@@ -68,7 +69,7 @@ def make_room(place: Path, keep: Path, limit: int) -> None:
 
 
 def sweep(place: Path) -> None:
-    """Remove the folders of processes that are gone."""
+    """Remove the folders of processes that have ended."""
     with contextlib.suppress(OSError):
         for name in sorted(os.listdir(place)):
             if _PASSING.fullmatch(name):
@@ -90,7 +91,7 @@ def new_folder(place: Path) -> tuple[int, Path]:
 
 @contextlib.contextmanager
 def hold(place: Path) -> Iterator[None]:
-    """Alone at moving entries, where the file system can lock."""
+    """Lock the cache while entries are moved, where the file system can lock."""
     handle = _opened(place)
     try:
         lock(handle)
@@ -100,12 +101,12 @@ def hold(place: Path) -> Iterator[None]:
 
 
 def _opened(folder: Path) -> int:
-    """A handle to lock a folder by; Windows opens none, and locks none."""
+    """A handle to lock a folder by. Windows cannot open folders, and there is no lock there."""
     return os.open(os.devnull if sys.platform == "win32" else folder, os.O_RDONLY)
 
 
 def remove(entry: Path) -> None:
-    """Out of the way in one step, so that nobody finds half an entry; then away."""
+    """Rename the entry in one step, so that no process finds half of it, then delete it."""
     gone = entry.parent / f".gone-{secrets.token_hex(8)}"
     entry.rename(gone)
     if gone.is_symlink() or not gone.is_dir():
@@ -114,7 +115,7 @@ def remove(entry: Path) -> None:
 
 
 def _entries(place: Path) -> list[tuple[float, int, Path]]:
-    """When last used, bytes, and folder of each entry."""
+    """Time of last use, bytes, and folder of each entry."""
     try:
         if not place.is_dir():
             return []

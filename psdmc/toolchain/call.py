@@ -1,6 +1,6 @@
 """A compiled robot called from Python: a method for each function of psdmc/functions.
 
-What type checkers and editors see of them is call.pyi: `python -m psdmc.toolchain.stubs` writes it.
+Type checkers and editors read the methods' types from call.pyi, which `python -m psdmc.toolchain.stubs` writes.
 """
 
 from __future__ import annotations

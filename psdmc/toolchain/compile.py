@@ -16,8 +16,8 @@ LIBRARY = "library.so"
 def compile_library(package: PackageView) -> Path:
     """The shared library of a package, from the cache or compiled now.
 
-    ToolchainError where there is no compiler, it fails or makes no library, or the cache cannot be written or is not
-    this user's alone.
+    ToolchainError where there is no compiler, it fails or makes no library, or the cache cannot be written or is
+    writable by other users.
     """
     files = library_files(package)
     compiler = find_compiler(package.options.target)
@@ -26,7 +26,7 @@ def compile_library(package: PackageView) -> Path:
 
 
 def _build(package: PackageView, files: dict[str, str], compiler: Compiler, folder: Path) -> None:
-    """Compile every source on its own, several at a time, and link."""
+    """Compile each source, several at a time, and link them."""
     for path, text in files.items():
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -41,7 +41,7 @@ def _build(package: PackageView, files: dict[str, str], compiler: Compiler, fold
 
 
 def _run_all(commands: list[list[str]], robot: str, folder: Path) -> None:
-    """Several at a time; after an error or Ctrl-C no further one is started."""
+    """Run the commands, several at a time; after an error or Ctrl-C no further one is started."""
     pool = ThreadPoolExecutor(os.cpu_count())
     try:
         list(pool.map(lambda words: run(words, robot, str(folder)), commands))

@@ -22,7 +22,7 @@ FLAGS = ("-O3", *ARITHMETIC, "-fPIC")
 SHOWN = 3
 """Missing CPU features that a message names."""
 SECONDS = 600
-"""Longest that one run of the compiler may take."""
+"""Longest time in seconds of one run of the compiler."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Compiler:
     """A C compiler.
 
     command   the words that start it
-    version   what it says of itself, for cache keys
+    version   its version text, for cache keys
     portable  FLAGS, and GCC's own where it is GCC
     flags     those, and the one for this machine's CPU
     target    macros that it predefines under its flags: they name the CPU features that it found
@@ -44,13 +44,14 @@ class Compiler:
 
     @property
     def identity(self) -> tuple[str, ...]:
-        """What of it decides a library, for cache keys."""
+        """The compiler's properties that a library depends on, for cache keys."""
         return (*self.command, self.version, self.target, *self.flags)
 
 
 def find_compiler(target: Target = NATIVE) -> Compiler:
-    """The compiler that CC names, else the first of CANDIDATES, with its flags for a target; ToolchainError where there is
-    none, where it does not take the target's flags, or where this machine cannot run what it makes under them."""
+    """The compiler that CC names, else the first of CANDIDATES, with its flags for a target. ToolchainError where there
+    is none, where it does not accept the target's flags, or where this machine cannot run the code that it then
+    makes."""
     return _described(_command(os.environ.get("CC", "")), target)
 
 
@@ -67,7 +68,7 @@ def _command(wanted: str) -> tuple[str, ...]:
 
 
 def _named(wanted: str) -> tuple[str, ...]:
-    """The words of CC, a path among them made absolute: compilers run in folders of their own."""
+    """The words of CC, a path among them made absolute, as compilers run in folders of their own."""
     hint = "set CC to a compiler, or unset it"
     try:
         program, *options = shlex.split(wanted)
@@ -109,8 +110,8 @@ def _taken(command: tuple[str, ...], flags: tuple[str, ...], target: Target) -> 
 def _check_runs_here(
     command: tuple[str, ...], portable: tuple[str, ...], macros: str, target: Target
 ) -> None:
-    """ToolchainError where a target has instructions that this machine's CPU, as the compiler finds it, has not: running
-    them would end the process."""
+    """ToolchainError where a target has instructions that this machine's CPU, as the compiler detects it, does not
+    have: running them would end the process."""
     here = _names(_native(command, portable, NATIVE.host_flags)[1])
     lacking = sorted(_names(macros) - _names(_macros(command, portable)) - here)
     if lacking:
@@ -121,7 +122,7 @@ def _check_runs_here(
 
 
 def _names(macros: str) -> set[str]:
-    """Names of macros, compilers' words about tuning aside."""
+    """Names of macros, except those about tuning."""
     names = {line.split()[1].partition("(")[0] for line in macros.splitlines() if line.startswith("#define ")}
     return {name for name in names if "tune" not in name}
 
@@ -129,7 +130,7 @@ def _names(macros: str) -> set[str]:
 def _native(
     command: tuple[str, ...], portable: tuple[str, ...], host_flags: tuple[str, ...]
 ) -> tuple[tuple[str, ...], str]:
-    """Flags that the compiler takes, this CPU's if it can, and the macros that it predefines under them."""
+    """Flags that the compiler accepts, with this CPU's if possible, and the macros that it predefines under them."""
     for native in host_flags:
         with contextlib.suppress(ToolchainError):
             return (*portable, native), _macros(command, (*portable, native))
@@ -141,7 +142,7 @@ def _macros(command: tuple[str, ...], flags: tuple[str, ...]) -> str:
 
 
 def run(words: Sequence[str], what: str, cwd: str | None = None) -> str:
-    """A program's standard output; ToolchainError with the first line of its complaint where it fails."""
+    """A program's standard output; ToolchainError with the first line of its error output where it fails."""
     done = attempt(words, what, cwd)
     if done.returncode != 0:
         raise failure(words, what, done)
@@ -162,7 +163,7 @@ def attempt(words: Sequence[str], what: str, cwd: str | None = None) -> subproce
 
 
 def failure(words: Sequence[str], what: str, done: subprocess.CompletedProcess[str]) -> ToolchainError:
-    """What to raise for a program that was killed or ended with a status other than 0."""
+    """The error for a program that was killed or ended with a status other than 0."""
     if done.returncode < 0:
         return ToolchainError(
             f"{what}: {words[0]} was killed by {_signal_name(-done.returncode)}",
@@ -183,7 +184,7 @@ def _signal_name(number: int) -> str:
 
 
 def _complaint(*texts: str) -> str:
-    """The first line that says 'error', else the last line there is."""
+    """The first line of the output that contains 'error', else the last line."""
     lines = [line.strip() for text in texts for line in text.splitlines() if line.strip()]
     errors = [line for line in lines if "error" in line.lower()]
     return (errors or lines[-1:] or ["no message"])[0]

@@ -1,4 +1,5 @@
-"""What calling a compiled library takes: names, sizes and prototypes, without the package that it was made from.
+"""The data that calling a compiled library needs: names, sizes and prototypes, without the package that it was made
+from.
 
 It is kept beside libraries in the compile cache: a model that was compiled before is called without being lowered,
 rendered or parsed again.
@@ -16,12 +17,12 @@ from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 
 FORMAT = 2
-"""Grows where the text's form changes."""
+"""Version of the text's form."""
 
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A compiled package as its caller sees it.
+    """A compiled package as its caller needs it.
 
     robot        prefix of its symbols
     real         C's name of its floating-point type; `dtype` is NumPy's
@@ -74,12 +75,12 @@ def batch_symbol(robot: str, kernel: str) -> str:
 
 
 def interface_to_json(interface: Interface, library: str) -> str:
-    """The text of an interface and of the key of the library in the cache that it belongs to."""
+    """JSON text of an interface and of the key of its library in the cache."""
     return json.dumps({"format": FORMAT, "library": library, "interface": asdict(interface)})
 
 
 def interface_from_json(text: str) -> tuple[Interface, str]:
-    """Interface and key of `interface_to_json`; InternalError where the text is not of its making."""
+    """Interface and key from `interface_to_json`'s text; InternalError where the text is another's."""
     try:
         whole = json.loads(text)
         if whole["format"] != FORMAT:

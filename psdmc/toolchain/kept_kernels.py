@@ -1,4 +1,4 @@
-"""Lowerings kept in the compile cache: a model is lowered once for its options and this psdmc."""
+"""Kernels kept in the compile cache: a model is lowered once for its options and this version of psdmc."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from psdmc.toolchain.cache import cache_key, cached
 KERNELS = "kernels.json"
 
 DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "robot", "target")
-"""Folders of psdmc whose sources decide what a lowering gives."""
+"""Folders of psdmc whose sources the result of a lowering depends on."""
 
 
 def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -> dict[str, Kernel]:
-    """What `lower` gives, from the compile cache where an equal call was made before.
+    """The kernels that `lower` returns, from the compile cache where an equal call was made before.
 
-    parts  everything that decides the result besides psdmc's own sources: the model's hash, the options
+    parts  all that the result depends on besides psdmc's own sources: the model's hash, the options
 
-    A cache that cannot be used costs time, not the result: `lower` is then called and nothing is kept.
+    Where the cache cannot be used, `lower` is called and nothing is kept.
     """
     made: dict[str, Kernel] = {}
 
@@ -44,7 +44,7 @@ def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -
 
 @cache
 def sources_digests() -> tuple[str, ...]:
-    """NumPy's version and the digests of the sources that lowering runs: an edited psdmc lowers anew."""
+    """NumPy's version and the digests of the sources that lowering runs, so that an edited psdmc lowers again."""
     return (np.__version__, *digests(DECIDES))
 
 

@@ -26,12 +26,13 @@ INTERFACE = "interface.json"
 def compiled_once(
     parts: Sequence[str], make: Callable[[], PackageView], target: Target = NATIVE
 ) -> tuple[Interface, Path]:
-    """Interface and shared library of the package that `make` gives, from the cache where an equal call was made before.
+    """Interface and shared library of the package that `make` returns, from the cache where an equal call was made
+    before.
 
-    parts   everything that decides the package besides psdmc's own sources: the model's hash, the options
+    parts   all that the package depends on besides psdmc's own sources: the model's hash, the options
     target  the package's
 
-    Raises what `make` and `compile_library` raise. An interface whose library is gone or altered is not believed.
+    Raises what `make` and `compile_library` raise. An interface whose library is missing or altered is not used.
     """
     made: list[tuple[Interface, Path]] = []
 
@@ -49,7 +50,7 @@ def compiled_once(
 
 @cache
 def _emission() -> tuple[str, ...]:
-    """psdmc's version and the digests of what makes C of kernels and a library of C."""
+    """psdmc's version and the digests of the sources that turn kernels into C and C into a library."""
     texts = sorted(
         (file.name, file.read_bytes())
         for file in resources.files("psdmc.templates").iterdir()
@@ -60,7 +61,7 @@ def _emission() -> tuple[str, ...]:
 
 
 def _opened(entry: Path) -> tuple[Interface, Path] | None:
-    """What an entry tells; None where it tells nothing or its library is not to be had."""
+    """The contents of an entry; None where it cannot be read or its library is missing."""
     try:
         interface, key = interface_from_json((entry / INTERFACE).read_text(encoding="utf-8"))
     except (InternalError, OSError, UnicodeDecodeError):

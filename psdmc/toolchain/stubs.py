@@ -1,4 +1,4 @@
-"""python -m psdmc.toolchain.stubs: writes call.pyi, the compiled robot's methods as type checkers see them."""
+"""python -m psdmc.toolchain.stubs: writes call.pyi, the compiled robot's methods for type checkers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def arguments(function: Signature) -> tuple[str, ...]:
 
 
 def documentation(function: Signature) -> str:
-    """What a method says of itself: the function's meaning, then the shapes of its outputs."""
+    """A method's docstring: the function's meaning, then the shapes of its outputs."""
     shapes = ", ".join(f"{output.name} {_shape(output)}" for output in function.outputs)
     inputs = "".join(f"; {q.name} {_shape(q)}" for q in function.inputs if len(q.axes) != 1)
     failure = f"; NaN in states that have {function.positive.which}" if function.positive else ""
