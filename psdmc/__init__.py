@@ -36,7 +36,7 @@ _MODULES |= {
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",
 }
-"""Where each name is: loaded when it is first used, so that the command line's first words cost nothing."""
+"""The module of each name. Modules are loaded when a name is first used, so that the command line starts fast."""
 
 
 def __getattr__(name: str) -> Any:

@@ -26,15 +26,15 @@ if sys.platform != "win32":
 _TEMPORARY = re.compile(r"\.psdmc-[0-9a-f]{16}\.part(\.[a-z]{1,8})?")
 
 _THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE)
-"""What no other name would help against."""
+"""Errors of the disk: writing under another name would not help."""
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
     """Write one file, text as UTF-8 with the line ends that it has.
 
-    An existing file's mode is kept, a new one's is the umask's; a symbolic link's target is replaced, not the
-    link; what is no regular file, such as /dev/null, is written to. InputError where the path does not admit a
-    file, ToolchainError where the disk does not.
+    An existing file's mode is kept, a new one's is the umask's; a symbolic link's target is replaced, not the link;
+    what is no regular file, such as /dev/null, is written to. InputError where no file can be made at the path,
+    ToolchainError where the disk fails.
     """
     with whole_file(path) as temporary:
         _fill(temporary, content)
@@ -80,7 +80,7 @@ def make_folder(path: str | os.PathLike[str]) -> None:
 
 
 def check_place(path: str | os.PathLike[str]) -> None:
-    """InputError where no file can be written at `path`: to be said before hours of work, not after."""
+    """InputError where no file can be written at `path`, so that it is reported before hours of work."""
     target = Path(path)
     with system_errors_at(path):
         if target.is_dir():
@@ -94,7 +94,7 @@ def check_place(path: str | os.PathLike[str]) -> None:
 
 @contextlib.contextmanager
 def system_errors_at(path: str | os.PathLike[str]) -> Iterator[None]:
-    """An OSError as the error of psdmc that says what would help; it names `path`, not a temporary file."""
+    """Turn an OSError into psdmc's error with the remedy; its message names `path`, not a temporary file."""
     try:
         yield
     except OSError as error:
@@ -102,7 +102,7 @@ def system_errors_at(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def unwritable(path: str | os.PathLike[str], error: OSError) -> PsdmcError:
-    """That `path` cannot be written, and whether another place or another disk would help."""
+    """The error for a `path` that cannot be written; its hint is another place or another disk."""
     what = f"{os.fspath(path)}: cannot be written: {error.strerror or error}"
     if error.errno in _THE_DISK:
         return ToolchainError(what, "make room there, or write to another disk")
@@ -110,7 +110,7 @@ def unwritable(path: str | os.PathLike[str], error: OSError) -> PsdmcError:
 
 
 def _is_stream(target: Path) -> bool:
-    """Whether a device, a pipe or a socket stands there: renaming a file onto it would destroy it."""
+    """Whether the path is a device, a pipe or a socket, which renaming a file onto it would destroy."""
     try:
         mode = target.stat().st_mode
     except FileNotFoundError:
@@ -145,7 +145,7 @@ def _locked_new_file(target: Path) -> tuple[int, Path]:
 
 
 def lock(handle: int, wait: bool = True) -> bool:
-    """Lock an open file or folder until it is closed or the process ends; whether that was possible."""
+    """Lock an open file or folder until it is closed or the process ends; returns whether that was possible."""
     if sys.platform == "win32":
         return False
     try:
@@ -156,7 +156,7 @@ def lock(handle: int, wait: bool = True) -> bool:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of processes that are gone; nobody else's files, and no error where that fails."""
+    """Remove temporary files of processes that have ended, no other files; errors are ignored."""
     with contextlib.suppress(OSError):
         for name in os.listdir(folder):
             if _TEMPORARY.fullmatch(name):
@@ -178,7 +178,7 @@ def _fill(own: Path, content: str | bytes) -> None:
 
 
 def _settle(own: Path, target: Path) -> None:
-    """Onto the disk, with the mode that the file had: a full disk says so here at the latest."""
+    """Write the file to the disk, with the mode that the old file had; a full disk raises here at the latest."""
     handle = os.open(own, os.O_RDWR)
     try:
         os.fsync(handle)
@@ -189,7 +189,7 @@ def _settle(own: Path, target: Path) -> None:
 
 
 def _settle_folder(folder: Path) -> None:
-    """The renaming too, where the file system can; the file is whole in any case."""
+    """Write the renaming to the disk, where the file system can; the file is whole in any case."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

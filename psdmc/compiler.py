@@ -1,4 +1,12 @@
-"""The whole pipeline, top to bottom: robot -> derive -> lower -> emit -> toolchain. Start reading here."""
+"""The whole pipeline: `derive`, `emit_c` and `compile`, each from top to bottom. Start reading here.
+
+stage        in                                         out
+robot        robot file, options                        LoadedRobot: a Mechanism and where it comes from
+derivation   Mechanism                                  DynamicsModel: E, P, theta_b, certificate (the MODEL)
+lower        DynamicsModel, names of functions, costs   Kernels: each function as a PROGRAM for one state and for lanes
+emit         Kernels, PackageInfo, ReferenceStates      PackageView, then the text of each file of the C package
+toolchain    PackageView                                shared library with its Interface, then CompiledRobot
+"""
 
 from __future__ import annotations
 
@@ -32,7 +40,7 @@ Progress = Callable[[str], None]
 
 
 def silent(step: str) -> None:
-    """Progress that is not shown."""
+    """Ignore progress: the default of the functions below."""
 
 
 def derive(
@@ -48,21 +56,22 @@ def derive(
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
 ) -> DynamicsModel:
-    """A robot file (URDF, or DH table in TOML) to its model (E, P, theta_b), certified.
+    """The certified model (E, P, theta_b) of a robot file: URDF, or DH table in TOML.
 
     base, tip      links that the chain starts and ends at; None: the root, the end of the longest chain
     gravity        m/s^2 in the file's root frame; None: the file's own, or (0, 0, -9.81)
     drive_inertia  the joints' drive inertias are parameters: True, or one value a joint, kg m^2 (kg)
     assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com"
     snap           rad; constant rotations this near to one with exact zeros become it; 0 turns it off
-    expand         False leaves E and P out, for chains whose functions would not fit
-    frames         links that functions of frames are about, in this order; none: the tip
+    expand         False leaves E and P out, for chains with too many monomials
+    progress       called with the name of each step as it begins
+    frames         links that kinematic functions are about, in this order; none: the tip
     tool           x y z (m), roll pitch yaw (rad) of one more frame, 'tool', in the tip's
-    Raises InputError for a wrong file or option, DerivationError where the model does not fit.
+
+    Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.
     """
-    from psdmc.derivation.derive import (
-        derive_model,
-    )  # here: Pinocchio and SciPy load slowly, emission needs neither
+    # Imported here: Pinocchio and SciPy load slowly, and emission needs neither.
+    from psdmc.derivation.derive import derive_model
     from psdmc.robot.load import load_robot
 
     progress("reading the robot")
@@ -81,7 +90,7 @@ def derive(
 
 
 def provenance(loaded: LoadedRobot) -> dict[str, Any]:
-    """Where a model comes from, as plain JSON values: enough to read the source again."""
+    """The model's origin as plain JSON values: enough to read the source again."""
     from psdmc.derivation.snap_effect import snap_effect
 
     effect = snap_effect(loaded.mechanism, loaded.unsnapped().chain) if loaded.snap_report else None
@@ -110,7 +119,7 @@ def emit_c(
     adapters: Sequence[str] = (),
     target: str | Target = NATIVE,
 ) -> list[str]:
-    """Write the model's C package; returns the files that changed.
+    """Write the model's C package; returns the paths of the files that changed.
 
     lowering   which arithmetic: "auto" takes the cheaper per function
     functions  names of functions to generate; None: psdmc.functions.DEFAULT. InputError where theta_b is known and the
@@ -120,10 +129,11 @@ def emit_c(
                target's
     name       the robot's name in C; None: the robot's own
     force      whether to overwrite files that psdmc did not write
+    progress   called with the name of each step as it begins
     payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
                do not admit every load
-    adapters   names of psdmc.emit.adapters.ADAPTERS: other programs that the package is for, too; what they need beside
-               `functions` is generated, too
+    adapters   names in psdmc.emit.adapters.ADAPTERS: other programs that the package is also for; functions that they
+               need are generated besides `functions`
     target     the machine that the package is for, by its name in psdmc.target.presets
     """
     options = _options(lowering, real, trig, target)
@@ -150,8 +160,8 @@ def compile(
 
     functions  by name, and no others; None: the default set at once, any other when it is first called
 
-    Other options as those of `emit_c`. InputError for a target that has no functions for many states, which Python calls;
-    ToolchainError for one that the compiler or this machine's CPU is not.
+    Other options as of `emit_c`. Raises InputError for a target without functions for many states, which Python calls;
+    ToolchainError for a target that the compiler does not know or this machine's CPU cannot run.
     """
     options = _options(lowering, real, trig, target)
     machine = options.target
@@ -199,7 +209,7 @@ def _package(
 def _options(
     lowering: str, real: Real | None = None, trig: Trig | None = None, target: str | Target = NATIVE
 ) -> EmitOptions:
-    """What is chosen, and the target's own precision and sines where nothing is; InputError where a choice is none."""
+    """The options, with the target's own precision and sines where none are chosen; InputError for an unknown choice."""
     machine = preset(target) if isinstance(target, str) else target
     real, trig = real or machine.real, trig or machine.trig
     _choose("lowering", lowering, ("auto", "expanded", "factored"))

@@ -1,7 +1,7 @@
-"""Errors that people meet, and the one that they should not.
+"""psdmc's errors: three that users can cause, and one for faults of psdmc itself.
 
-Every error a user can cause carries what and where in its message and, where there is one, the remedy in `hint`.
-The command line prints both on one line each and ends with `exit_status`; only `--debug` shows a traceback.
+Every error that a user can cause has what and where in its message and, where there is one, the remedy in `hint`. The
+command line prints both on one line each and ends with `exit_status`; only `--debug` shows a traceback.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import sys
 from collections.abc import Callable
 
 INTERRUPTED_STATUS = 130
-"""Of a process that Ctrl-C ended, as shells say it: 128 + SIGINT."""
+"""Exit status of a process that Ctrl-C ended, as shells define it: 128 + SIGINT."""
 
 
 class PsdmcError(Exception):
-    """Something outside psdmc is not as it should be; `hint` says what would help."""
+    """Base class of errors with a cause outside psdmc; `hint` is the remedy."""
 
     exit_status = 1
 
@@ -49,8 +49,8 @@ class InternalError(Exception):
 
 
 def exit_status_of(action: Callable[[], int | None]) -> int:
-    """Run `action`, for `python -m` modules; its status (None: 0), or that of its PsdmcError, whose message and hint
-    are printed to standard error, a line each. Ctrl-C and a full disk behind standard output are a line, too."""
+    """Run `action`, for `python -m` modules; returns its status (None: 0), or that of its PsdmcError, whose message and
+    hint are printed to standard error, a line each. Ctrl-C and a full standard output are reported in a line, too."""
     try:
         status = action() or 0
         sys.stdout.flush()
@@ -72,7 +72,7 @@ def _said(message: str, hint: str | None, status: int) -> int:
 
 
 def _drop_output() -> None:
-    """What is still in standard output's buffer goes nowhere: Python would complain of it after the last word."""
+    """Discard what is still in standard output's buffer: Python would otherwise report it when it ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())

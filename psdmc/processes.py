@@ -1,4 +1,4 @@
-"""Independent jobs in processes of their own, which Ctrl-C ends without a word."""
+"""Independent jobs in processes of their own, which end quietly on Ctrl-C."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ Result = TypeVar("Result")
 
 
 def in_processes(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    """`work` of each job, in order; in this process where one worker or one job is all there is.
+    """The results of `work` for each job, in order. They are computed in this process where there is one worker or one
+    job.
 
     Where the caller stops early, by an error or by Ctrl-C, the workers are ended.
     """
@@ -26,7 +27,7 @@ def in_processes(work: Callable[[Job], Result], jobs: Sequence[Job], workers: in
 
 
 def in_a_new_process(work: Callable[[Job], Result], job: Job) -> Result:
-    """`work` of one job, in a process that has done nothing before; ended with this one's by Ctrl-C."""
+    """The result of `work` for one job, computed in a new process, which ends with this one on Ctrl-C."""
     (result,) = _elsewhere(work, [job], 1)
     return result
 
