@@ -84,10 +84,10 @@ class Angle:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Lines in the order: loads, steps, sines and cosines of the angles that these steps compute, further loads.
+    """A part of a body: loads, steps, then the sines and cosines of the angles that these steps compute.
 
-    Inputs that no angle of the section needs are loaded after the sines, so that they need not be kept while libm is
-    called. Stores come with the last steps, after all loads: an output may overwrite an input.
+    Inputs that no angle needs are loaded in the last section, after all sines, so that they need not be kept while libm
+    is called. Stores come with the last steps, after all loads: an output may overwrite an input.
     """
 
     loads: tuple[Load, ...]
