@@ -41,7 +41,7 @@ class Runs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourSteps:
-    """What the four steps found; `motor` is None where the logs hold torques."""
+    """The result of the four steps; `motor` is None where the logs hold torques."""
 
     motor: MotorResult | None
     motors: Motors
@@ -75,7 +75,7 @@ def calibrate_four_steps(
     torque_constants: Mapping[str, float] | None = None,
     file_theta: Array | None = None,
 ) -> FourSteps:
-    """Torque constants, gravity, friction, inertia; gravity to inertia as often as the options say.
+    """Torque constants, gravity, friction, inertia; gravity to inertia are repeated as the options say.
 
     torque_constants  N m/A by joint name, for joints that no load can reach (an axis along gravity)
     file_theta        (l,)  the file's values, kept in directions that no run shows; None: zero
@@ -108,7 +108,7 @@ def calibrate_four_steps(
 
 
 def _require_runs(runs: Runs) -> None:
-    """InputError where a step that the others rest on has no run."""
+    """InputError where a step that later ones need has no run."""
     steps = {"gravity": runs.gravity, "friction": runs.friction, "inertial": runs.inertial}
     missing = [step for step, own in steps.items() if not own]
     if missing:
@@ -119,9 +119,9 @@ def _require_runs(runs: Runs) -> None:
 
 
 def _motors(chain: Mechanism, motor: MotorResult | None, runs: Runs, given: Mapping[str, float]) -> Motors:
-    """Identified constants, given ones where none was identified, or ones where every log holds torques.
+    """Identified torque constants, given ones where none was identified, and one for each joint where logs hold torques.
 
-    InputError where currents stay unexplained.
+    Raises InputError where the logs hold currents without a constant.
     """
     require_constants(given, chain.joint_names)
     logs = [run.log for step in (runs.gravity, runs.friction, runs.inertial) for run in step]

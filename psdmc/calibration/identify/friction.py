@@ -59,7 +59,7 @@ def calibrate_friction(
 
 
 def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
-    """One warning that names the joints whose residual is no noise."""
+    """One warning that names the joints whose residual is not noise."""
     named = [
         f"{name} ({joint.correlation:.2f}, by {joint.widened:.1f})"
         for name, joint in found.items()
@@ -74,7 +74,8 @@ def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
 
 
 def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFriction]) -> StepQuality:
-    """Friction of each joint alone against its run, relieved of the base parameters' gravity that it was prepared with."""
+    """Quality of each joint's friction alone on its run, after the gravity by the base parameters that it was prepared
+    with is subtracted."""
     qualities, samples = {}, []
     for name, data in runs.items():
         if name in joints:
@@ -91,7 +92,7 @@ def prepared_runs(
     runs: Sequence[FrictionRun],
     options: StepOptions,
 ) -> dict[str, JointRun]:
-    """The runs by joint, in the chain's order, each beside its gravity by these base parameters."""
+    """The runs by joint, in the chain's order, each with its gravity torque by these base parameters."""
     places = {name: k for k, name in enumerate(chain.joint_names)}
     own = sorted((run for run in runs if run.joint in places), key=lambda run: places[run.joint])
     return {
@@ -103,7 +104,7 @@ _Task = tuple[str, JointRun, FrictionOptions, JointFriction | None]
 
 
 def _fitted(tasks: list[_Task], workers: int) -> list[JointFriction]:
-    """Joints are independent: one process each, where more than one is allowed."""
+    """The fits of all joints, which are independent: in several processes where more than one is allowed."""
     return list(in_processes(_fit, tasks, workers))
 
 
@@ -112,7 +113,7 @@ def _fit(task: _Task) -> JointFriction:
 
 
 def _judged(name: str, data: JointRun, joint: JointFriction) -> tuple[JointQuality, Sample]:
-    """Friction alone: what gravity, inertia and offset explain is taken from both sides."""
+    """Quality of friction alone: the torque that gravity, inertia and offset explain is subtracted from both sides."""
     rigid = data.low_pass(data.rigid(joint.inertia, joint.offset, joint.delay))
     measured = data.measured - rigid
     modelled = data.low_pass(data.torque(unknowns_of(joint))) - rigid

@@ -1,9 +1,9 @@
-"""The seven LuGre parameters of one joint, in the paper's two steps and a last polish.
+"""The seven LuGre parameters of one joint, in the paper's two steps and a final refinement.
 
 First the fast samples, where bristles do not matter: F_c, F_v, d_v by trust-region least squares. Then the rest by
-Nelder-Mead over a simulation of (12). Last, all of them together by trust region, from which the standard deviations
-come. Beside the seven, a run has unknowns of its own: the joint's inertia in that pose (the paper neglects it), a
-constant torque, and the time between position and current.
+Nelder-Mead over a simulation of (12). Last, all of them together by trust region, which also gives the standard
+deviations. Besides the seven, a run has unknowns of its own: the joint's inertia in that pose (the paper neglects it),
+a constant torque, and the time between position and current.
 
 Unknowns p, in order: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1, inertia, offset, delay.
 """
@@ -24,27 +24,30 @@ from psdmc.calibration.logs.log import Array
 
 DELAY = 9
 FREE = {"lugre": tuple(range(10)), "coulomb_viscous": (0, 3, 7, 8, DELAY)}
-"""Unknowns that each friction law leaves to the data."""
+"""Unknowns that each friction law estimates."""
 STIFF_BEND = 1e-5
-"""rad: bristle deflection at Coulomb friction that stands for none at all."""
+"""rad: bristle deflection at Coulomb friction that stands for rigid bristles."""
 PEAK_SPEEDS = (0.01, 0.04)
-"""Stribeck velocities that the last step starts from as well, shares of the run's largest speed."""
+"""Stribeck velocities of further starts of the last step, as shares of the run's largest speed."""
 PEAK_HEIGHT = 0.2
-"""F_s - F_c there, share of F_c."""
+"""F_s - F_c of these starts, as a share of F_c."""
 SHORT_DESCENT, LONG_DESCENT = 8, 25
-"""Evaluations by which a start is judged, and that its best is given."""
+"""Numbers of evaluations: to compare starts, and to refine the best one."""
 UNSEEN_CURVATURE = 1e-13
-"""Of the sum of squares, relative to the largest, below which a direction is not seen."""
+"""Curvature of the sum of squares, relative to the largest, below which a direction counts as not seen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointFriction:
-    """One joint's friction as identified.
+    """One joint's identified friction.
 
-    covariance  (7, 7)  in the order of lugre.PARAMETERS, of the fit alone, widened where residuals are correlated
-    unseen      names of parameters that the data do not determine
-    inertia     kg m^2, of the joint in the run's pose, not negative;  offset N m;  delay s
-    correlation of the residual from sample to sample;  widened  the standard deviations, by this factor
+    covariance   (7, 7)  in the order of lugre.PARAMETERS, of the fit alone, widened where residuals are correlated
+    unseen       names of parameters that the data do not determine
+    inertia      kg m^2, of the joint in the run's pose, not negative
+    offset       N m
+    delay        s
+    correlation  of the residual from sample to sample
+    widened      factor by which standard deviations were widened
     """
 
     joint: str
@@ -59,7 +62,7 @@ class JointFriction:
 
     @property
     def std(self) -> Array:
-        """(7,)"""
+        """(7,) standard deviations."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
 
@@ -73,7 +76,7 @@ def unknowns_of(found: JointFriction) -> Array:
 def fit_joint(
     name: str, data: JointRun, options: FrictionOptions, start: JointFriction | None
 ) -> JointFriction:
-    """The seven of one joint: by the paper's two steps, or from an earlier pass, and polished."""
+    """The seven parameters of one joint: by the paper's two steps, or from an earlier pass, then refined."""
     if options.law == "coulomb_viscous":
         sliding = data.fit[np.abs(data.qd[data.fit]) > options.sliding * np.abs(data.qd).max()]
         return _polished(name, replace(data, fit=sliding), _plain(_fast(data, options)), options)
@@ -86,7 +89,8 @@ def fit_joint(
 
 
 def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionOptions) -> Array:
-    """The start that leads lowest: a Stribeck peak that was missed, or found where nothing moves, is a minimum, too."""
+    """The start that leads to the smallest residual. A missed Stribeck peak, or a false one, is a local minimum as
+    well."""
     top = float(np.abs(data.qd).max())
     starts = [first]
     for speed in PEAK_SPEEDS:
@@ -99,7 +103,7 @@ def _best_of_peaks(data: JointRun, first: Array, fast: Array, options: FrictionO
 
 
 def _plain(fast: Array) -> Array:
-    """Coulomb and viscous friction as LuGre sees them: no Stribeck peak, linear, bristles that hardly bend."""
+    """Coulomb and viscous friction as LuGre parameters: no Stribeck peak, linear, rigid bristles."""
     coulomb, viscous, _, inertia, offset = fast
     return np.array(
         [coulomb, 0.0, 0.0, viscous, 1.0, np.log(coulomb / STIFF_BEND), 0.0, inertia, offset, 0.0]
@@ -167,7 +171,7 @@ def _presliding(data: JointRun, fast: Array, options: FrictionOptions) -> Array:
 
 
 def _polished(name: str, data: JointRun, p: Array, options: FrictionOptions) -> JointFriction:
-    """All free unknowns together by trust region, bounds kept; standard deviations from its Jacobian."""
+    """All free unknowns together by trust region within bounds, with standard deviations from its Jacobian."""
     free = _free(options)
     scale = step_sizes(p)[free]
     fitted = _descended(data, p, options, LONG_DESCENT)
@@ -183,7 +187,7 @@ def _polished(name: str, data: JointRun, p: Array, options: FrictionOptions) -> 
 
 
 def _free(options: FrictionOptions) -> list[int]:
-    """Unknowns that are left to the data."""
+    """The unknowns that are estimated."""
     return [j for j in FREE[options.law] if options.estimate_delay or j != DELAY]
 
 
@@ -218,7 +222,8 @@ def _put(p: Array, free: list[int], x: Array) -> Array:
 
 
 def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
-    """sigma_0, sigma_1, F_v, inertia >= 0, F_s >= F_c > 0, v_s > 0; the rest keeps the search where numbers make sense."""
+    """Bounds: sigma_0, sigma_1, F_v, inertia >= 0, F_s >= F_c > 0, v_s > 0; the others keep the search within
+    reasonable numbers."""
     reach = options.largest_delay
     low = [1e-9, 0.0, np.log(1e-5), 0.0, 0.05, np.log(1.0), 0.0, 0.0, -np.inf, -reach]
     high = [np.inf, np.inf, np.log(1e2), np.inf, 3.0, np.log(1e9), np.inf, np.inf, np.inf, reach]

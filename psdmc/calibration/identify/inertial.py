@@ -1,6 +1,6 @@
-"""Step four: the inertial parameters from fast motion, relieved of what the steps before know, (21).
+"""Step four: the inertial parameters from fast motion, after the earlier steps' results are subtracted, (21).
 
-Every prediction passes through the same filter as the measurement, and at the same time: a current that is read late is
+Every prediction passes through the same filter as the measurement, with the same delay: a current that is read late is
 compared with a prediction read late.
 """
 
@@ -28,19 +28,19 @@ from psdmc.calibration.logs.log_checks import checked
 from psdmc.robot.mechanism import Mechanism
 
 FRICTION_STEP = 0.1
-"""Finite difference in standard deviations of a friction parameter, for its effect on the torque."""
+"""Step of the finite difference for a friction parameter's effect on the torque, in its standard deviations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InertialResult:
-    """theta_b complete.
+    """The complete theta_b.
 
-    theta_b      (l,)    gravity and inertial parameters together
-    covariance   (l, l)  with the uncertainty of torque constants, gravity and friction
-    identifiable (l,)
-    estimate     of psi, the parameters that gravity does not show
-    unseen       (l, k)  directions of theta_b that no run shows, SI, each as long as is believable
-    scale        (l,)    believable size of each base parameter
+    theta_b       (l,)    gravity and inertial parameters together
+    covariance    (l, l)  with the uncertainty of torque constants, gravity and friction
+    identifiable  (l,)
+    estimate      of psi, the parameters that gravity does not show
+    unseen        (l, k)  directions of theta_b that no run shows, SI, each as long as is believable
+    scale         (l,)    believable size of each base parameter
     """
 
     theta_b: Array
@@ -53,7 +53,7 @@ class InertialResult:
 
     @property
     def prior_covariance(self) -> Array:
-        """(l, l) what the prior leaves open where no run sees anything."""
+        """(l, l) covariance of the prior in the directions that no run shows."""
         return np.asarray(self.estimate.prior_std**2 * self.unseen @ self.unseen.T)
 
     @property
@@ -85,7 +85,7 @@ def calibrate_inertial(
     options: StepOptions,
     file_theta: Array | None = None,
 ) -> InertialResult:
-    """psi by linear least squares, and theta_b with what gravity found.
+    """psi by linear least squares, combined with the gravity parameters to theta_b.
 
     file_theta  the file's values, kept where the runs show nothing; None: zero
     """
@@ -114,7 +114,7 @@ def calibrate_inertial(
 
 
 def _believable(solved: Estimate) -> Array:
-    """Unseen directions, SI, as long as is believable."""
+    """Unseen directions, SI, scaled to believable lengths."""
     return np.asarray(solved.scale[:, None] * solved.unseen)
 
 
@@ -127,7 +127,8 @@ def judge_inertial(
     runs: Sequence[InertialRun],
     options: StepOptions,
 ) -> tuple[StepQuality, StepQuality]:
-    """What gravity and friction leave of the fast motion against inertia alone; and the whole torque."""
+    """Two qualities on the fast motion: of inertia alone, after gravity and friction are subtracted; and of the whole
+    torque."""
     split = gravity_split(chain, model, len(theta_b))
     rows = _stacked([_rows(chain, model, motors, friction, run, options, sensitive=False) for run in runs])
     still = split.from_phi() @ split.phi(theta_b)
@@ -155,7 +156,8 @@ def _rows(
     options: StepOptions,
     sensitive: bool = True,
 ) -> _Rows:
-    """`sensitive`: with noise columns and slopes of friction, which the fit needs and a prediction does not."""
+    """One run's rows. `sensitive` adds noise columns and slopes of friction, which a fit needs and a prediction does
+    not."""
     states = filtered(checked(run.log, chain, options.filter.cutoff), options.filter)
     at = thinned(states, options.filter)
     late = _Late(states, friction.delay, at)
@@ -186,13 +188,13 @@ def _rows(
 
 
 def _late_columns(model: Regressor, late: _Late, motion: tuple[Array, Array, Array]) -> Array:
-    """(rows, n, l) the regressor along a motion as the log would hold it."""
+    """(rows, n, l) the regressor along a motion, delayed and filtered like a log."""
     columns = model.regressor(*motion)
     return np.stack([late(columns[:, :, j]) for j in range(columns.shape[2])], axis=-1)
 
 
 class _Late:
-    """A prediction as the log would hold it: read late, filtered, one row per independent sample."""
+    """Turns a prediction into what a log would hold: delayed, filtered, one row per independent sample."""
 
     def __init__(self, states: States, delay: float, at: NDArray[np.intp]) -> None:
         self.states, self.delay, self.at = states, delay, at
@@ -227,7 +229,7 @@ def _friction_slopes(found: JointFriction, states: States, k: int, unmoved: Arra
 
 
 def _considered(motors: Motors, gravity: GravityResult, friction: FrictionResult, rows: _Rows) -> Consider:
-    """Effects of torque constants, phi and friction on (prediction - target); constants move all three."""
+    """Effects of torque constants, phi and friction on (prediction - target); constants change all three."""
     n = len(motors.relative_std)
     by_phi = rows.columns @ gravity.split.from_phi()
     moved = (rows.torque - rows.friction)[:, :, None] * np.eye(n)
@@ -261,7 +263,7 @@ def _combined(motors: Motors, gravity: GravityResult, friction: FrictionResult, 
 
 
 def _identifiable(gravity: GravityResult, solved: Estimate) -> NDArray[np.bool_]:
-    """A theta_b entry counts where all that it hangs on does."""
+    """An entry of theta_b is identifiable where all that it depends on is."""
     split = gravity.split
     seen = np.ones(len(split.pivots) + len(split.rest), dtype=bool)
     seen[split.rest] = solved.identifiable

@@ -1,4 +1,4 @@
-"""Blocks of a linear problem kept for several rounds: in memory while they are few, in a temporary file from then on."""
+"""Blocks of a linear problem kept for several rounds: in memory while they are few, then in a temporary file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BLOCK_SAMPLES = 2048
 
 
 class KeptRows:
-    """Rows of a problem: appended once, read as often as they are asked for.
+    """Rows of a problem: appended once, read repeatedly.
 
     n joints, l unknowns;  held  bytes in memory before a file is used
     """
@@ -32,7 +32,7 @@ class KeptRows:
         return self._columns.on_disk
 
     def append(self, columns: Array, noise: Array) -> None:
-        """(k, n, l) each: the columns, and what sensor noise alone would make of them."""
+        """(k, n, l) each: the columns, and the columns that sensor noise alone would give."""
         for store, values in ((self._columns, columns), (self._noise, noise)):
             store.append(np.ascontiguousarray(values.reshape(len(values), -1)))
 

@@ -1,4 +1,5 @@
-"""Linear estimation shared by the steps: weights, robustness, standard deviations, and what the data cannot see."""
+"""Linear estimation shared by the steps: weights, robustness, standard deviations, and directions that the data do not
+show."""
 
 from __future__ import annotations
 
@@ -23,10 +24,10 @@ class FitOptions:
     rounds          of reweighting
     huber           residual in standard deviations beyond which irls turns from squares to magnitudes: 1.345 keeps
                     95 % of least squares' efficiency where errors are normal
-    rank_tolerance  share of its own size by which a column may be wrong, beside its noise: differentiation and filters
+    rank_tolerance  share of its own size by which a column may be wrong, besides its noise: differentiation and filters
                     leave about 1e-4
     noise_ratio     how many times stronger than noise alone a direction must be: at ten, noise in the columns shrinks
-                    what is found by a tenth at most
+                    the result by a tenth at most
     seen            standard deviation, in units of the prior's scale, from which the data no longer show a direction
     unseen_share    share (squared, in the prior's units) of a parameter in unseen directions from which it is
                     unidentifiable
@@ -45,7 +46,7 @@ class FitOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Consider:
-    """What an earlier step left uncertain and this one takes as given: its effect is counted, not estimated.
+    """Quantities that an earlier step left uncertain and this one uses: their effect is counted, not estimated.
 
     columns     (N, n, k)  change of (prediction - target) per unit of each quantity
     covariance  (k, k)
@@ -57,7 +58,7 @@ class Consider:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """What is known before the data: where unseen directions stay, and in which units "near" is measured.
+    """The values before the data are seen: kept in unseen directions, with the units that measure distances from them.
 
     values  (l,)       the file's parameters, or zero
     scale   (l,)       positive: how far from them a parameter may believably lie
@@ -73,23 +74,22 @@ class Prior:
 class Estimate:
     """The solution of target = columns @ values. l unknowns, n joints, r directions seen.
 
-    values            (l,)      as near to the prior as the data allow: in unseen directions, on it
+    values            (l,)      by the data in seen directions; the prior's in unseen ones
     covariance        (l, l)    of the fit alone, widened where residuals are correlated; none in unseen directions
     considered        (l, k)    change of `values` per unit of what was considered; k may be 0
     total_covariance  (l, l)    with what was considered
     unseen            (l, l - r)  orthonormal directions that the data do not show, in units of `scale`
     scale             (l,)      the prior's, or the columns' where there is none
     prior_std         of unseen directions, in units of `scale`; zero without a prior
-    whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances: the data's where they see
-                                (its sum of squares over noise_factor^2), the prior's where not
+    whitening         (l, l)    W with |W (v - values)|^2 the cost of any v, in variances: the data's in seen directions
+                                (its sum of squares over noise_factor^2), the prior's in others
     identifiable      (l,)      whether the data see the parameter by itself
     singular_values   (l,)      of the weighted, column-scaled problem, descending
     rank              how many directions are seen
     sigma             (n,)      residual RMS per joint, target's unit
     weights           (N, n)    of the last round, one over unit; zero where a row did not count
     correlation       (n,)      of the residual from sample to sample: near zero for noise
-    noise_factor      by how much correlated residuals widened the standard deviation that they widened most; near one
-                      for noise
+    noise_factor      largest factor by which correlated residuals widened a standard deviation; near one for noise
     """
 
     values: Array
@@ -110,20 +110,20 @@ class Estimate:
 
     @property
     def prior_covariance(self) -> Array:
-        """(l, l) what the prior leaves open where the data see nothing."""
+        """(l, l) covariance of the prior in directions that the data do not show."""
         directions = self.scale[:, None] * self.unseen
         return np.asarray(self.prior_std**2 * directions @ directions.T)
 
     @property
     def std(self) -> Array:
-        """(l,) standard deviations with what was considered and what unseen directions leave open; infinite where
+        """(l,) standard deviations with what was considered and the prior's in unseen directions; infinite where
         unidentifiable."""
         variance = np.diag(self.total_covariance) + np.diag(self.prior_covariance)
         return np.where(self.identifiable, np.sqrt(np.maximum(variance, 0.0)), np.inf)
 
     @property
     def condition(self) -> float:
-        """Of the part that counts, columns scaled."""
+        """Condition number of the seen part, columns scaled."""
         return (
             float(self.singular_values[0] / self.singular_values[self.rank - 1])
             if self.rank
@@ -139,11 +139,11 @@ def estimate(
     use: NDArray[np.bool_] | None = None,
     prior: Prior | None = None,
 ) -> Estimate:
-    """Solve target = columns @ values in the least squares that the options name.
+    """The solution of target = columns @ values by the least squares that the options choose.
 
     columns  (N, n, l), target (N, n): samples that may be taken as independent (filter.thinned)
     use      (N, n)  entries that count; None: all
-    prior    None: zero, in units of the columns, and no bound on what is believable
+    prior    None: zero, in units of the columns, without a bound on believable values
     """
     noise = None if prior is None else prior.noise
     rows = [Block(columns, noise, None if consider is None else consider.columns)]
@@ -158,9 +158,9 @@ def estimate_rows(
     use: NDArray[np.bool_] | None = None,
     prior: Prior | None = None,
 ) -> Estimate:
-    """The same of columns that come block by block, and need not be held at once.
+    """The same solution for columns that come block by block and need not be held at once.
 
-    considered  (k, k)  covariance of what the blocks' `consider` columns belong to
+    considered  (k, k)  covariance of the quantities of the blocks' `consider` columns
     prior       whose noise is the blocks'
     """
     options = options or FitOptions()
@@ -181,7 +181,7 @@ def _level(weighted: Array, use: NDArray[np.bool_]) -> float:
 
 
 def _weights(residual: Array, use: NDArray[np.bool_], options: FitOptions) -> Array:
-    """(N, n) one over standard deviation, per joint; smaller for outliers with irls."""
+    """(N, n) weights: one over standard deviation, per joint; smaller for outliers with irls."""
     sigma = spread(residual, use)
     if options.method == "irls":
         size = np.nan_to_num(np.nanmedian(np.where(use, np.abs(residual), np.nan), axis=0))
@@ -194,17 +194,17 @@ def _weights(residual: Array, use: NDArray[np.bool_], options: FitOptions) -> Ar
 
 
 NUMERICAL = 1e-9
-"""Of the largest column: what rounding alone leaves of one."""
+"""Relative to the largest column: the size of a column that is rounding alone."""
 
 
 ROUNDING = 1e-12
-"""Share of a parameter in shown directions that is none: its value is then the prior's to the last digit."""
+"""Share of a parameter in seen directions that counts as none: its value is then exactly the prior's."""
 
 
 class _Solved:
     """One weighted solution, in units z of the prior: v = v0 + S z.
 
-    Directions in which the data are stronger than `_floor` are shown, the others hidden: hidden ones form a subspace,
+    Directions in which the data are stronger than `_floor` are shown, the others hidden. Hidden ones form a subspace,
     in which z = 0; the rest of z is the least-squares solution.
     """
 
@@ -249,8 +249,8 @@ class _Solved:
     def _floor(self, sizes: Array, scale: Array, noise: Array | None, level: float) -> Array:
         """(l, l), in the prior's units: the square of what a direction must exceed to be seen.
 
-        Noise in the columns, times the ratio asked for; the error of differentiation, a share of each column; and the
-        torque's noise, against the prior's scale.
+        It includes noise in the columns, times the ratio that the options ask for; the error of differentiation, a
+        share of each column; and the torque's noise, relative to the prior's scale.
         """
         options = self.options
         largest = float(sizes.max(initial=0.0)) or 1.0
@@ -299,13 +299,13 @@ class _Solved:
         )
 
     def _noise_factor(self, widened: Array, variance: float) -> float:
-        """The largest ratio of a standard deviation to what residuals taken as white would give."""
+        """The largest ratio of a standard deviation to that for white residuals."""
         white = variance * np.sum(self.inverse**2, axis=1)
         seen = np.flatnonzero((white > 0) & self.identifiable)
         return float(np.sqrt(np.max(widened[seen] / white[seen]))) if len(seen) else 1.0
 
     def _clusters(self, count: int) -> int:
-        """Stretches of time for robust standard deviations; none where there are too few rows."""
+        """Number of stretches of time for robust standard deviations; 0 where there are too few rows."""
         clusters = min(self.options.clusters, count // 4)
         return clusters if clusters >= FEWEST_CLUSTERS and self.rank else 0
 
@@ -321,4 +321,4 @@ class _Solved:
 
 
 FEWEST_CLUSTERS = 5
-"""Below these, stretches of time say nothing of a standard deviation."""
+"""Least number of stretches of time from which a standard deviation can be computed."""

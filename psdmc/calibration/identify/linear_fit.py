@@ -1,7 +1,7 @@
-"""Everything linear at once, from one log: base parameters, Coulomb and viscous friction, offsets.
+"""One linear fit of one log: base parameters, Coulomb and viscous friction, offsets.
 
-The alternative to the four steps where a robot gives a single exciting log and torques, or currents with known
-constants. Regressor and friction columns pass through the filter that the measurement passed through.
+The alternative to the four steps for a single exciting log with torques, or currents with known constants. Regressor
+and friction columns pass through the same filter as the measurement.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from psdmc.robot.mechanism import Mechanism
 
 @dataclass(frozen=True, slots=True)
 class LinearOptions:
-    """One log, one linear fit.
+    """Options of the linear fit of one log.
 
-    exponents       of the viscous terms |qd|^d sign(qd), each with a coefficient of its own; the first is `viscous`
-    sign_speed      rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
-    offset          whether each joint's torque has a constant of its own
-    stretch         rows of a log that are filtered at once
-    held_bytes      of columns that are held in memory; more of them go to a temporary file
+    exponents   of the viscous terms |qd|^d sign(qd), each with a coefficient of its own; the first is `viscous`
+    sign_speed  rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
+    offset      whether each joint's torque has a constant of its own
+    stretch     rows of a log that are filtered at once
+    held_bytes  of columns that are held in memory; more of them go to a temporary file
     """
 
     filter: FilterOptions = field(default_factory=lambda: FilterOptions(cutoff=8.0))
@@ -56,7 +56,8 @@ class LinearResult:
     """One vector: theta_b, then each joint's friction and offset.
 
     estimate   of the whole vector, without constraints
-    problem    what it was estimated from;  prior  where unseen directions stay
+    problem    the rows of the fit
+    prior      the values in unseen directions
     motors     that made torques of what was logged
     """
 
@@ -111,7 +112,7 @@ class LinearProblem:
 
     @property
     def never_negative(self) -> NDArray[np.bool_]:
-        """(l + n f,) friction other than offsets: it takes energy, whatever the data say."""
+        """(l + n f,) true for friction other than offsets, which only takes energy and may not be negative."""
         own = np.array([name != "offset" for name in self.friction] * len(self.chain), dtype=bool)
         return np.concatenate([np.zeros(self.l, dtype=bool), own])
 
@@ -162,7 +163,8 @@ def friction_names(exponents: Sequence[float], offset: bool) -> tuple[str, ...]:
 
 
 def friction_terms(qd: Array, sign_speed: float, exponents: Sequence[float], offset: bool) -> list[Array]:
-    """(N, n) each: what Coulomb friction, the viscous terms and the offset are multiplied with, before the filter."""
+    """(N, n) each: the factors of the coefficients of Coulomb friction, the viscous terms and the offset, before the
+    filter."""
     sign = np.tanh(qd / sign_speed)
     terms = [sign, *(sign * np.abs(qd) ** d for d in exponents)]
     return [*terms, np.ones_like(sign)] if offset else terms
@@ -177,7 +179,7 @@ def linear_problem(
     motors: Motors,
     progress: Callable[[str], None],
 ) -> tuple[LinearProblem, tuple[str, ...]]:
-    """The stack of all logs' independent samples, every log split on its own; and remarks on joints that rest."""
+    """The stacked independent samples of all logs, each log split separately; and remarks on joints that rest."""
     names = friction_names(options.exponents, options.offset)
     rows = KeptRows(len(chain), l + len(chain) * len(names), options.held_bytes)
     torques, outs, remarks = [], [], []
@@ -197,7 +199,7 @@ def linear_problem(
 
 
 def _ripples(log: AnyLog, states: States, options: LinearOptions) -> list[str]:
-    """Names the joints that move by no more than noise, where the log's own check did not call them still."""
+    """Remarks on joints that move by no more than noise, where the log's own check did not find them at rest."""
     found = [
         f"{name} ({size:.1e} rad)" if name not in (log.sliding or ()) else f"{name} ({size:.1e} m)"
         for name, size, rests in zip(log.joint_names, states.motion, states.still, strict=True)
@@ -211,7 +213,8 @@ def _ripples(log: AnyLog, states: States, options: LinearOptions) -> list[str]:
 def _columns(
     model: Regressor, states: States, at: NDArray[np.intp], options: LinearOptions
 ) -> tuple[Array, Array]:
-    """(rows, n, l + n f) filtered like the torque; and what another draw of the position noise adds to it."""
+    """(rows, n, l + n f) columns, filtered like the torque; and the change of them by another draw of the position
+    noise."""
     measured = (states.q, states.qd, states.qdd)
     jittered = states.jittered()
     plain = _filtered_columns(model, states, measured, at, options)

@@ -1,4 +1,5 @@
-"""Rows of a linear problem block by block, and what a fit needs of them: sums, so that no fit holds all rows at once."""
+"""Rows of a linear problem block by block, and the sums that a fit needs of them, so that no fit holds all rows at
+once."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ class Block:
     """Some samples of a linear problem. N samples, n joints, l unknowns.
 
     columns   (N, n, l)
-    noise     (N, n, l)  what the sensors' noise alone would make of the columns; None: nothing
+    noise     (N, n, l)  the columns that the sensors' noise alone would give; None: none
     consider  (N, n, k)  columns of what is uncertain and not estimated (least_squares.Consider); None: nothing
     """
 
@@ -29,14 +30,14 @@ class Block:
 
 
 class Rows(Protocol):
-    """Blocks of a problem, in the order of its samples; as often as they are asked for."""
+    """Blocks of a problem, in the order of its samples; may be iterated repeatedly."""
 
     def __iter__(self) -> Iterator[Block]: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """Weighted rows A and targets y as their triangle: R'R = A'A.
+    """Weighted rows A and targets y in triangular form: R'R = A'A.
 
     factor  (l, l)  R
     onto    (l,)    R^-T A'(y - A start)
@@ -49,7 +50,7 @@ class Reduced:
 
 
 def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> Reduced:
-    """The triangle of all blocks; one block's rows and the triangle are all that is held.
+    """The triangular form of all blocks; only one block's rows and the triangle are held at a time.
 
     target, weights (N, n);  start (l,) from which targets are counted; None: zero
     """
@@ -70,7 +71,7 @@ def reduced(rows: Rows, target: Array, weights: Array, start: Array | None) -> R
 
 
 def residual_of(rows: Rows, target: Array, values: Array) -> Array:
-    """(N, n) target less what these values make of the columns."""
+    """(N, n) target less columns @ values."""
     residual = np.empty_like(target)
     for block, own in _with_rows(rows):
         residual[own] = target[own] - block.columns @ values
@@ -79,7 +80,7 @@ def residual_of(rows: Rows, target: Array, values: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collected:
-    """Sums over weighted rows that standard deviations are made of.
+    """Sums over weighted rows for standard deviations.
 
     squares   (n, l, l)  A'A of each joint's rows
     scores    (c, l)     A' of the weighted residual, per stretch of time
@@ -92,7 +93,7 @@ class Collected:
 
 
 def collected(rows: Rows, weights: Array, weighted: Array, clusters: int) -> Collected:
-    """`weighted` (N, n) residual; `clusters` stretches of time, 0: none."""
+    """The sums. `weighted` (N, n) is the residual; `clusters` the number of stretches of time, 0: none."""
     count, n = weighted.shape
     squares, scores, consider = np.zeros((n, 0, 0)), np.zeros((clusters, 0)), np.zeros((0, 0))
     for block, own in _with_rows(rows):

@@ -63,7 +63,7 @@ PARAMETERS = tuple(field.name for field in fields(Lugre))
 
 @dataclass(frozen=True, slots=True)
 class LugreView:
-    """What the templates fill in: the number type, its functions and a prefix for names."""
+    """The data of the templates: the number type, its functions and a prefix for names."""
 
     real: str = "double"
     prefix: str = ""

@@ -20,9 +20,9 @@ from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
 STEADY = 0.9
-"""Share of the sweep's typical speed below which a sample belongs to a turn."""
+"""Share of the sweep's typical speed below which a sample belongs to a reversal."""
 SMALLEST_SHARE = 20.0
-"""A joint is reached by a load whose torque stands this many residuals above the noise, over all samples."""
+"""Least ratio of a load's torque to the residuals' noise, over all samples, for the load to count as reaching a joint."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +73,7 @@ def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOp
 def judge_motors(
     chain: Mechanism, runs: Sequence[MotorRun], options: StepOptions, constants: Mapping[str, float]
 ) -> StepQuality:
-    """The known load's torque against what these constants (N m/A, by joint name) say of the current that it adds."""
+    """Quality of the known load's torque against these constants (N m/A, by joint name) times the current that it adds."""
     joints: dict[str, JointQuality] = {}
     samples: list[Sample] = []
     for k, joint in enumerate(chain.joints):
@@ -104,7 +104,7 @@ def _sweeps(
 
 
 def _slope(x: Array, y: Array) -> tuple[float, float]:
-    """Of y = slope x, and its standard deviation, widened where the residual is correlated along x."""
+    """The slope of y = slope x, and its standard deviation, widened where the residual is correlated along x."""
     power = float(x @ x)
     if power == 0 or len(x) < 3:
         return 0.0, np.inf
@@ -116,7 +116,8 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
 
 
 def _added(chain: Mechanism, k: int, run: MotorRun, options: StepOptions) -> tuple[Array, Array, Array]:
-    """Angle, load torque (N m) and current that the load adds (A), both ways averaged so that friction cancels."""
+    """Angle, load torque (N m) and current that the load adds (A), averaged over both directions so that friction
+    cancels."""
     unloaded, loaded = (_both_ways(chain, k, log, options.filter) for log in (run.unloaded, run.loaded))
     low = max(unloaded[0][0], loaded[0][0])
     high = min(unloaded[0][-1], loaded[0][-1])
@@ -134,7 +135,7 @@ def _added(chain: Mechanism, k: int, run: MotorRun, options: StepOptions) -> tup
 
 
 def _both_ways(chain: Mechanism, k: int, log: Log, options: FilterOptions) -> tuple[Array, Array, Array]:
-    """Angle, current averaged over both directions there, and the pose of the other joints."""
+    """Angle, current averaged over both directions at that angle, and the pose of the other joints."""
     log = checked(log, chain, options.cutoff)
     if log.quantity != "current":
         raise InputError(

@@ -1,4 +1,5 @@
-"""Which torque constants turn logs into torques: those given are held against the joints and against what logs hold."""
+"""Torque constants that turn logs into torques: given ones are checked against the joints and the quantities of the
+logs."""
 
 from __future__ import annotations
 
@@ -34,7 +35,7 @@ def require_constants(constants: Mapping[str, float], joint_names: Sequence[str]
 
 
 def one_quantity(logs: Sequence[AnyLog]) -> Quantity:
-    """What all the logs hold; InputError names those that hold something else."""
+    """The quantity that all logs hold; InputError names those that hold another."""
     by_quantity: dict[Quantity, list[str]] = {}
     for log in logs:
         by_quantity.setdefault(log.quantity, []).append(log.name)
@@ -53,7 +54,8 @@ def motors_of_logs(
     """Torque per logged unit for plain logs.
 
     constants   N m/A by joint name, for logs that hold currents
-    InputError where they are given for torques, are missing for currents, or the logs hold different things.
+
+    Raises InputError where they are given for torques, are missing for currents, or the logs hold different quantities.
     """
     require_constants(constants or {}, joint_names)
     quantity = one_quantity(logs)

@@ -1,4 +1,4 @@
-"""From what was logged to motor torque, and how well that is known."""
+"""Motor torque from logged effort, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Motors:
 
     @staticmethod
     def torques(n: int) -> Motors:
-        """For logs that hold torques."""
+        """The motors of logs that hold torques: constants of one."""
         return Motors(np.ones(n), np.zeros(n))
 
     def torque(self, effort: Array) -> Array:

@@ -1,7 +1,7 @@
 """Physically consistent parameters: every link's pseudo-inertia positive definite, every drive inertia positive.
 
-Wensing, Kim, Slotine 2018: a link is a distribution of mass just when the 4 x 4 matrix of its integrals of 1, r and r r^T
-is positive. Then the mass matrix is positive definite everywhere, and forward dynamics exist.
+Wensing, Kim, Slotine 2018: parameters belong to a distribution of mass exactly where the 4 x 4 matrix of its integrals
+of 1, r and r r^T is positive. Then the mass matrix is positive definite everywhere, and forward dynamics exist.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 SETTLING = 1e-6
-"""Pull towards the prior's standard parameters (SI, squared) beside a squared standard deviation: settles what theta_b
-leaves open, moves nothing that it fixes."""
+"""Weight of the distance from the prior's standard parameters (SI, squared), relative to a squared standard deviation:
+it determines what theta_b leaves open and changes nothing that theta_b fixes."""
 
 
 class NotPhysical(InputError):
@@ -33,13 +33,13 @@ class NotPhysical(InputError):
 
 @dataclass(frozen=True, slots=True)
 class PhysicalOptions:
-    """How far inside, and how near to the file's bodies.
+    """Bounds of the physical estimate, and weights of the distance from the file's bodies.
 
     smallest        eigenvalue of each link's pseudo-inertia, kg with lengths in units of 0.1 m
     smallest_drive  kg m^2, of each drive inertia that is a parameter
     known_body      variances that one unit of divergence from the file's body costs (Lee, Wensing, Park 2020: the
                     divergence of one distribution of mass from another, the same in any unit and frame)
-    unknown_body    likewise from an ordinary body, where the file has none: enough to keep off the boundary
+    unknown_body    the same for an ordinary body, where the file has none: enough to stay off the boundary
     """
 
     smallest: float = 1e-6
@@ -79,8 +79,9 @@ def nearest_physical(
     values          (l + k,)  theta_b and whatever was estimated with it, friction and offsets
     whitening       (l + k, l + k)  W: the cost of v is |W (v - values)|^2, in variances (Estimate.whitening)
     never_negative  (l + k,)  entries that may not be negative
-    For a linear fit that cost is what v adds to its sum of squares: one problem, its weights, and the prior where the
-    data see nothing. InputError where cvxpy is missing, NotPhysical where no solution is found.
+
+    For a linear fit that cost is what v adds to its sum of squares: one problem with its weights, and the prior where
+    the data show nothing. Raises InputError where cvxpy is missing, NotPhysical where no solution is found.
     """
     cp: Any = require_cvxpy()
     bounded = np.zeros(len(values), dtype=bool) if never_negative is None else never_negative
@@ -96,8 +97,9 @@ def nearest_physical(
 
 
 EASED = (1.0, 0.1, 0.01, 1e-3)
-"""Shares of the fit's certainty that are tried: where it contradicts every body by ten thousand standard deviations,
-no solver weighs it against a body's shape; with less certainty it can, and the answer hardly differs."""
+"""Shares of the fit's certainty that are tried. Where the fit contradicts every body by ten thousand standard
+deviations, no solver can weigh it against a body's shape; with less certainty it can, and the solution hardly
+differs."""
 
 
 def _nearest(
@@ -108,7 +110,7 @@ def _nearest(
     bounded: NDArray[np.bool_],
     options: PhysicalOptions,
 ) -> Physical:
-    """One attempt; NotPhysical where the solver has no answer, or its answer is none."""
+    """The solution of one attempt; NotPhysical where the solver finds none, or one that is not physical."""
     l, span = model.l, model.mechanism.parameter_span
     inner = cp.Variable(span.shape[1])
     size = 1.0 / np.linalg.norm(whitening, axis=0)[l:]
@@ -160,7 +162,8 @@ def _known_inner(model: DynamicsModel) -> Array:
 
 
 def _require_physical(model: DynamicsModel, x: Array) -> None:
-    """The solver's word, held against the pseudo-inertias themselves; none may be negative beyond rounding."""
+    """NotPhysical unless the solution's pseudo-inertias have no negative eigenvalue beyond rounding, whatever the
+    solver reports."""
     for joint, link in zip(model.mechanism.joints, x.reshape(-1, PARAMETERS_PER_LINK), strict=True):
         matrix = np.zeros((4, 4))
         matrix[:3, :3] = second_moments(inertia_matrix(link))
@@ -174,17 +177,17 @@ def _require_physical(model: DynamicsModel, x: Array) -> None:
 
 
 SOLVER_SLACK = 1e-5
-"""Of the largest friction or offset: by this much the solver may leave a bound, and it then counts as kept."""
+"""Share of the largest friction or offset by which the solver may exceed a bound; the bound then counts as kept."""
 ROUNDING = 1e-7
 """Negative eigenvalue of a pseudo-inertia, relative to its largest entry, that counts as zero: the solver keeps
-constraints to 1e-8. The mass matrix is tested by itself."""
+constraints to 1e-8. The mass matrix is checked separately."""
 
 
 def _link_terms(
     cp: Any, model: DynamicsModel, x: Any, link: int, options: PhysicalOptions
 ) -> tuple[list[Any], Any]:
-    """Constraints, pseudo-inertia above its bound, and divergence from the file's body; a link that the chain assumes
-    massless has neither."""
+    """Constraints, pseudo-inertia above its bound, and divergence from the file's body; none of them for a link that
+    the chain assumes massless."""
     start = PARAMETERS_PER_LINK * link
     span: Array = model.mechanism.parameter_span
     constraints: list[Any] = []
@@ -203,7 +206,8 @@ def _link_terms(
 
 
 def _pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
-    """Of m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz; metres to tenths: entries of one size, which the solver likes."""
+    """The pseudo-inertia of m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in units of 0.1 m: entries of similar size suit
+    the solver."""
     m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = link
     half = 0.5 * (ixx + iyy + izz)
     t = 10.0
@@ -216,7 +220,7 @@ def _pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
 
 
 def _reference_body(link: Array, held: list[int], options: PhysicalOptions) -> tuple[Array, float]:
-    """The body that a link should resemble, and how much that counts: the file's, or an ordinary one."""
+    """The body that a link should resemble, and the weight of that: the file's body, or an ordinary one."""
     if not np.isfinite(link[:10]).all() or not link[0] > 0:
         return np.diag([ORDINARY_BODY[k] for k in held]), options.unknown_body
     body = np.array(_pseudo_inertia(link[:10].tolist()))[np.ix_(held, held)]
@@ -225,7 +229,7 @@ def _reference_body(link: Array, held: list[int], options: PhysicalOptions) -> t
 
 
 def _flat_rows(span: Array, start: int) -> list[int]:
-    """Rows of a pseudo-inertia that are zero in any body that the assumptions allow: a link without moment of inertia
+    """Rows of a pseudo-inertia that are zero in any body that the assumptions allow. A link without moment of inertia
     about an axis has no extent across it, whatever its other moments are (a rod along x where Ixx is assumed zero)."""
     rows: set[int] = set()
     for axis, inertia in enumerate((4, 6, 9)):

@@ -1,4 +1,5 @@
-"""Physical consistency of the four steps: theta_b and LuGre friction as one vector, each step's own cost, one problem."""
+"""Physical consistency of the four steps: theta_b and LuGre friction as one vector and one problem, with each step's
+own cost."""
 
 from __future__ import annotations
 
@@ -17,21 +18,23 @@ from psdmc.model.dynamics_model import DynamicsModel
 
 SEVEN = 7
 NEVER_NEGATIVE = (True, True, False, True, True, False, True)
-"""Of F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1: then v_s and sigma_0 are positive, and F_s >= F_c."""
+"""Of F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1. By the logarithms v_s and sigma_0 are positive; F_s >= F_c."""
 NEAR = 0.5
-"""Step sizes by which a friction parameter that its run does not show may move: the relative standard deviation from
+"""Step sizes by which a friction parameter may change that its run does not show: the relative standard deviation from
 which it is called unseen."""
 HELD = 1e-6
-"""Step sizes by which a parameter that the friction law fixes may move: none, to the solver's accuracy."""
+"""Step sizes by which a parameter may change that the friction law fixes: none, to the solver's accuracy."""
 SMALLEST = np.array([1e-9, 0.0, -np.inf, 0.0, 0.05, -np.inf, 0.0])
-"""Of the seven, as the friction run's own bounds: what the solver leaves on a bound becomes a LuGre law all the same."""
+"""Of the seven, as the friction run's own bounds, so that a value that the solver leaves on a bound is a LuGre law."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicalSteps:
-    """What the four steps found, moved to where a robot can be.
+    """The four steps' result, moved to values that a robot can have.
 
-    theta_b   (l,);  found  with friction moved along;  distance  from the unconstrained vector, in standard deviations
+    theta_b   (l,)
+    found     the steps' result with friction moved along
+    distance  from the unconstrained vector, in standard deviations
     """
 
     theta_b: Array
@@ -45,8 +48,8 @@ def physical_steps(
     """The vector of theta_b and every joint's seven LuGre parameters that a robot can have, nearest to the four steps'.
 
     The cost of a change is the sum of the steps' own: gravity's of phi, friction's of each joint's seven, and the
-    inertial step's of psi, whose estimate moves with phi and friction. So friction follows where theta_b has to move,
-    as far as its own run lets it. Torque constants stay what a known load says they are.
+    inertial step's of psi, whose estimate changes with phi and friction. So friction follows where theta_b has to
+    change, as far as its own run allows. Torque constants stay those of the known load.
     """
     joints = found.friction.joints
     unknowns = {name: unknowns_of(joint)[:SEVEN] for name, joint in joints.items()}
@@ -95,7 +98,7 @@ def _whitening(found: FourSteps, size: int) -> Array:
 
 
 def _friction_rows(joint: JointFriction, turn: Array) -> Array:
-    """(14, 7) of one joint: its run's cost, and a pull that holds what the run does not show."""
+    """(14, 7) of one joint: its run's cost, and rows that keep the values that the run does not show."""
     back = np.linalg.inv(turn)
     covariance = back @ joint.covariance @ back.T
     free = np.flatnonzero(np.diag(covariance) > 0)

@@ -1,4 +1,5 @@
-"""What a calibrated model file says, beside theta_b, of how torques are predicted: enough to judge it by logs alone."""
+"""The numbers of a torque prediction other than theta_b, kept in a calibrated model file: enough to judge it by logs
+alone."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ Law = Literal["linear", "lugre"]
 
 @dataclass(frozen=True, slots=True)
 class FrictionRunConstants:
-    """What belongs to a joint's friction run and not to its friction: inertia in that pose (kg m^2), constant torque
-    (N m), and the time between position and current (s)."""
+    """Constants of a joint's friction run that are not friction: inertia in that pose (kg m^2), constant torque (N m),
+    and the time between position and current (s)."""
 
     inertia: float
     offset: float

@@ -1,4 +1,4 @@
-"""What calibration asks of a model: its regressor. Compiled robots have it; here is one straight from the recursion."""
+"""The regressor that calibration needs of a model. Compiled robots have it; here is one from the recursion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Regressor(Protocol):
 
 
 class ChainRegressor:
-    """The regressor of a model by Newton-Euler on arrays of states: no compiler needed."""
+    """The regressor of a model by Newton-Euler on arrays of states; needs no compiler."""
 
     def __init__(self, model: DynamicsModel) -> None:
         chain = model.mechanism
@@ -46,9 +46,9 @@ class ChainRegressor:
 
 
 def expansion(model: DynamicsModel) -> Array:
-    """(11 n, l) standard parameters, within the chain's span, that a theta_b stands for: B @ expansion = identity.
+    """(11 n, l) standard parameters, within the chain's span, from theta_b: B @ expansion = identity.
 
-    Where B is in echelon form, its unit columns do it sparsely.
+    Where B is in echelon form, its unit columns give sparse ones.
     """
     span = model.mechanism.parameter_span
     reduced = model.B @ span
@@ -63,7 +63,7 @@ def expansion(model: DynamicsModel) -> Array:
 
 
 def gravity_regressor(model: Regressor, q: Array) -> Array:
-    """Y_grav(q), (..., n, l): the model's gravity functions alone."""
+    """Y_grav(q), (..., n, l): the regressor of gravity alone."""
     still = np.zeros_like(q)
     return model.regressor(q, still, still)
 

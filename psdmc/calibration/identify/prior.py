@@ -1,4 +1,4 @@
-"""What is believable of parameters before any fit: the file's values, and how far from them they may lie."""
+"""Believable values of parameters before any fit: the file's, and how far from them the truth may lie."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from psdmc.robot.mechanism import Mechanism
 STATES = 200
 SEED = 51_407
 ORDINARY_SPEED = 1.0
-"""rad/s, m/s: what a robot does without haste."""
+"""rad/s, m/s: an ordinary speed of a robot."""
 ORDINARY_ACCELERATION = 5.0
-"""rad/s^2, m/s^2: likewise."""
+"""rad/s^2, m/s^2: an ordinary acceleration."""
 QUIET_JOINT = 0.02
-"""Share of the largest joint torque that every joint is granted: one that carries nothing shows only noise."""
+"""Least share of the largest joint torque that every joint gets as its size: one that carries nothing shows only noise."""
 NO_EFFECT = 1e-9
-"""Share of a column's largest entry below which it does not act on a joint."""
+"""Share of a column's largest entry below which the parameter has no effect on a joint."""
 
 
 def torque_sizes(torque: Array) -> Array:
@@ -27,7 +27,8 @@ def torque_sizes(torque: Array) -> Array:
 
 
 def base_parameter_scale(chain: Mechanism, model: Regressor, sizes: Array, theta_b: Array | None) -> Array:
-    """(l,) believable size of each base parameter: what would explain a joint's whole torque in an ordinary motion.
+    """(l,) believable size of each base parameter: the value that would explain a joint's whole torque in an ordinary
+    motion.
 
     sizes    (n,) N m, of the joints' torques
     theta_b  the file's values, which are believable themselves; None where it has none

@@ -1,4 +1,4 @@
-"""How well a prediction meets what was measured."""
+"""The quality of a prediction: RMSE and R^2."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Quality:
 
 
 def quality(measured: Array, predicted: Array) -> Quality:
-    """Of one joint, (N,) each: R^2 = 1 - sum of squared errors over that about the mean."""
+    """The quality of one joint, (N,) each: R^2 = 1 - sum of squared errors over that about the mean."""
     if len(measured) == 0:
         return Quality(float("nan"), float("nan"))
     error = float(np.mean((measured - predicted) ** 2))
@@ -27,5 +27,5 @@ def quality(measured: Array, predicted: Array) -> Quality:
 
 
 def qualities(measured: Array, predicted: Array) -> tuple[Quality, ...]:
-    """Of every joint, (N, n) each."""
+    """The quality of every joint, (N, n) each."""
     return tuple(quality(measured[:, k], predicted[:, k]) for k in range(measured.shape[1]))

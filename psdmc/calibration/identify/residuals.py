@@ -1,4 +1,4 @@
-"""What residuals say of a fit: their size, whether they are noise, and how many samples they are worth."""
+"""Statistics of a fit's residuals: their size, whether they are noise, and how many independent samples they count as."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from psdmc.calibration.logs.log import Array
 
 
 class Judged(Protocol):
-    """A solution that knows how its residuals hang together: least_squares.Estimate."""
+    """A solution with the correlation of its residuals: least_squares.Estimate."""
 
     @property
     def correlation(self) -> Array: ...
@@ -36,17 +36,18 @@ def sample_correlation(residual: Array, use: NDArray[np.bool_]) -> Array:
 
 
 SURELY = 0.999
-"""Largest correlation that is believed: closer to one, a log is too short to tell."""
+"""Largest correlation that is used: where it is closer to one, the log is too short."""
 FEWEST_PAIRS = 20
-"""Pairs of samples below which a lag's correlation is not looked at."""
+"""Pairs of samples below which a lag's correlation is not computed."""
 
 
 def widening(residual: Array, use: NDArray[np.bool_]) -> Array:
-    """(n,) by how much correlated residuals widen standard deviations: the root of samples per effective sample, >= 1.
+    """(n,) factor by which correlated residuals widen standard deviations: the root of samples per effective sample, >=
+    1.
 
-    The larger of two counts. An autoregressive process with the lag-one correlation r has (1 + r) / (1 - r) samples per
-    effective one; any stationary process has 1 + 2 sum of its correlations, summed in pairs until the first that is
-    not positive (Geyer 1992). The former is right of short logs, the latter sees noise of several time scales.
+    The larger of two estimates. An autoregressive process with the lag-one correlation r has (1 + r) / (1 - r) samples
+    per effective one; any stationary process has 1 + 2 sum of its correlations, summed in pairs until the first that is
+    not positive (Geyer 1992). The former is right for short logs, the latter for noise of several time scales.
     """
     first = np.clip(sample_correlation(residual, use), 0.0, SURELY)
     each = [_samples_per_effective(residual[:, k], use[:, k]) for k in range(residual.shape[1])]
@@ -70,13 +71,13 @@ def _samples_per_effective(residual: Array, use: NDArray[np.bool_]) -> float:
 
 
 CORRELATED = 0.5
-"""Correlation of neighbouring residuals above which they are called no noise: filtered white noise gives 0 +- 0.1."""
+"""Correlation of neighbouring residuals above which they are not noise: filtered white noise gives 0 +- 0.1."""
 NOISY = 1.7
 """Widening from which a fit is said to lack something: white residuals of short logs reach 1.3."""
 
 
 def noise_warnings(step: str, joint_names: Sequence[str], solved: Judged) -> tuple[str, ...]:
-    """Says so where residuals are no noise: the model lacks something, and standard deviations were widened for it."""
+    """Warnings where residuals are not noise: the model lacks an effect, and standard deviations were widened for it."""
     found = [
         (name, rho) for name, rho in zip(joint_names, solved.correlation, strict=True) if rho > CORRELATED
     ]

@@ -1,4 +1,4 @@
-"""What the four steps are given and what they hand on: runs, options, results."""
+"""Inputs and results that the four steps share: runs, options, qualities."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class MotorRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GravityRun:
-    """All joints at constant speeds, then the same path backwards; `tool` is what the tip carries, if known."""
+    """All joints at constant speeds, then the same path backwards; `tool` is the known load at the tip, if any."""
 
     log: Log
     tool: Load | None = None
@@ -70,9 +70,9 @@ class StepOptions:
 
 @dataclass(frozen=True, slots=True)
 class FrictionOptions:
-    """How the seven are found.
+    """How the seven LuGre parameters are found.
 
-    law             lugre: all seven; coulomb_viscous: F_c and a linear F_v, for those who want no more
+    law             lugre: all seven; coulomb_viscous: F_c and a linear F_v only
     fast            speed above which pre-sliding is ignored in the first step, share of the run's largest
     sliding         speed above which plain friction is fitted, share of the run's largest
     simplex_steps   largest number of Nelder-Mead evaluations
@@ -96,8 +96,8 @@ class FrictionOptions:
 class CalibrationOptions:
     """All four steps, with the cut-offs of Denso-2022.
 
-    passes   how often gravity, friction and inertia are gone through: from the second on, the gravity step is
-             relieved of the inertial torque that the first one found (the paper's single pass neglects it)
+    passes   how often gravity, friction and inertia are repeated: from the second pass on, the inertial torque of the
+             first is subtracted in the gravity step (the paper's single pass neglects it)
     """
 
     motor: StepOptions = field(default_factory=lambda: StepOptions(FilterOptions(cutoff=4.0)))

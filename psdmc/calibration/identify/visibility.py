@@ -1,4 +1,4 @@
-"""Which unknowns the data show: by themselves, weakly, only together with others, or not at all."""
+"""Which unknowns the data show: alone, weakly, only in combination with others, or not at all."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ IDENTIFIED = "identified"
 WEAK = "weakly visible"
 TOGETHER_WORDS = "only in combination with "
 WEAK_SHARE = 0.5
-"""Standard deviation, as a share of the value, from which a parameter is called weakly visible: its sign is then known
-with two standard deviations at most."""
+"""Standard deviation, as a share of the value, from which a parameter is called weakly visible: its sign is then
+certain by two standard deviations at most."""
 INVISIBLE_SHARE = 0.9999
-"""Share (squared) of a parameter in unseen directions from which nothing of it is seen: a hundredth may leak."""
+"""Share (squared) of a parameter in unseen directions from which it is not seen at all: a hundredth may remain."""
 TOGETHER = 0.2
-"""Correlation within unseen directions from which two parameters are said to show together."""
+"""Correlation within unseen directions from which two parameters are said to be visible in combination only."""
 NAMED = 4
 """Partners that a message names."""
 
@@ -47,8 +47,9 @@ def visibility(
 ) -> Visibility:
     """Words for every unknown.
 
-    values, std   (m,)  delivered;  unseen  (m, k)  directions in units of what is believable
-    kept_at       (m) where each stays where it is unseen, in words
+    values, std   (m,)    delivered
+    unseen        (m, k)  directions in units of what is believable
+    kept_at       (m)     where each is kept if it is unseen, in words
     """
     limit = (options or FitOptions()).unseen_share
     share = np.minimum(np.sum(unseen**2, axis=1), 1.0)
@@ -98,7 +99,7 @@ def visibility_warnings(step: str, names: Sequence[str], found: Visibility) -> t
 
 
 def weak_notes(step: str, names: Sequence[str], found: Visibility) -> tuple[str, ...]:
-    """Names what the data fix, but hardly better than its own size."""
+    """Notes that name the unknowns that the data fix hardly better than to their own size."""
     weak = [name for name, words in zip(names, found.words, strict=True) if words == WEAK]
     if not weak:
         return ()
