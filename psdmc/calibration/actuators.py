@@ -1,4 +1,4 @@
-"""C for what a calibrated robot has beside its rigid bodies: LuGre friction and motors."""
+"""C code for LuGre friction and motors of a calibrated robot, beside that for its rigid bodies."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from psdmc.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class ActuatorView(LugreView):
-    """What the templates see. Every joint has friction; torque constants (N m/A) may be missing, all or none."""
+    """The data of the templates. Every joint has friction; torque constants (N m/A) may be missing, all or none."""
 
     robot: str = "robot"
     joint_names: tuple[str, ...] = ()

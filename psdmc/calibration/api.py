@@ -1,4 +1,4 @@
-"""`psdmc.calibrate`: what `import psdmc` offers of this stage, which is loaded when it is called."""
+"""`psdmc.calibrate`. The rest of this stage is loaded when it is called."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ def calibrate(
     options: CalibrateOptions | None = None,
     torque_constants: Mapping[str, float] | None = None,
 ) -> Calibration:
-    """The calibrated model, what was found, and the verdict on it, from a campaign's folder or from logs.
+    """The calibrated model, the identified values, and the verdict on them, from a campaign's folder or from logs.
 
     The result's `verdict.word` is "usable", "usable, with doubts" or "not usable"; `verdict.reasons`, `.suspects` and
     `.doubts` say why, `.model` is the calibrated model whatever the verdict.
 
-    torque_constants   N m/A by joint name, for plain logs that hold currents and joints that no load reaches
-    InputError where a file is missing or a log cannot be read.
+    torque_constants   N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
+
+    Raises InputError where a file is missing or a log cannot be read.
     """
     from psdmc.calibration.calibrate import calibrate as run
 

@@ -35,12 +35,14 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class CalibrateOptions:
-    """Everything `psdmc calibrate` can be told.
+    """Options of `psdmc calibrate`.
 
-    physical   whether the result must be what a robot can have: links of positive mass distribution, drive inertias
-               and friction not negative; False shows the unconstrained fit
-    campaign   options of the four steps;  linear  of the linear fit;  consistency  of the physical estimate
-    verdict    limits of the verdict
+    physical     whether the result must be possible for a robot: links with a distribution of mass, drive inertias and
+                 friction not negative; False shows the unconstrained fit
+    campaign     options of the four steps
+    linear       options of the linear fit
+    consistency  options of the physical estimate
+    verdict      limits of the verdict
     """
 
     physical: bool = True
@@ -62,8 +64,9 @@ def calibrate(
     """Calibrate a model from a campaign (its folder or campaign.toml) or from plain logs.
 
     regressor         the compiled model where there is one; else Newton-Euler on arrays
-    torque_constants  N m/A by joint name, for plain logs that hold currents and joints that no load reaches
-    InputError where a file is missing or a log cannot be used.
+    torque_constants  N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
+
+    Raises InputError where a file is missing or a log cannot be used.
     """
     options = options or CalibrateOptions()
     if options.physical:
@@ -95,7 +98,8 @@ def calibrate_campaign(
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
 ) -> Calibration:
-    """The four steps; what they found, or the nearest that is physical, as their uncertainties and the prior measure."""
+    """The result of the four steps; if physical, the physically consistent values nearest to it, in the metric of its
+    uncertainties and the prior."""
     progress("checking logs")
     logs = checked_runs(model.mechanism, runs, options.campaign)
     found = calibrate_four_steps(
@@ -121,7 +125,7 @@ def calibrate_campaign(
 def _physical(
     plain: Calibration, consistent: Callable[[], Calibration], options: CalibrateOptions, progress: Progress
 ) -> Calibration:
-    """The physically consistent record where it is wanted and there is one; else the bare fit's, which says so."""
+    """The physically consistent record where it is wanted and exists; else the unconstrained fit's, with a note."""
     if not options.physical:
         return plain
     progress("physical consistency")
@@ -139,7 +143,7 @@ def calibrate_logs(
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
 ) -> Calibration:
-    """Everything linear at once: one vector of theta_b, friction and offsets."""
+    """The result of one linear fit: theta_b, friction and offsets as one vector."""
     motors = motors_of_logs(model.joint_names, logs, torque_constants)
     progress("linear fit")
     linear = options.linear

@@ -1,4 +1,4 @@
-"""A calibration campaign: which motions to run, what to hang on the tip, and where the logs are expected.
+"""A calibration campaign: its motions, the load to fix at the tip, and the place of its logs.
 
 A campaign is a folder: `campaign.toml` lists the runs, `trajectories/` holds their motions, `logs/` receives what the
 robot (or `psdmc simulate`) measured.
@@ -39,14 +39,15 @@ from psdmc.robot.mechanism import Mechanism
 
 Progress = Callable[[str], None]
 LARGEST_ACCELERATION = 1e6
-"""rad/s^2 or m/s^2: beyond any joint."""
+"""rad/s^2 or m/s^2: above any joint's."""
 
 
 @dataclass(frozen=True, slots=True)
 class CampaignOptions:
-    """What a campaign consists of.
+    """Options of a campaign's plan.
 
-    load          kg and centre of mass (m, tip frame) of the motor step's mass; beside the last axis, so that it is felt
+    load          kg and centre of mass (m, tip frame) of the motor step's mass; it must not lie on the last axis, which
+                  would not feel it
     gravity_runs  sweeps through the workspace, each there and back
     repeats       periods of the exciting motion
     acceleration  rad/s^2 (m/s^2), for joints whose file gives no limit, as no URDF does; None: refuse them
@@ -74,7 +75,7 @@ class CampaignOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedRun:
-    """One run of the robot: a motion, for one joint's sake where `joint` is given, with a load or without."""
+    """One run of the robot: a motion, for joint `joint` where one is given, with a load or without."""
 
     step: Step
     name: str
@@ -90,7 +91,7 @@ def plan_campaign(
     options: CampaignOptions,
     progress: Progress = lambda step: None,
 ) -> tuple[tuple[PlannedRun, ...], Excitation]:
-    """All runs of the four steps, and the exciting motion's search. Collisions are not looked at."""
+    """All runs of the four steps, and the search for the exciting motion. Collisions are not checked."""
     chain = bounded(chain, options.acceleration)
     runs: list[PlannedRun] = []
     progress("motor sweeps")
@@ -122,8 +123,8 @@ def plan_campaign(
 
 
 def bounded(chain: Mechanism, acceleration: float | None) -> Mechanism:
-    """The chain with limits where its file has none: a half turn either way for joints that turn freely, and the
-    acceleration that was given. InputError where a limit is still missing."""
+    """The chain with limits where its file has none: half a turn either way for joints that turn freely, and the given
+    acceleration. InputError where a limit is still missing."""
     joints = []
     for joint in chain.joints:
         limits = joint.limits
@@ -137,7 +138,7 @@ def bounded(chain: Mechanism, acceleration: float | None) -> Mechanism:
 
 
 def _spoken(progress: Progress) -> Callable[[float, float], None]:
-    """The search's progress, every few seconds."""
+    """A function that reports the search's progress every few seconds."""
     said = 0.0
 
     def say(seconds: float, condition: float) -> None:
@@ -150,16 +151,16 @@ def _spoken(progress: Progress) -> Callable[[float, float], None]:
 
 
 SPOKEN_EVERY = 5.0
-"""s between two words on the search."""
+"""Seconds between two reports on the search."""
 
 
 UNFINISHED = ".psdmc-unfinished"
-"""Stands in a campaign's folder while it is written, and where that was killed or failed."""
+"""Marks a campaign's folder while it is written, and after that was killed or failed."""
 
 
 @contextmanager
 def being_written(folder: str | Path) -> Iterator[None]:
-    """What is written inside is a campaign at the end, and until then psdmc's own to write again."""
+    """Mark a folder while a campaign is written to it: until the end, psdmc may write it again."""
     root = Path(folder)
     make_folder(root)
     write_whole(root / UNFINISHED, "")
@@ -173,9 +174,10 @@ def being_written(folder: str | Path) -> Iterator[None]:
 
 
 def require_free(folder: str | Path) -> None:
-    """InputError where a folder holds a campaign, which writing another one would replace; it says what is there.
+    """InputError where a folder holds a campaign, which writing another one would replace; the message lists what is
+    there.
 
-    One that an earlier run left unfinished, and that nobody recorded logs for, is free.
+    A campaign that an earlier run left unfinished, and that has no recorded logs, does not count.
     """
     root = Path(folder)
     if (root / UNFINISHED).is_file() and not _count(root / "logs"):
@@ -198,10 +200,11 @@ def _count(folder: Path) -> int:
 def write_campaign(
     folder: str | Path, runs: Sequence[PlannedRun], found: Excitation, table: str, *, force: bool = False
 ) -> Path:
-    """Write a campaign's folder; returns its campaign.toml.
+    """Write a campaign's folder; returns the path of its campaign.toml.
 
-    force   replace the plan and the trajectories of a campaign that is there; logs are never touched
-    InputError where there is one and `force` is not given, or the folder cannot be written.
+    force   replace the plan and the trajectories of an existing campaign; logs are never touched
+
+    Raises InputError where there is one and `force` is not given, or the folder cannot be written.
     """
     if not force:
         require_free(folder)
@@ -230,7 +233,8 @@ def write_campaign(
 
 
 def _file_names(runs: Sequence[PlannedRun]) -> list[str]:
-    """Each run's name where it can be a file's everywhere; else its step and number, for joints may be called anything."""
+    """File names of the runs: the run's name where every system accepts it; else its step and number, as joints may
+    have any name."""
     names = [run.name for run in runs]
     plain = [name.replace("_", "").replace("-", "").isalnum() and name.isascii() for name in names]
     return [
@@ -246,7 +250,7 @@ LONGEST_NAME = 100
 
 
 def _toml_text(text: str) -> str:
-    """A TOML string; JSON's escapes are TOML's, but for DEL, which TOML wants escaped too."""
+    """A TOML string: JSON's escapes are TOML's, except that TOML also requires one for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -26,7 +26,7 @@ LARGEST_RUNS = 1000
 LARGEST_MASS = 1e4
 """kg, of a load at the tip."""
 SMALLEST_MASS = 1e-3
-"""kg; no sensor feels less."""
+"""kg; a smaller mass is not measurable."""
 LARGEST_ARM = 100.0
 """m, of a load's centre of mass from the tip."""
 
@@ -36,7 +36,7 @@ _LOAD_KEYS = ("mass", "com")
 
 @dataclass(frozen=True, slots=True)
 class ListedRun:
-    """One [[run]] of a campaign.toml, paths as seen from here."""
+    """One [[run]] of a campaign.toml, with its paths relative to the working directory."""
 
     step: Step
     name: str
@@ -47,12 +47,12 @@ class ListedRun:
 
 
 def is_campaign(path: Path) -> bool:
-    """Whether a path is meant as a campaign: a .toml file, or a folder with a campaign.toml."""
+    """Whether a path names a campaign: a .toml file, or a folder with a campaign.toml."""
     return path.suffix.lower() == ".toml" or (is_folder(path) and (path / FILE).exists())
 
 
 def listed_runs(path: str | Path) -> tuple[ListedRun, ...]:
-    """The runs of a campaign.toml (or its folder); InputError says which run lacks what."""
+    """The runs of a campaign.toml (or its folder); InputError names the run and what it lacks."""
     path = Path(path)
     path = path / FILE if is_folder(path) else path
     return runs_of(read_toml(path, WHAT), path)
@@ -96,7 +96,8 @@ def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) ->
     """All logs of a campaign, step by step.
 
     joint_names  of the robot that it is for
-    InputError where a log is missing, a motor run lacks its partner, or a run is for a joint that is not there.
+
+    Raises InputError where a log is missing, a motor run has no partner, or a run names a joint that does not exist.
     """
     runs = listed_runs(path)
     if joint_names is not None:

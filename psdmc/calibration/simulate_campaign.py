@@ -1,4 +1,4 @@
-"""Logs of a whole campaign from a virtual robot, each kept until what decides it changes."""
+"""Logs of a whole campaign from a virtual robot. Each is kept until its inputs change."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from psdmc.processes import in_processes
 
 INDEX = "simulated.json"
 LARGEST_SEED = 2**31
-"""Each run adds its number to it."""
+"""Largest seed; each run adds its number to it."""
 
 
 @dataclass(frozen=True, slots=True)
 class SimulateOptions:
-    """Which plant, as a variant of its file.
+    """The plant's variant, and how it is simulated.
 
     ideal_sensors  no noise, no steps, no delay
     harness        with the file's cable harness, an effect that no model here has
@@ -143,7 +143,7 @@ def _simulated(job: _Job) -> str:
 
 
 def _key(job: _Job) -> str:
-    """Digest of everything that decides a log: plant, variant, motion, load, seed and the simulation's own code."""
+    """Digest of all that a log depends on: plant, variant, motion, load, seed and the simulation's own code."""
     assert job.run.trajectory is not None
     digest = hashlib.sha256()
     variant = (job.options.ideal_sensors, job.options.harness, job.seed, job.run.load)

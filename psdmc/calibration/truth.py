@@ -1,4 +1,4 @@
-"""A calibration against the truth that only a virtual robot has."""
+"""A calibration compared with the truth, which only a virtual robot has."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Comparison:
     within_three_std: float
 
     def lines(self) -> list[str]:
-        """For people."""
+        """The comparison as lines of text."""
         worst = ", ".join(f"{name} {error:.2%}" for name, error in self.friction.items())
         return [
             f"  largest error: K_t {self.torque_constant:.4%}, gravity {self.gravity:.4%}, inertial {self.inertial:.4%}",
