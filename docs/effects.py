@@ -29,9 +29,10 @@ from psdmc.dynamics.parameters import bodies_of, joint_frame_map
 from psdmc.functions import RECIPES
 from psdmc.lower.expanded import lowering as expanded
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
+from psdmc.lower.geometry import all_feet
 from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe
-from psdmc.lower.search import SINGLE, Search, all_feet
+from psdmc.lower.search import SINGLE, Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.differentiate import Block, jacobians
