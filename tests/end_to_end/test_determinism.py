@@ -1,5 +1,5 @@
-"""Same input, same bytes: model file and C package, under three PYTHONHASHSEEDs and in processes of their own; and the
-same operations whatever instructions BLAS takes its sums with."""
+"""Same input, same bytes: model file and C package, under three PYTHONHASHSEEDs, in processes and with caches of their
+own; and the same operations whatever instructions BLAS takes its sums with."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ def test_same_model_and_same_c(name: str, tmp_path: Path):
         folder = tmp_path / seed
         folder.mkdir()
         for words in (("derive", robot_path(name), "-o", "m.npz"), ("emit-c", "m.npz", "-o", "c")):
-            done = typed(*words, cwd=folder, PYTHONHASHSEED=seed)
+            done = typed(
+                *words, cwd=folder, PYTHONHASHSEED=seed, PSDMC_CACHE_DIR=str(tmp_path / f"cache {seed}")
+            )
             assert done.returncode == 0, done.stderr
         made.append(files_in(folder))
 
@@ -45,7 +47,8 @@ def test_another_processors_blas_gives_the_same_operations(name: str, tmp_path: 
             ("derive", robot_path(name), "-o", "m.npz"),
             ("emit-c", "m.npz", "-o", "c", "--functions", functions),
         ):
-            done = typed(*words, cwd=folder, OPENBLAS_CORETYPE=kernels)
+            own = {"OPENBLAS_CORETYPE": kernels, "PSDMC_CACHE_DIR": str(tmp_path / f"cache {kernels}")}
+            done = typed(*words, cwd=folder, **own)
             assert done.returncode == 0, done.stderr
         headers.append([line for line in _text(files_in(folder), ".h") if " mul + " in line])
 
