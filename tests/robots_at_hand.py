@@ -54,18 +54,20 @@ def loaded(name: str) -> LoadedRobot:
 
 
 @cache
-def subject(name: str) -> Subject:
+def subject(name: str, *, expand: bool = True) -> Subject:
+    """`expand`: with E and P."""
     if name in GENERIC:
-        return drawn(*GENERIC[name])
+        return drawn(*GENERIC[name], expand=expand)
     robot = loaded(name)
-    return Subject(name, derive_model(robot.chain, provenance=provenance(robot)), reference(robot))
+    model = derive_model(robot.chain, provenance=provenance(robot), expand=expand)
+    return Subject(name, model, reference(robot))
 
 
-def drawn(seed: int, kinds: str, *, tidy: bool = False) -> Subject:
+def drawn(seed: int, kinds: str, *, tidy: bool = False, expand: bool = True) -> Subject:
     """A random chain with one joint per letter of `kinds`."""
     chain = random_chain(seed, kinds, tidy=tidy, gravity=(1.0, -2.0, -9.0))
     label = f"{kinds}, seed {seed}{', tidy' if tidy else ''}"
-    return Subject(label, derive_model(chain), Reference(Oracle(chain).model, "tip"))
+    return Subject(label, derive_model(chain, expand=expand), Reference(Oracle(chain).model, "tip"))
 
 
 def _in_wheel(file: str) -> Path:

@@ -1,4 +1,5 @@
-"""Two hundred chains of one to five joints, turning and sliding about any axes: MODEL and PROGRAM on all, C on ten."""
+"""Two hundred chains of one to five joints, turning and sliding about any axes: MODEL and PROGRAM on all, each by one of
+the two lowerings; C on ten."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from robots_at_hand import drawn
 from psdmc.compiler import compile
 from psdmc.functions import DEFAULT
 from psdmc.lower import kernels, search
-from psdmc.lower.kernels import lower
+from psdmc.lower.kernels import EXPANDED_LIMIT, Lowering, lower
 from psdmc.toolchain import compile as toolchain
 from psdmc.toolchain.compiler_command import find_compiler
 
@@ -41,12 +42,14 @@ def test_model_and_program(length: int, chains: int):
         kinds=st.text("RP", min_size=length, max_size=length),
         tidy=st.booleans(),
         function=st.sampled_from(DEFAULT[1:]),
+        form=st.sampled_from(["factored", "expanded"]),
     )
     @settings(max_examples=chains, deadline=None)
-    def check(seed: int, kinds: str, tidy: bool, function: str):
+    def check(seed: int, kinds: str, tidy: bool, function: str, form: Lowering):
         robot = drawn(seed, kinds, tidy=tidy)
         questions = Questions(robot, STATES)
-        lowered = lower(robot.model, "auto", [DEFAULT[0], function])
+        is_short = robot.model.p is not None and robot.model.p <= EXPANDED_LIMIT
+        lowered = lower(robot.model, form if is_short else "factored", [DEFAULT[0], function])
 
         assert not too_large(errors(questions, numpy_answers(robot.model, questions)))
         assert not too_large(errors(questions, program_answers(lowered, robot.model, questions)))
