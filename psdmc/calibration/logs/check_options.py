@@ -1,4 +1,4 @@
-"""The numbers by which a log is refused or remarked on."""
+"""The limits by which a log is refused or gets a remark."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class CheckOptions:
-    """When a log is refused or remarked on.
+    """Limits by which a log is refused or gets a remark.
 
-    largest_gap       sample periods; a longer pause is a gap, and refused
-    largest_jitter    share of the sample period; above it the log is resampled, and a note says so
-    limit_slack       share by which position and speed may exceed the chain's limits
-    free_position     rad, largest believable position of a joint without limits
-    free_speed        rad/s, largest believable speed of a joint without a limit
-    rate_disagreement share by which the logged velocity may differ from the position's slope
-    saturated_share   share of samples at the largest effort from which it counts as saturated
-    shortest          s, shortest log that is read
-    samples_per_cycle smallest sampling rate in units of the filter's cut-off
-    smallest_motion   rad or m, peak to peak; below it a joint stands still
-    longest           s, longest log that is read
-    fastest           Hz, largest believable sampling rate
+    largest_gap        sample periods; a longer pause is a gap, and refused
+    largest_jitter     share of the sample period; above it the log is resampled, and a note says so
+    limit_slack        share by which position and speed may exceed the chain's limits
+    free_position      rad, largest believable position of a joint without limits
+    free_speed         rad/s, largest believable speed of a joint without a limit
+    rate_disagreement  share by which the logged velocity may differ from the position's slope
+    saturated_share    share of samples at the largest effort from which it counts as saturated
+    shortest           s, shortest log that is read
+    samples_per_cycle  smallest sampling rate in units of the filter's cut-off
+    smallest_motion    rad or m, peak to peak; below it a joint is at rest
+    longest            s, longest log that is read
+    fastest            Hz, largest believable sampling rate
     """
 
     largest_gap: float = 10.0

@@ -1,4 +1,4 @@
-"""A log's rows on an even grid of times: as they are where they lie on it, resampled where they do not."""
+"""A log's rows on an even grid of times: unchanged where they lie on it, resampled where they do not."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class EvenGrid:
 
 
 def even_grid(log: AnyLog) -> EvenGrid:
-    """A log's even grid."""
+    """The even grid of a log."""
     count = round(log.duration / log.period) + 1
     even = np.linspace(0.0, log.duration, count)
     same = count == len(log) and bool(np.abs(even - (log.time - log.time[0])).max() < 1e-6 * log.period)
@@ -39,11 +39,11 @@ def even_grid(log: AnyLog) -> EvenGrid:
 
 
 NEIGHBOURS = 4
-"""Rows on either side that interpolation between rows may look at: its slopes take one."""
+"""Rows on either side that interpolation between rows uses; its slopes need one."""
 
 
 def evenly_spaced(log: AnyLog, grid: EvenGrid, first: int, last: int) -> tuple[Array, Array]:
-    """Position and effort at rows first to last of the grid; rows that are even already stay as they are."""
+    """Position and effort at rows first to last of the grid; rows that are evenly spaced stay as they are."""
     if grid.same:
         part = log.rows(first, last)
         return part.position, part.effort

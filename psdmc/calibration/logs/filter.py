@@ -1,4 +1,4 @@
-"""From a log's rows to evenly spaced, smooth states: resampling, zero-phase low-pass, central differences, split."""
+"""Evenly spaced, smooth states from a log's rows: resampling, zero-phase low-pass, central differences, split."""
 
 from __future__ import annotations
 
@@ -65,15 +65,15 @@ class States:
     raw: Array
 
     def jittered(self) -> tuple[Array, Array, Array]:
-        """q, qd, qdd (N, n) as another draw of the position noise would have made them."""
+        """q, qd, qdd (N, n) with another draw of the position noise."""
         draw = self.low_pass(noise_like(self.noise, self.first, self.first + len(self.time)))
         rate, acceleration = central_differences(draw, self.period)
         return self.q + draw, self.qd + rate, self.qdd + acceleration
 
 
 def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None) -> States:
-    """States of a checked log, held whole; a joint that does no more than its sensor's noise gets exactly zero rates, so
-    that it excites nothing."""
+    """States of a checked log, held as a whole. A joint that moves by no more than its sensor's noise gets rates of
+    exactly zero, so that it excites nothing."""
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
     return _states(log, grid, low_pass, noticed(log, grid, low_pass, options, check), options, 0, grid.count)
@@ -81,9 +81,9 @@ def filtered(log: Log, options: FilterOptions, check: CheckOptions | None = None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stretch:
-    """A part of a log: its states with what lies before and after it, and which rows of them it stands for.
+    """A part of a log: its states, with what the filter needs before and after it, and the rows that it stands for.
 
-    at  rows of `states` that are usable and one cut-off's independence apart, each in one stretch only
+    at  rows of `states` that are usable and independent (one cut-off's time apart), each in one stretch only
     """
 
     states: States
@@ -93,9 +93,9 @@ class Stretch:
 def stretches(
     log: AnyLog, options: FilterOptions, check: CheckOptions | None = None, rows: int = STRETCH_ROWS
 ) -> Iterator[Stretch]:
-    """The states of a log, `rows` at a time, each as if the whole log had been filtered at once.
+    """The states of a log, `rows` at a time, as if the whole log had been filtered at once.
 
-    Neighbours overlap by twice what the filter remembers, once for the states and once for what is made of them.
+    Neighbours overlap by twice the filter's memory: once for the states and once for what is computed from them.
     """
     grid = even_grid(log)
     low_pass = LowPass.design(options, grid.period)
@@ -146,7 +146,7 @@ def _states(
 
 
 def _usable(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> range:
-    """Rows that are left after the filter settled; InputError where there are none."""
+    """The rows that are left after the filter's start; InputError where there are none."""
     margin = int(np.ceil(options.settle / options.cutoff / grid.period))
     if grid.count <= 2 * margin:
         raise InputError(
@@ -157,13 +157,13 @@ def _usable(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> range:
 
 
 def independent_rows(grid: EvenGrid, options: FilterOptions, log: AnyLog) -> NDArray[np.intp]:
-    """Of the whole log: usable, one cut-off's independence apart."""
+    """Rows of the whole log that are usable and independent (one cut-off's time apart)."""
     usable = _usable(grid, options, log)
     return np.arange(usable.start, usable.stop, _independent(options, grid.period), dtype=np.intp)
 
 
 def central_differences(q: Array, period: float) -> tuple[Array, Array]:
-    """Speed and acceleration without phase: (q[k+1] - q[k-1]) / 2T and (q[k+1] - 2 q[k] + q[k-1]) / T^2."""
+    """Speed and acceleration without phase error: (q[k+1] - q[k-1]) / 2T and (q[k+1] - 2 q[k] + q[k-1]) / T^2."""
     qd, qdd = np.zeros_like(q), np.zeros_like(q)
     qd[1:-1] = (q[2:] - q[:-2]) / (2.0 * period)
     qdd[1:-1] = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / period**2
@@ -183,28 +183,30 @@ def held_out(count: int, options: SplitOptions) -> NDArray[np.bool_]:
 
 
 def thinned(states: States, options: FilterOptions) -> NDArray[np.intp]:
-    """Indices of usable samples one cut-off's independence apart, 1/(2 f_c).
+    """Indices of usable samples that are independent: 1/(2 f_c) apart.
 
-    Neighbouring filtered samples share their noise; counting each as new information would shrink standard
-    deviations by the square root of the oversampling.
+    Neighbouring filtered samples share their noise; counting each as new information would reduce standard deviations
+    by the square root of the oversampling.
     """
     return np.flatnonzero(states.use)[:: _independent(options, states.period)]
 
 
 def _independent(options: FilterOptions, period: float) -> int:
-    """Rows from one sample to the next that shares no noise with it."""
+    """Rows from one sample to the next with independent noise."""
     return max(1, int(np.floor(0.5 / (options.cutoff * period))))
 
 
 BLOCK_ROWS = 16384
-"""Rows that are filtered at once."""
+"""Rows filtered at once."""
 
 
 def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice], Array]) -> Array:
-    """(len(at), ...) low-passed values at rows `at`, block by block: a long log's values need not be held at once.
+    """(len(at), ...) low-passed values at rows `at`, computed block by block, so that a long log's values need not be
+    held at once.
 
     values   of a slice of the log's rows, (rows, ...)
-    The same as filtering all rows at once, but for what the filter remembers beyond MEMORY_CYCLES.
+
+    The same as filtering all rows at once, except for the filter's memory beyond MEMORY_CYCLES.
     """
     count = len(states.time)
     margin = memory(states.cutoff, states.period)
@@ -219,7 +221,7 @@ def smoothed_rows(states: States, at: NDArray[np.intp], values: Callable[[slice]
 
 
 def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Array:
-    """A filter's copies of one column are small, those of all columns are not."""
+    """The filtered values, column by column: the filter's copies of one column are small, those of all columns are not."""
     flat = values.reshape(len(values), -1)
     columns = np.ascontiguousarray(flat.T)
     smooth = np.stack(
@@ -229,7 +231,7 @@ def _by_column(low_pass: LowPass, values: Array, rows: NDArray[np.intp]) -> Arra
 
 
 def away_from(turning: NDArray[np.bool_], options: FilterOptions, period: float) -> NDArray[np.bool_]:
-    """Samples that the filter does not mix with any turn: two periods of its cut-off away."""
+    """Samples that the filter does not mix with any reversal: two periods of its cut-off away."""
     reach = int(np.ceil(2.0 / options.cutoff / period))
     before = np.concatenate([[0], np.cumsum(turning)])
     index = np.arange(len(turning))

@@ -1,4 +1,4 @@
-"""Files that others wrote: opened with a bound on their size, decoded with nothing but InputErrors coming out."""
+"""Untrusted files: opened with a bound on their size, and decoded so that every fault is an InputError."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from psdmc.calibration.logs.wording import LONGEST_QUOTE
 from psdmc.errors import InputError, PsdmcError
 
 LARGEST_FILE = 2 * 1024**3
-"""Bytes of a table or bag: two hours of seven joints at 1 kHz as text, and what a workstation's memory holds."""
+"""Bytes of a table or bag: two hours of seven joints at 1 kHz as text, which a workstation's memory holds."""
 LARGEST_STORED = 64 * 1024**3
 """Bytes of a table or bag that is read in pieces: a day of seven joints at 1 kHz as text."""
 LARGEST_TOML = 256 * 1024
-"""Bytes of a campaign or plant: a thousand runs; beyond, the standard library's reader takes seconds."""
+"""Bytes of a campaign or plant: a thousand runs; beyond that the standard library's reader takes seconds."""
 
 WRITE_AGAIN = "record, export or copy it again; the format goes by the file's ending"
 
@@ -46,10 +46,10 @@ def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
 
 @contextmanager
 def decoding(name: str, what: str, hint: str = WRITE_AGAIN) -> Iterator[None]:
-    """Whatever a decoder of foreign bytes raises inside becomes "NAME: not WHAT, or damaged: why".
+    """Turn whatever a decoder of untrusted bytes raises inside into "NAME: not WHAT, or damaged: why".
 
-    Decoders of damaged bytes fail in many ways (struct.error, KeyError, AssertionError, MemoryError, ...): none of
-    them is a fault of psdmc, and each is the file's.
+    Decoders of damaged bytes fail in many ways (struct.error, KeyError, AssertionError, MemoryError, ...). None of them
+    is a fault of psdmc; the file is at fault.
     """
     try:
         with warnings.catch_warnings():
@@ -63,7 +63,7 @@ def decoding(name: str, what: str, hint: str = WRITE_AGAIN) -> Iterator[None]:
 
 
 def _reason(error: Exception) -> str:
-    """One short line."""
+    """The reason as one short line."""
     text = getattr(error, "strerror", None) or str(error)
     lines = text.strip().splitlines()
     return lines[0][: 2 * LONGEST_QUOTE] if lines else type(error).__name__

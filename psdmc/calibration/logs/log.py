@@ -1,4 +1,4 @@
-"""A robot's log: what the joints did and what the motors gave, row by row."""
+"""A robot's log: motion of the joints and effort of the motors, row by row."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Quantity = Literal["current", "motor_torque", "joint_torque"]
 QUANTITIES: tuple[Quantity, ...] = ("current", "motor_torque", "joint_torque")
 
 LARGEST_NUMBER = 1e20
-"""In any unit: what is beyond it is no time, angle or torque, and its square would soon overflow."""
+"""In any unit: a number beyond it is no time, angle or torque, and its square may overflow."""
 
 
 class Timed:
-    """What rows with a time have: their number, and how long and how far apart they are."""
+    """The properties of rows with a time: their number, duration and period."""
 
     __slots__ = ()
     time: Array
@@ -44,16 +44,16 @@ class Timed:
 class Log(Timed):
     """Samples of one run. N rows, n joints.
 
-    name         how messages call it
+    name         for messages
     joint_names  n, in the order of the columns
     time         (N,)    s
     position     (N, n)  rad; m for sliding joints
     velocity     (N, n)  per s, or None where the log has none
-    effort       (N, n)  A, N m or N, as `quantity` says; motor torque counts positive in the joint's positive sense
+    effort       (N, n)  A, N m or N, by `quantity`; motor torque is positive in the joint's positive direction
     quantity     current: of the motor; motor_torque: with friction; joint_torque: without
-    notes        what reading it assumed
+    notes        assumptions made when it was read
     sliding      names of joints whose position is in m, the others' being in rad; None: the log does not say
-    date         of the data, as far as the file tells; empty where it does not
+    date         of the data, if the file tells; else empty
     """
 
     name: str
@@ -99,7 +99,7 @@ class Log(Timed):
         return self.at(slice(start, stop))
 
     def at(self, rows: slice | NDArray[np.bool_]) -> Log:
-        """The rows that a slice or a mask names."""
+        """The rows of a slice or a mask, as a log."""
         velocity = None if self.velocity is None else self.velocity[rows]
         return replace(
             self,

@@ -31,13 +31,13 @@ MESSAGE_TYPE = "sensor_msgs/msg/JointState"
 BAGS = (".db3", ".mcap")
 METADATA = "metadata.yaml"
 LARGEST_METADATA = 1024**2
-"""Bytes of a bag's metadata.yaml: thousands of topics."""
+"""Bytes of a bag's metadata.yaml, enough for thousands of topics."""
 PLAIN_MODE = re.compile(r"^\s*compression_mode:\s*(['\"]?)(none|file|)\1\s*$", re.MULTILINE)
-"""The line of metadata, in lower case, of a bag whose messages are not packed."""
+"""The line of metadata, in lower case, of a bag whose messages are not compressed one by one."""
 STEPS_PER_BYTE = 100
-"""SQLite's instructions per byte of a bag; honest ones take less than one."""
+"""SQLite's instructions per byte of a bag; ordinary bags take less than one."""
 STEPS = 1_000_000
-"""Instructions that any bag may take."""
+"""Instructions that every bag may take."""
 
 
 def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) -> AnyLog:
@@ -45,6 +45,7 @@ def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) 
 
     path   a bag's folder, or a bare .db3 or .mcap file of it
     held   bytes of rows in memory, beyond which they go to a temporary file and a StoredLog is returned; None: all
+
     Time is each message's header stamp. InputError where the bag is damaged, the topic is missing, or its messages
     disagree on joints.
     """
@@ -109,7 +110,7 @@ def _kept(path: Path, topic: str, held: int | None) -> tuple[tuple[str, ...], Ar
 
 
 PIECE_MESSAGES = 4096
-"""Messages that are held one by one."""
+"""Messages held one by one."""
 
 
 def _files(path: Path) -> tuple[Path, ...]:
@@ -128,7 +129,8 @@ def _files(path: Path) -> tuple[Path, ...]:
 
 
 def _packs_messages(folder: Path) -> bool:
-    """Whether a bag's metadata may say that its messages are packed one by one: YAML has many ways to write a word."""
+    """Whether a bag's metadata may say that its messages are compressed one by one. True in doubt, as YAML has many
+    ways to write a word."""
     try:
         with (folder / METADATA).open("rb") as file:
             text = file.read(LARGEST_METADATA).decode("utf-8", "replace").lower()
@@ -200,7 +202,7 @@ def _raw_messages(path: Path, topic: str) -> Iterator[bytes]:
 
 
 def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
-    """Blobs of a bag's table `messages`; a view of that name, which could compute for ever, is refused."""
+    """Blobs of a bag's table `messages`; InputError for a view of that name, whose evaluation might never end."""
     tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('messages', 'topics')"
     query = (
         "SELECT data FROM messages JOIN topics ON topics.id = messages.topic_id "
@@ -224,7 +226,7 @@ def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
 
 
 def _count(connection: sqlite3.Connection, query: str) -> int:
-    """A count; -1 where SQLite says that memory ran out, which it says of some damaged heads at once."""
+    """A count; -1 where SQLite reports a lack of memory, as it does for some damaged headers."""
     try:
         return int(connection.execute(query).fetchone()[0])
     except MemoryError:

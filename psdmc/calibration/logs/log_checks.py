@@ -1,4 +1,4 @@
-"""What can be wrong with a log, found before anything is fitted, and named."""
+"""Faults of a log, found and named before anything is fitted."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ LogKind = TypeVar("LogKind", Log, StoredLog, AnyLog)
 
 
 class Fault(NamedTuple):
-    """What forbids a log's use, and the remedy."""
+    """A fault that forbids a log's use, and the remedy."""
 
     text: str
     remedy: str
 
 
 def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions | None = None) -> LogKind:
-    """The log with its joints in the chain's order and what was noticed in its notes.
+    """The log with its joints in the chain's order, and remarks in its notes.
 
     cutoff   Hz, of the filter that the log is meant for
-    InputError names what forbids its use: first values that are no numbers, then faults of time, then the rest.
+
+    InputError names the faults that forbid its use: first values that are no numbers, then faults of time, then others.
     """
     options = options or CheckOptions()
     if len(log) < 2:
@@ -65,7 +66,7 @@ def _no_numbers(
 
 
 def _no_number(found: NoNumber, log: AnyLog) -> Fault:
-    """A column's first value that is not finite, or so large that it is no measurement."""
+    """The fault of a column's first value that is not finite, or too large for a measurement."""
     word = "is not finite" if not np.isfinite(found.value) else f"reaches {found.value:.3g}"
     return Fault(
         f"{found.what} {word} in {found.rows} row(s), the first is row {found.first + 1} of {len(log)}",
@@ -76,7 +77,7 @@ def _no_number(found: NoNumber, log: AnyLog) -> Fault:
 def _units(
     log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[Fault]:
-    """Columns in rad for joints that slide, or in m for joints that turn."""
+    """Faults of columns in rad for joints that slide, or in m for joints that turn."""
     if log.sliding is None:
         return []
     faults = []
@@ -136,7 +137,7 @@ def _speeds(
 def _rates(
     log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[Fault]:
-    """The logged velocity against the position's slope: a ratio far from one is a wrong unit."""
+    """Faults of the logged velocity against the position's slope: a ratio far from one is a wrong unit."""
     faults = []
     for k, ratio in survey.velocity_ratios.items():
         if abs(ratio - 1.0) <= options.rate_disagreement:
@@ -217,5 +218,5 @@ _FAULTS: tuple[tuple[Check, ...], ...] = (
     (_times,),
     (_positions, _speeds, _rates, _nothing_there),
 )
-"""In stages: what a later one computes makes sense only where the earlier ones found nothing."""
+"""In stages: the checks of a stage make sense only where earlier stages found no fault."""
 _REMARKS: tuple[Remark, ...] = (_jitter, _saturation, _still, _dead_effort)

@@ -65,7 +65,7 @@ def require_format(path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Which columns of a table are a log's, and what they hold. n joints."""
+    """The columns of a table that a log consists of, and their quantities. n joints."""
 
     name: str
     joint_names: tuple[str, ...]
@@ -83,7 +83,7 @@ class Layout:
 
 
 def layout_of(name: str, columns: Sequence[str]) -> Layout:
-    """The layout of a table with these columns; InputError says which column is missing and what would do."""
+    """The layout of a table with these columns; InputError names a missing column and the names that would be accepted."""
     if "time_s" not in columns:
         raise InputError(f"{name}: no column 'time_s'", f"it has {listed(tuple(columns))}")
     joints = _joints(name, columns, POSITIONS)
@@ -108,7 +108,7 @@ def layout_of(name: str, columns: Sequence[str]) -> Layout:
 
 
 def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
-    """A log from named columns of equal length; InputError says which column is missing and what would do."""
+    """A log from named columns of equal length; InputError names a missing column and the names that would be accepted."""
     found = layout_of(name, tuple(columns))
 
     def stacked(names: tuple[str, ...]) -> Array:
@@ -180,7 +180,7 @@ def _efforts(
 def _require_units(
     name: str, positions: Mapping[str, str], velocities: Mapping[str, str], efforts: list[str]
 ) -> None:
-    """InputError where one column says that a joint turns and another that it slides."""
+    """InputError where one column says that a joint turns and another one that it slides."""
     for (joint, position), effort in zip(positions.items(), efforts, strict=True):
         others = [effort] if effort.partition(".")[0] != "current_a" else []
         others += [velocities[joint]] if joint in velocities else []

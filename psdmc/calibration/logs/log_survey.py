@@ -1,4 +1,4 @@
-"""What the checks of a log look at, gathered in one pass over its rows, a stretch at a time."""
+"""The figures that the checks of a log need, from one pass over its rows, a stretch at a time."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from psdmc.calibration.logs.log import LARGEST_NUMBER, Array, Log
 from psdmc.calibration.logs.stored_log import AnyLog
 
 STRETCH_ROWS = 32_768
-"""Rows that are looked at, filtered and fitted at once."""
+"""Rows that are surveyed, filtered and fitted at once."""
 MOST_SLOPES = 200_000
-"""Rows of which slopes are ranked; longer logs are judged by evenly spread ones."""
+"""Rows whose slopes are ranked; in longer logs evenly spread ones."""
 FAST_SHARE = 0.99
 """Of the slopes; those above are noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class NoNumber:
-    """A column with values that are not finite, or beyond any measurement: how many, and the first."""
+    """A column with values that are not finite, or too large for a measurement: how many, and the first."""
 
     what: str
     rows: int
@@ -31,11 +31,13 @@ class NoNumber:
 class Survey:
     """A log's columns in figures. n joints.
 
-    no_numbers      columns that hold any;  with them, the other figures mean nothing
+    no_numbers      columns that hold any; the other figures then mean nothing
     reach, motion   (n,)  largest |position|; peak to peak
     speed           (n,)  slope of the position below which FAST_SHARE of the rows lie
-    slope_power     (n,)  sum of squared slopes;  slope_velocity  of slope times logged velocity, None where there is none
-    largest_effort  (n,)  |effort|;  saturated  (n,) share of rows that have it
+    slope_power     (n,)  sum of squared slopes
+    slope_velocity  (n,)  sum of slope times logged velocity; None where there is none
+    largest_effort  (n,)  |effort|
+    saturated       (n,)  share of rows with the largest effort
     """
 
     no_numbers: tuple[NoNumber, ...]
@@ -102,12 +104,12 @@ def surveyed(log: AnyLog) -> Survey:
 
 
 def position_slope(log: Log) -> Array:
-    """(N - 2, n) central differences over two periods: too coarse for dynamics, enough to tell units apart."""
+    """(N - 2, n) central differences over two periods: too coarse for dynamics, enough to distinguish units."""
     return np.asarray((log.position[2:] - log.position[:-2]) / (log.time[2:] - log.time[:-2])[:, None])
 
 
 SAME = 1e-9
-"""Relative difference of two efforts that are one value."""
+"""Relative difference up to which two efforts count as equal."""
 
 
 def _saturation(effort: Array, largest: Array, count: Array) -> tuple[Array, Array]:

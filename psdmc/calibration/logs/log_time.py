@@ -1,4 +1,4 @@
-"""A log's time column: its order, its gaps, its rate, and which unit it seems to have."""
+"""A log's time column: its order, its gaps, its rate, and the unit that it seems to have."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from psdmc.calibration.logs.log_survey import Survey
 from psdmc.calibration.logs.stored_log import AnyLog
 
 UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
-"""That loggers write instead of seconds, and how many make one."""
+"""Units that loggers write instead of seconds, and how many make one second."""
 PERIODS = (0.9, 100.0, 1e5)
-"""Smallest period, as a number, that reads as each of UNITS: no robot logs once in 0.9 s, and 20 kHz in nanoseconds
-or microseconds, 10 Hz in the unit before, lie at the others."""
+"""Smallest period, as a number, that is read as each of UNITS. Slower or faster logs do not exist: one row in 0.9 s, or
+20 kHz in nanoseconds or microseconds, 10 Hz in the unit before."""
 UNIT_MATCH = 0.1
 """Share by which velocity over slope may differ from a unit's factor."""
 SMALLEST_STEP = 1e-9
@@ -23,7 +23,7 @@ FaultAndRemedy = tuple[str, str]
 
 
 def time_faults(log: AnyLog, survey: Survey, cutoff: float, options: CheckOptions) -> list[FaultAndRemedy]:
-    """What is wrong with the time of a log whose numbers are finite, each with its remedy; at most one of a kind."""
+    """Faults of the time of a log whose numbers are finite, each with its remedy; at most one of a kind."""
     steps = np.diff(log.time)
     order = _order(log, steps)
     if order:
@@ -42,7 +42,8 @@ def time_faults(log: AnyLog, survey: Survey, cutoff: float, options: CheckOption
 
 
 def suspected_unit(log: AnyLog, survey: Survey) -> str:
-    """Name of the unit that time seems to have, where it is not seconds: by velocity over slope, else by the period."""
+    """Name of the unit that time seems to have, where it is not seconds: from velocity over slope, else from the
+    period."""
     ratios = list(survey.velocity_ratios.values())
     if ratios:
         middle = float(np.median(ratios))

@@ -1,4 +1,4 @@
-"""The zero-phase low-pass: its options, its design for a sampling rate, and how long it remembers a sample."""
+"""The zero-phase low-pass: its options, its design for a sampling rate, and the length of its memory."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.errors import InputError
 
 SMALLEST_CUTOFF, LARGEST_CUTOFF = 0.01, 10_000.0
-"""Hz: a filter slower than minutes, or faster than any log of a robot, is a slip."""
+"""Hz: a filter slower than minutes, or faster than any log of a robot, is a mistake."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +58,10 @@ class LowPass:
 
 
 MEMORY_CYCLES = 30.0
-"""Cut-off periods after which the filter has forgotten a sample to rounding: its slowest pole decays by
-exp(-2 pi sin(pi / (2 order))) a period, which is to 0.29 at order 8."""
+"""Cut-off periods after which a sample's effect on the filter is rounding: its slowest pole decays by exp(-2 pi sin(pi
+/ (2 order))) a period, which is to 0.29 at order 8."""
 
 
 def memory(cutoff: float, period: float) -> int:
-    """Rows after which the filter has forgotten one."""
+    """Rows after which a sample's effect on the filter is rounding."""
     return int(np.ceil(MEMORY_CYCLES / cutoff / period))

@@ -1,4 +1,4 @@
-"""What an MCAP file's record heads say of sizes, looked at before its reader makes room for them."""
+"""Sizes in an MCAP file's record heads, checked before its reader allocates memory for them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FOOTER, CHUNK, CHUNK_INDEX = 0x02, 0x06, 0x08
 HEAD = struct.Struct("<BQ")
 """Kind and length of a record."""
 FROM_FOOTER = len(MAGIC) + 20
-"""Bytes from the footer's content to the end: two places, a checksum, and the magic again."""
+"""Bytes from the footer's content to the end: two offsets, a checksum, and the magic again."""
 CHUNK_HEAD = struct.Struct("<QQQII")
 """Of a chunk: first and last time, unpacked size, checksum, length of the compression's name; packed size follows it."""
 LONGEST_PACKING = 100
@@ -26,8 +26,8 @@ SIZES = struct.Struct("<QQ")
 
 
 def require_mcap_size(path: Path) -> None:
-    """InputError where a record is longer than the file, or chunks or their index unpack to more than its size allows, or
-    than they say."""
+    """InputError where a record is longer than the file, or chunks or their index unpack to more than its size allows,
+    or than their heads say."""
     with opened(path) as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{path}: not an MCAP file", "give a file that ros2 bag recorded")
@@ -40,7 +40,8 @@ def require_mcap_size(path: Path) -> None:
 
 
 def _require_size(claims: list[tuple[int, int]], file: BinaryIO, path: Path) -> None:
-    """`claims`: packed and unpacked sizes of chunks, or those that their index says."""
+    """InputError where `claims`, the packed and unpacked sizes of chunks or of their index entries, exceed what the
+    file's size allows."""
     file_bytes = file.seek(0, 2)
     packed, unpacked = (sum(sizes) for sizes in zip(*claims, strict=True)) if claims else (0, 0)
     allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file_bytes)
@@ -56,7 +57,7 @@ def _require_size(claims: list[tuple[int, int]], file: BinaryIO, path: Path) -> 
 
 
 def _records(file: BinaryIO, path: Path) -> list[tuple[int, int, int]]:
-    """Kind, place (of the head) and length of every record up to the footer or the end."""
+    """Kind, offset (of the head) and length of every record up to the footer or the end."""
     found: list[tuple[int, int, int]] = []
     end, place = file.seek(0, 2), len(MAGIC)
     while place + HEAD.size <= end:
@@ -74,7 +75,7 @@ def _records(file: BinaryIO, path: Path) -> list[tuple[int, int, int]]:
 
 
 def _claims(file: BinaryIO, kind: int, place: int, length: int) -> tuple[int, int]:
-    """Packed and unpacked size that a chunk, or its index, says; none where the record is too short to say it."""
+    """Packed and unpacked size in the head of a chunk, or of its index entry; none where the record is too short."""
     start = place + HEAD.size
     if kind == CHUNK_INDEX:
         file.seek(start + max(length - SIZES.size, 0))
@@ -91,7 +92,7 @@ def _claims(file: BinaryIO, kind: int, place: int, length: int) -> tuple[int, in
 
 
 def _require_summary(file: BinaryIO, records: list[tuple[int, int, int]], path: Path) -> None:
-    """InputError where the footer at the file's end leads to what is no record: its length would be any bytes."""
+    """InputError where the footer at the file's end points to no record, whose length would be arbitrary bytes."""
     file.seek(max(file.seek(0, 2) - FROM_FOOTER, 0))
     footer = file.read(8)
     summary = struct.unpack("<Q", footer)[0] if len(footer) == 8 else 0
@@ -100,7 +101,7 @@ def _require_summary(file: BinaryIO, records: list[tuple[int, int, int]], path: 
 
 
 def _require_claims(file: BinaryIO, records: list[tuple[int, int, int]], path: Path) -> None:
-    """InputError where a chunk unpacks to more than it says, or an index says of a chunk what that does not say itself."""
+    """InputError where a chunk unpacks to more than its head says, or an index entry differs from its chunk's head."""
     chunks: dict[int, tuple[str, int, int]] = {}
     for kind, place, length in records:
         if kind == CHUNK and length >= CHUNK_HEAD.size + 8:
@@ -129,7 +130,7 @@ def _packing(file: BinaryIO, place: int) -> str:
 
 
 def _indexed(file: BinaryIO, place: int, length: int) -> tuple[int, str, int, int]:
-    """What a chunk's index says: the chunk's place, compression, packed and unpacked size."""
+    """The contents of a chunk's index entry: the chunk's offset, compression, packed and unpacked size."""
     file.seek(place + HEAD.size)
     content = file.read(length)
     (where,) = struct.unpack_from("<Q", content, 16)

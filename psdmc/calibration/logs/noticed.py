@@ -1,4 +1,4 @@
-"""What a pass over a log's positions notices of its joints: sensor noise, and which of them rest."""
+"""Sensor noise and rest of each joint, from a pass over a log's positions."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from psdmc.calibration.logs.stored_log import AnyLog
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Noticed:
-    """Of a log's joints: sensor noise of a raw sample, zero where it rests; whether it rests, and where; and its motion,
-    peak to peak. (n,) each, rad or m."""
+    """(n,) each, rad or m: sensor noise of a raw sample, zero for a joint at rest; whether it rests, and where; and its
+    motion, peak to peak."""
 
     noise: Array
     still: NDArray[np.bool_]
@@ -35,7 +35,7 @@ def noticed(
     check: CheckOptions | None = None,
     rows: int = STRETCH_ROWS,
 ) -> Noticed:
-    """Noise and rest of every joint, from one pass over the log; the noise of long logs from evenly spread rows."""
+    """Noise and rest of every joint, from one pass over the log; noise of long logs from evenly spread rows."""
     reach, every = memory(options.cutoff, grid.period), -(-grid.count // NOISE_ROWS)
     raw, smooth = [], []
     n = len(log.joint_names)
@@ -62,4 +62,4 @@ def noticed(
 
 
 NOISE_ROWS = 200_000
-"""Rows from which sensor noise is taken; longer logs are judged by evenly spread ones."""
+"""Rows from which sensor noise is computed; in longer logs evenly spread ones."""

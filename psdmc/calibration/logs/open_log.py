@@ -1,4 +1,4 @@
-"""Logs of any size from files: read piece by piece, held in memory where they are small, on disk where they are not."""
+"""Logs of any size from files, read piece by piece: held in memory where they are small, else on disk."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ Progress = Callable[[str], None]
 
 
 def open_log(path: str | Path, progress: Progress = lambda step: None, held: int = HELD_BYTES) -> AnyLog:
-    """A log from a file that read_log takes, of any size.
+    """A log of any size from a file that read_log takes.
 
     held      bytes of rows in memory; where there are more, they go to a temporary file and a StoredLog is returned
-    progress  is told how much of a large file has been read
-    InputError as read_log.
+    progress  called with how much of a large file has been read
+
+    InputError as of read_log.
     """
     path = Path(path)
     if path.suffix.lower() in BAGS or is_folder(path):

@@ -1,4 +1,5 @@
-"""Bags packed by rosbag2 itself, file by file or message by message: what comes out is bounded before it is made."""
+"""Bags that rosbag2 compressed, file by file or message by message: their unpacked size is bounded before they are
+unpacked."""
 
 from __future__ import annotations
 
@@ -21,8 +22,8 @@ SMALLER = "record the bag again without compression, or cut it into several"
 
 
 def require_packed_file(file: Path) -> None:
-    """InputError where a file that is packed as a whole unpacks to more than its size makes believable, or to an MCAP file
-    whose chunks do. It is unpacked into a temporary file to see the latter."""
+    """InputError where a file that is compressed as a whole unpacks to more than its size makes plausible, or to an
+    MCAP file whose chunks do. It is unpacked into a temporary file to check the latter."""
     allowed = _allowed(file)
     with opened(file) as packed, tempfile.TemporaryDirectory() as folder:
         inside = Path(folder) / "inside"
@@ -37,7 +38,7 @@ def require_packed_file(file: Path) -> None:
 
 
 def require_packed_messages(file: Path) -> None:
-    """InputError where messages that are packed one by one unpack to more than a file's size makes believable."""
+    """InputError where messages that are compressed one by one unpack to more than the file's size makes plausible."""
     if file.suffix.lower() != ".db3":
         raise InputError(
             f"{file}: messages packed one by one in a file that is not SQLite's are not read",

@@ -1,4 +1,4 @@
-"""Noise of the position sensors, from the log itself, and what it does to states: a joint at rest that ripples, and
+"""Noise of the position sensors, estimated from the log, and its effects: joints at rest whose positions ripple, and
 columns of a regressor that noise alone would give."""
 
 from __future__ import annotations
@@ -9,21 +9,23 @@ from numpy.typing import NDArray
 from psdmc.calibration.logs.log import Array
 
 CLIPPED = 10.0
-"""Typical deviations beyond which a sample is a fault, not noise, and counts as this much."""
+"""Typical deviations beyond which a sample counts as a fault instead of noise, and as this much."""
 SMALLEST_SHARE = 0.05
-"""Of the spectrum above the cut-off; below it, the filter leaves nothing to judge noise by, and this is assumed."""
+"""Least share of the spectrum above the cut-off that is assumed: the filter leaves nothing to estimate noise from below
+it."""
 REST_DEVIATIONS = 10.0
 """Peak to peak of filtered noise, in standard deviations, over as many samples as logs have: 8 to 9 for normal noise."""
 REST_STEPS = 3.0
-"""Steps of the encoder within which a joint counts as resting: a position between two steps flickers."""
+"""Encoder steps within which a joint counts as resting: a position between two steps flickers."""
 SEED = 30_301
 
 
 def position_noise(position: Array, filtered: Array, in_band: float) -> Array:
-    """(n,) standard deviation of a raw sample, rad or m, from what the low-pass took away.
+    """(n,) standard deviation of a raw sample, rad or m, from what the low-pass removed.
 
     position, filtered  (N, n) of a log on an even grid;  in_band  share of the spectrum below the cut-off
-    Taken as white: what lies above the cut-off stands for what lies below.
+
+    The noise is taken as white: the part above the cut-off stands for the part below.
     """
     left = position - filtered
     left = left - np.median(left, axis=0)
@@ -58,7 +60,7 @@ NOISE_CHUNK = 65_536
 
 
 def noise_like(noise: Array, first: int, last: int) -> Array:
-    """(last - first, n) raw position noise of these standard deviations at some rows: the same on every call."""
+    """(last - first, n) raw position noise of these standard deviations at some rows, the same on every call."""
     parts = []
     for chunk in range(first // NOISE_CHUNK, (last - 1) // NOISE_CHUNK + 1):
         start = chunk * NOISE_CHUNK

@@ -1,4 +1,4 @@
-"""Rows of numbers that may be more than memory holds: kept while they are few, on disk from then on."""
+"""Rows of numbers that may exceed the memory: kept in it while they are few, then on disk."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ import numpy as np
 from psdmc.calibration.logs.log import Array
 
 HELD_BYTES = 128 * 1024**2
-"""Bytes of rows that are kept in memory: 800,000 rows of seven joints; beyond, they go to a temporary file."""
+"""Bytes of rows kept in memory: 800,000 rows of seven joints; beyond, they go to a temporary file."""
 
 
 class RowStore:
-    """Rows of equal width, appended piece by piece and read back by place; its file ends with it.
+    """Rows of equal width, appended piece by piece and read back by place; the temporary file is removed with the
+    store.
 
-    width   numbers in a row;  held  bytes in memory before the file is used
+    width   numbers in a row
+    held    bytes in memory before the file is used
     """
 
     def __init__(self, width: int, held: int = HELD_BYTES) -> None:

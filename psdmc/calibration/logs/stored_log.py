@@ -1,4 +1,4 @@
-"""A log whose rows lie on disk: what a Log is, for files larger than memory."""
+"""A log whose rows are on disk: the interface of Log for files larger than memory."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class StoredLog(Timed):
     """A Log's fields; position, velocity and effort are read with `rows`. N rows, n joints.
 
     time    (N,)  s, held in memory
-    store   rows of positions, velocities (which do not count unless `has_velocity`) and efforts, of `stored` joints each
+    store   rows of positions, velocities (unused unless `has_velocity`) and efforts, of `stored` joints each
     places  (n,)  of this log's joints among those
     """
 

@@ -1,4 +1,4 @@
-"""Tables in npz and Parquet files: named columns of numbers, sizes looked at before anything is unpacked."""
+"""Tables in npz and Parquet files: named columns of numbers, sizes checked before anything is unpacked."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ def columns_from_npz(file: BinaryIO, name: str) -> dict[str, Array]:
 
 
 def _array(content: bytes) -> Any:
-    """A member's array; ValueError where its head names more numbers than follow, for which NumPy would make room."""
+    """A member's array; ValueError where its header names more numbers than follow, for which NumPy would allocate
+    memory."""
     stream = io.BytesIO(content)
     is_first = np.lib.format.read_magic(stream) == (1, 0)
     read_header = np.lib.format.read_array_header_1_0 if is_first else np.lib.format.read_array_header_2_0
@@ -46,7 +47,7 @@ def _array(content: bytes) -> Any:
 
 
 def npz_names(file: BinaryIO, name: str) -> tuple[str, ...]:
-    """The columns' names alone."""
+    """The columns' names."""
     with decoding(name, "an npz file"), zipfile.ZipFile(file) as archive:
         return tuple(member.removesuffix(".npy") for member in archive.namelist()[: LARGEST_COLUMNS + 1])
 
@@ -102,7 +103,7 @@ def columns_from_parquet(file: BinaryIO, name: str) -> dict[str, Array]:
 
 
 def parquet_names(file: BinaryIO, name: str) -> tuple[str, ...]:
-    """The columns' names alone."""
+    """The columns' names."""
     parquet = _parquet()
     with decoding(name, "a Parquet file"):
         return tuple(parquet.ParquetFile(file).schema_arrow.names)

@@ -1,7 +1,7 @@
-"""CSV as loggers and spreadsheets write it: named columns of numbers, every fault with its line and column.
+"""CSV files of loggers and spreadsheets: named columns of numbers, every fault with its line and column.
 
-UTF-8, with or without a byte-order mark; cells separated by comma, semicolon or tab, quoted or not. Where a semicolon or
-tab separates them, numbers may have decimal commas.
+UTF-8, with or without a byte-order mark; cells separated by comma, semicolon or tab, quoted or not. Where a semicolon
+or tab separates them, numbers may have decimal commas.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class CsvReader:
         return self._names
 
     def no_header(self) -> list[str]:
-        """InputError: the file ended before a header."""
+        """The InputError of a file that ends before a header."""
         _header_and_body("", self.name)
         return []
 
@@ -87,7 +87,7 @@ class CsvReader:
         return values
 
     def _pointed(self, body: str) -> str:
-        """Decimal commas as points, where all pieces agree."""
+        """The text with decimal commas changed to points, where all pieces agree."""
         if self._separator == ",":
             return body
         found = "".join(mark for mark in ",." if mark in body)
@@ -125,7 +125,7 @@ def _text(data: bytes, name: str, before: int = 0) -> str:
 
 
 def _header_and_body(text: str, name: str) -> tuple[int, str, str]:
-    """The first line with something on it, its number, and what follows."""
+    """The first line that is not empty, its number, and the rest."""
     stripped = text.lstrip("\n")
     header, _, body = stripped.partition("\n")
     if not header.strip():
@@ -136,7 +136,7 @@ def _header_and_body(text: str, name: str) -> tuple[int, str, str]:
 
 
 def _separator(header: str) -> str:
-    """The one that leaves a column of time; else the one that leaves most columns."""
+    """The separator that leaves a column of time; else the one that leaves most columns."""
     counted = []
     for separator in SEPARATORS:
         try:
@@ -164,7 +164,7 @@ def _require_header(names: Sequence[str], name: str) -> None:
 
 
 def _with_points(body: str, separator: str, name: str) -> str:
-    """Decimal commas as points; both in one file may be thousands' marks, which are not guessed at."""
+    """The text with decimal commas changed to points. InputError where both occur: they may be thousands' separators."""
     if separator == "," or "," not in body:
         return body
     if "." in body:
@@ -183,7 +183,7 @@ def _numbers(body: str, separator: str) -> Array | None:
 
 
 def _first_fault(body: str, names: Sequence[str], separator: str, first: int, name: str) -> InputError:
-    """What is wrong with the first line that is; `first` is the number of the body's first line."""
+    """The fault of the first wrong line; `first` is the number of the body's first line."""
     for number, line in enumerate(body.split("\n"), start=first):
         if not line:
             continue

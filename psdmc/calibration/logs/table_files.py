@@ -1,4 +1,4 @@
-"""Tables of named columns as .csv, .parquet or .npz files: read with their faults named, written all or not at all."""
+"""Tables of named columns as .csv, .parquet or .npz files: read with faults named, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from psdmc.errors import InputError
 
 TABLES = (".csv", ".parquet", ".npz")
 LARGEST_HEADER = 1024**2
-"""Bytes of a CSV file's first line: a thousand columns with a thousand letters each."""
+"""Bytes of a CSV file's first line: a thousand columns with names of a thousand letters."""
 
 
 def read_columns(path: Path) -> dict[str, Array]:
@@ -75,7 +75,7 @@ def _require_equal(columns: Mapping[str, Array], name: str) -> None:
 
 
 def write_columns(columns: Mapping[str, Array], path: Path) -> None:
-    """Write named columns of equal length as .csv, .parquet or .npz; a reader never sees half a file."""
+    """Write named columns of equal length as .csv, .parquet or .npz; a reader never sees a part of a file."""
     kind = _kind(path)
     write = {".csv": _write_csv, ".npz": write_npz, ".parquet": write_parquet}[kind]
     make_folder(path.parent)

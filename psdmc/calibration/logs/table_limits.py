@@ -1,4 +1,4 @@
-"""How large a table may be, and what its columns may be called."""
+"""Limits of a table's size, and of its columns' names."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ LARGEST_ROWS = 20_000_000
 LARGEST_STORED_ROWS = 100_000_000
 """Of a log that is read in pieces: a day at 1 kHz."""
 LARGEST_COLUMNS = 1_000
-"""Ten per joint of the longest chains, and as many again that are not read."""
+"""Ten per joint of the longest chains, and as many that are not read."""
 LARGEST_VALUES = 100_000_000
 """Rows times columns: 800 MB; an hour of seven joints at 1 kHz has 80 million."""
 LARGEST_EXPANSION = 200
-"""Bytes of numbers from one byte of a packed file; real logs, whose noise does not pack, stay below 20."""
+"""Bytes of numbers from one byte of a packed file; real logs, whose noise is incompressible, stay below 20."""
 ALWAYS_ALLOWED = 64 * 1024**2
-"""Bytes of numbers that any file may unpack to."""
+"""Bytes of numbers that every file may unpack to."""
 
 
 def require_size(rows: int, columns: int, file_bytes: int, name: str) -> None:
@@ -40,7 +40,7 @@ def require_size(rows: int, columns: int, file_bytes: int, name: str) -> None:
 
 
 def require_unpacked(size: int, file_bytes: int, name: str) -> None:
-    """InputError where a packed file says that it unpacks to more bytes than its own size makes believable."""
+    """InputError where a packed file claims to unpack to more bytes than its own size makes plausible."""
     allowed = max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file_bytes)
     if size > allowed:
         raise InputError(

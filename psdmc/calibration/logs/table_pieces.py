@@ -1,4 +1,5 @@
-"""Tables in pieces: the names of their columns, then rows as they come, so that no table need be held at once."""
+"""Tables in pieces: the names of their columns, then rows one piece after the other, so that no table is held as a
+whole."""
 
 from __future__ import annotations
 

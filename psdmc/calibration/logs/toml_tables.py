@@ -13,7 +13,7 @@ from psdmc.calibration.logs.wording import first_faults, listed, quoted
 from psdmc.errors import InputError
 
 LONGEST_LINE = 500
-"""Characters of a line: the time of the standard library's reader grows with the square of a dotted key's parts."""
+"""Characters of a line: the standard library's reader takes time that grows with the square of a dotted key's parts."""
 LONGEST_TEXT = 300
 """Characters of a name or path."""
 _ZIP = b"PK\x03\x04"
@@ -48,9 +48,9 @@ def toml_content(data: bytes, name: str, what: str) -> dict[str, Any]:
 
 
 class TomlTable:
-    """One table that is read key by key; what is wrong goes to `faults`, with the table's name.
+    """One table that is read key by key; faults go to `faults`, with the table's name.
 
-    Every reader returns its default, or a harmless value, where a key is missing or wrong: `faults` decide.
+    Every reader returns its default, or a harmless value, where a key is missing or wrong; the caller checks `faults`.
     """
 
     def __init__(self, value: object, where: str, keys: tuple[str, ...], faults: list[str]) -> None:
@@ -130,7 +130,7 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def shown(value: object) -> str:
-    """A TOML value as a message shows it."""
+    """A TOML value as text for a message."""
     if isinstance(value, str):
         return quoted(value)
     if isinstance(value, bool):
@@ -143,6 +143,6 @@ def shown(value: object) -> str:
 
 
 def require_none(faults: list[str], name: str, hint: str) -> None:
-    """InputError names the first of the faults."""
+    """InputError with the first of the faults, if there is one."""
     if faults:
         raise InputError(f"{name}: {first_faults(faults)}", hint)

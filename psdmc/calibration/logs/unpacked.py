@@ -1,6 +1,6 @@
-"""How much a packed stretch of a file unpacks to: found out piece by piece, none of which is kept in memory.
+"""The unpacked size of a packed stretch of a file, found piece by piece without keeping any.
 
-What a packed file says of its size is a claim; readers that make room for whatever comes out would believe it.
+The size that a packed file states is a claim, and readers that allocate memory for whatever comes out would trust it.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ PIECE = 2**20
 
 
 def unpacked_size(file: BinaryIO, packed: int, packing: str, most: int, keep: BinaryIO | None = None) -> int:
-    """Bytes that the next `packed` bytes of a file unpack to; counted no further than beyond `most`.
+    """Bytes that the next `packed` bytes of a file unpack to; counting stops beyond `most`.
 
     keep     where they are written, if anywhere
-    packing  'lz4' or 'zstd'; others are not unpacked by anybody, and 0 bytes come out
+    packing  'lz4' or 'zstd'; for any other, 0
     """
     start = _unpackers().get(packing)
     if start is None:

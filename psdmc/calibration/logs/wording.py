@@ -1,11 +1,11 @@
-"""Long lists in messages: the first few, and how many more."""
+"""Long lists in messages: the first entries, and the number of the others."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 MOST_NAMES = 8
-"""Names in one message: more than these nobody reads."""
+"""Names in one message."""
 MOST_FAULTS = 3
 """Faults in one message: the first ones usually cause the others."""
 
@@ -26,7 +26,7 @@ def _first(texts: Sequence[str], most: int, between: str) -> str:
 
 
 def quoted(text: str) -> str:
-    """Text from a file as a message shows it: in quotes, control characters escaped, cut where it is long."""
+    """Text from a file for a message: in quotes, control characters escaped, shortened where it is long."""
     return repr(text if len(text) <= LONGEST_QUOTE else text[:LONGEST_QUOTE] + "...")
 
 
