@@ -1,4 +1,4 @@
-"""Exciting trajectories: sums of sines per joint (22), optimised for the regressor's condition (23), limits kept.
+"""Exciting trajectories: sums of sines per joint (22), optimised for the regressor's condition (23), within limits.
 
 A candidate is scaled to a share of what its limits allow, so that every candidate is feasible and the search needs no
 constraints.
@@ -25,16 +25,16 @@ STEP = 0.5
 SETTLED = 1e-3
 """Spread of a generation's scores, relative to the best, at which a descent ends and the next begins."""
 FILL = 3.0
-"""Where the search for each joint's share of its limits starts: 1 / (1 + exp(-3)) = 95 %."""
+"""Start of the search for each joint's share of its limits: 1 / (1 + exp(-3)) = 95 %."""
 
 SHORTEST_DURATION, LONGEST_DURATION = 0.1, 120.0
-"""s, of a period: from what a small joint follows to what still fits a log, six periods at 1 kHz."""
+"""s, of a period: from what a small joint can follow to what fits a log, six periods at 1 kHz."""
 LONGEST_SEARCH = 86_400.0
 """s: a day."""
 MOST_HARMONICS, HIGHEST_HARMONIC = 20, 100
 """Per joint: each adds two unknowns per joint to the search."""
 LARGEST_SEED = 2**31
-"""Seeds start at 1: the search takes 0 for a seed drawn from the clock."""
+"""Largest seed. Seeds start at 1, as the search takes 0 for a seed drawn from the clock."""
 
 Objective = Literal["condition", "log_det"]
 Progress = Callable[[float, float], None]
@@ -118,7 +118,7 @@ class SineSum:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Excitation:
-    """A motion found, and how it compares.
+    """A motion found, compared with random ones.
 
     condition         of the column-scaled regressor along it
     random_conditions (random,) of random motions scaled to the limits, ascending
@@ -134,7 +134,7 @@ class Excitation:
 
     @property
     def gain(self) -> float:
-        """Best random condition over the one reached."""
+        """Best condition of the random motions over the one reached."""
         return float(self.random_conditions[0] / self.condition)
 
 
@@ -189,7 +189,7 @@ def require_limits(joints: Sequence[Joint]) -> None:
 def _search(
     judge: _Judge, starts: Array, options: ExciteOptions, begin: float, progress: Progress | None
 ) -> tuple[Array, list[tuple[float, float]], int]:
-    """CMA-ES from one random start after the other, best first, until candidates or time run out."""
+    """CMA-ES from one random start after the other, the best first, until candidates or time are used up."""
     import cma
 
     best, best_score = starts[0], float(judge(starts[:1])[0])
@@ -220,7 +220,7 @@ def _search(
 
 
 class _Space:
-    """Candidates, as vectors: per joint sine and cosine weights and where the motion sits within the range."""
+    """Candidates as vectors: per joint, weights of sines and cosines, and the place of the motion within the range."""
 
     def __init__(self, chain: Mechanism, options: ExciteOptions) -> None:
         require_limits(chain.joints)

@@ -1,4 +1,4 @@
-"""Poses in which a known load is felt by a joint: one for each joint's motor sweep."""
+"""Poses in which a known load acts on a joint: one for each joint's motor sweep."""
 
 from __future__ import annotations
 

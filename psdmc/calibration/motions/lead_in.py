@@ -1,4 +1,4 @@
-"""Ways into and out of a motion that starts or ends in full swing: a robot has to get there from rest."""
+"""Motions from rest into and out of a motion that starts or ends at speed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
 DURATIONS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""s, tried in this order until the limits hold."""
+"""s, tried in this order until the limits are kept."""
 
 
 def from_rest_to_rest(motion: Trajectory, chain: Mechanism) -> Trajectory:
@@ -28,7 +28,7 @@ def from_rest_to_rest(motion: Trajectory, chain: Mechanism) -> Trajectory:
 
 
 def _lead(motion: Trajectory, chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Trajectory:
-    """From rest to a state; run backwards it leads from the mirrored state to rest."""
+    """The motion from rest to a state; run backwards it leads from the mirrored state to rest."""
     low = np.array([joint.limits.lower for joint in chain.joints])
     high = np.array([joint.limits.upper for joint in chain.joints])
     for duration in DURATIONS:

@@ -60,7 +60,7 @@ Piece = tuple[float, float, float]
 
 
 def swept_range(joint: Joint, share: float) -> tuple[float, float]:
-    """The middle `share` of a joint's position range; a half turn either way where it has no limits."""
+    """The middle `share` of a joint's position range; half a turn either way where it has no limits."""
     lower, upper = joint.limits.lower, joint.limits.upper
     if not np.isfinite([lower, upper]).all():
         lower, upper = -np.pi, np.pi
@@ -87,7 +87,7 @@ def _require_short(joint: Joint, what: str, seconds: float) -> None:
 
 
 def single_joint_sweep(chain: Mechanism, joint: int, pose: Array, options: SweepOptions) -> Trajectory:
-    """One joint through its range and back at constant speed, the others at `pose` (n,): (16)'s motion."""
+    """One joint through its range and back at constant speed, the others at `pose` (n,): the motion of (16)."""
     low, high = swept_range(chain.joints[joint], options.range)
     speed = sweep_speed(chain.joints[joint], options.speed)
     _require_speed(chain.joints[joint], speed)
@@ -109,9 +109,9 @@ def single_joint_sweep(chain: Mechanism, joint: int, pose: Array, options: Sweep
 
 
 def gravity_sweep(chain: Mechanism, seed: int, options: SweepOptions) -> Trajectory:
-    """All joints to and fro at constant speeds of their own, then the same path backwards: (18)'s motion.
+    """All joints to and fro, each at its own constant speed, then the same path backwards: the motion of (18).
 
-    Speeds and starts are drawn from the seed, so that the joints meet in ever new poses.
+    Speeds and starts are drawn from the seed, so that the joints meet in new poses all the time.
     """
     rng = np.random.default_rng(seed)
     half = _times(options.seconds, options.period)
@@ -205,9 +205,9 @@ def _smooth_step(x: Array) -> tuple[Array, Array, Array]:
 
 
 def _to_and_fro(low: float, high: float, start: float, speed: float, options: SweepOptions) -> list[Piece]:
-    """Pieces that turn round at both ends of the range and stand at `options.seconds`.
+    """Pieces that reverse at both ends of the range and end at `options.seconds`.
 
-    A turn covers no net distance, so it starts where the range has room for its overshoot.
+    A reversal covers no net distance, so it starts where the range has room for its overshoot.
     """
     blend = options.blend
     room = _blend_reach(speed, blend)
@@ -231,7 +231,7 @@ def _to_and_fro(low: float, high: float, start: float, speed: float, options: Sw
 
 
 def _blend_reach(speed: float, blend: float) -> float:
-    """How far a turn overshoots its start: the integral of the speed up to its zero."""
+    """How far a reversal overshoots its start: the integral of the speed up to its zero."""
     return float(_blend(np.array([0.5]), blend, speed, -speed)[0][0])
 
 

@@ -1,4 +1,4 @@
-"""A motion to be run: positions, speeds and accelerations on an even time grid, as a table that robots can be fed."""
+"""A motion to be run: positions, speeds and accelerations on an even time grid, as a table for robots."""
 
 from __future__ import annotations
 

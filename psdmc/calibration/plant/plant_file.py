@@ -1,6 +1,6 @@
 """A virtual robot's files: the plant (motors, friction, sensors, harness) and the DH table that it names.
 
-The robot's values are read here a second time, so that the virtual robot shares no code with what is calibrated by it.
+The robot's values are read by code of its own here, so that the virtual robot shares none with the calibration.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ HINT = "compare it with examples/plants/denso_virtual.toml"
 SMALLEST, LARGEST = 1e-9, 1e9
 """Of a motor's or friction's numbers in SI: wider than any joint, narrow enough that nothing overflows."""
 SLOWEST = 1e-6
-"""rad/s, Stribeck velocity: below, the integrator would have to resolve what no encoder shows."""
+"""rad/s, Stribeck velocity: for a smaller one the integrator would have to resolve motions that no encoder shows."""
 LARGEST_EXPONENT = 3.0
 """Of viscous friction: air drag has 2."""
 LARGEST_DELAY = 1.0
 """s, between a motion and its current."""
 FINEST = 1e-12
-"""rad or A, step of a sensor that has one: below, doubles of ordinary angles have no such steps."""
+"""rad or A, step of a sensor: doubles of ordinary angles cannot represent finer ones."""
 LARGEST_LENGTH = 1e3
 """m, of a link;  also m/s^2 of gravity."""
 LARGEST_BODY = 1e6
@@ -68,7 +68,7 @@ class JointTruth:
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """How the log differs from the truth.
+    """The sensors' imperfections.
 
     position_step   rad, quantisation
     current_noise   A RMS, white
@@ -84,7 +84,8 @@ class Sensors:
 
 @dataclass(frozen=True, slots=True)
 class Harness:
-    """A cable harness that no model here knows: a spring that saturates at `torque` (N m) beyond about `angle` (rad)."""
+    """A cable harness, an effect that no model here has: a spring that saturates at `torque` (N m) beyond about `angle`
+    (rad)."""
 
     joints: tuple[str, ...]
     torque: float
@@ -109,7 +110,7 @@ class PlantRow:
 
 @dataclass(frozen=True, slots=True)
 class PlantRobot:
-    """gravity in m/s^2, base frame."""
+    """A robot's rows; gravity in m/s^2, base frame."""
 
     name: str
     gravity: Triple
@@ -118,7 +119,7 @@ class PlantRobot:
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """What both files say."""
+    """The content of both files."""
 
     robot: PlantRobot
     joints: tuple[JointTruth, ...]
@@ -157,7 +158,7 @@ def plant_of(content: dict[str, Any], path: Path) -> Plant:
 
 
 def plant_texts(path: str | Path) -> tuple[bytes, bytes]:
-    """The bytes that decide a plant: its own file's and its robot's."""
+    """The bytes that a plant depends on: its own file's and its robot's."""
     path = Path(path)
     robot = path.parent / str(read_toml(path, WHAT).get("robot"))
     with opened(path, LARGEST_TOML) as own, opened(robot, LARGEST_TOML) as other:
@@ -211,7 +212,7 @@ def _harness(value: object, names: Sequence[str], faults: list[str]) -> Harness:
 
 
 def read_plant_robot(path: Path) -> PlantRobot:
-    """The DH table of a virtual robot; InputError where it is no such table, or a value is not known."""
+    """The DH table of a virtual robot; InputError where it is no such table, or a value is unknown."""
     with opened(path, LARGEST_TOML) as file:
         data = file.read()
     content = toml_content(data, str(path), "a robot as a DH table (.toml)")
@@ -231,7 +232,7 @@ def read_plant_robot(path: Path) -> PlantRobot:
 
 
 def _row(joint: dict[str, Any], faults: list[str]) -> PlantRow:
-    """One joint of a table that is well formed; what is unknown or absurd goes to the faults."""
+    """One joint of a well-formed table; unknown and absurd values go to the faults."""
     where = f"joint {quoted(str(joint.get('name', '')))}"
     keys = tuple(joint)
     table = TomlTable(

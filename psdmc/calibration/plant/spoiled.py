@@ -1,4 +1,4 @@
-"""Logs made wrong on purpose, as logs go wrong: what a verdict must notice."""
+"""Logs with faults that real logs have, made on purpose: a verdict must notice them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ALL = (*MOVED, "effort")
 
 
 def scaled(log: Log, factor: float | Sequence[float]) -> Log:
-    """Efforts times one factor, or one a joint: another unit, or currents where torques should stand."""
+    """Efforts multiplied by one factor, or one per joint: another unit, or currents in place of torques."""
     return replace(log, effort=log.effort * np.asarray(factor, dtype=np.float64))
 
 
@@ -33,12 +33,12 @@ def swapped(log: Log, first: int, second: int, columns: Sequence[str]) -> Log:
 
 
 def decimated(log: Log, every: int) -> Log:
-    """Each so many-th row."""
+    """Every `every`-th row."""
     return log.at(slice(None, None, every))
 
 
 def noise_only(log: Log, seed: int = 0) -> Log:
-    """Efforts that have nothing to do with the motion, of the same size."""
+    """Efforts of the same size that are unrelated to the motion."""
     rng = np.random.default_rng(seed)
     return replace(log, effort=rng.standard_normal(log.effort.shape) * np.std(log.effort, axis=0))
 

@@ -1,7 +1,7 @@
 """A robot with known truth: Pinocchio's dynamics, LuGre friction by scipy's stiff integrator, imperfect sensors.
 
-It shares no code with what is calibrated: robot files, friction law and sensors are read and written here a second time.
-The motion is prescribed, as a stiff position controller would keep it; the motors give what the motion takes.
+It shares no code with the calibration: robot files, friction law and sensors are implemented here a second time. The
+motion is prescribed, as by a stiff position controller; the motors give the torque that it needs.
 """
 
 from __future__ import annotations
@@ -70,8 +70,10 @@ def load_virtual_robot(
 ) -> VirtualRobot:
     """A plant from its TOML file; `robot` there names a DH file beside it.
 
-    ideal_sensors  no noise, no steps, no delay;  harness  with the file's cable harness
-    InputError names what is wrong with either file.
+    ideal_sensors  no noise, no steps, no delay
+    harness        with the file's cable harness
+
+    InputError names the faults of either file.
     """
     plant = read_plant(Path(path))
     if harness and plant.harness is None:
@@ -108,7 +110,7 @@ def _pinocchio_model(robot: PlantRobot) -> tuple[Any, Any]:
 def simulate(
     robot: VirtualRobot, trajectory: Trajectory, *, payload: Payload | None = None, seed: int = 0
 ) -> Log:
-    """The log that the robot's sensors would give while it runs a trajectory from rest. Rows as the trajectory's."""
+    """The log that the robot's sensors give while it runs a trajectory from rest. Rows as the trajectory's."""
     shifted = _at(trajectory, trajectory.time + robot.sensors.effort_delay)
     tau = _rigid_torque(_loaded(robot, payload), *shifted)
     for k, joint in enumerate(robot.joints):

@@ -1,4 +1,4 @@
-"""How well a calibrated model file predicts logs: every figure from what the file holds, nothing from the fit.
+"""How well a calibrated model file predicts logs. All figures are computed from the file's content, none from the fit.
 
 The regressor is not used where one log was fitted: torques come from Newton-Euler on the file's theta_b.
 """
@@ -39,9 +39,10 @@ from psdmc.model.store import save
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Delivered:
-    """A calibrated model as its file tells it.
+    """A calibrated model as read from its file.
 
-    friction         by joint and parameter name;  constants  N m/A by joint, empty where torques were logged
+    friction         by joint and parameter name
+    constants        N m/A by joint, empty where torques were logged
     """
 
     model: DynamicsModel
@@ -55,7 +56,7 @@ class Delivered:
 
     @property
     def motors(self) -> Motors:
-        """What makes torques of logged effort."""
+        """The motors, which turn logged effort into torque."""
         names = self.model.joint_names
         constants = (
             np.array([self.constants[name] for name in names]) if self.constants else np.ones(len(names))
@@ -64,7 +65,7 @@ class Delivered:
 
 
 def delivered(model: DynamicsModel) -> Delivered:
-    """What a calibrated model holds; InputError where it was not calibrated by this psdmc or a newer one."""
+    """The contents of a calibrated model; InputError where it was not calibrated by this psdmc or a newer one."""
     kept = model.provenance.get("calibration")
     if model.theta_b is None or not isinstance(kept, Mapping) or "prediction" not in kept:
         raise InputError(
@@ -90,7 +91,7 @@ def reread(model: DynamicsModel) -> DynamicsModel:
 def delivered_quality(
     model: DynamicsModel, source: Sequence[AnyLog] | Runs, check: CheckOptions | None = None
 ) -> tuple[StepQuality, ...]:
-    """R^2 and RMSE of a calibrated model on logs, or on a campaign's runs, by what its file holds.
+    """R^2 and RMSE of a calibrated model on logs, or on a campaign's runs, from the content of its file.
 
     InputError where the model holds no calibration, or a log cannot be used.
     """
@@ -151,7 +152,7 @@ def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
 
 
 def _identified(found: Delivered) -> dict[str, float]:
-    """Torque constants that a motor step found; what was given is not judged by it."""
+    """Torque constants that a motor step found; given ones are not judged by it."""
     rows = found.model.provenance["calibration"]["motors"]
     return {row["joint"]: found.constants[row["joint"]] for row in rows if row["seen"]}
 

@@ -1,4 +1,4 @@
-"""What a user should know of a calibration before using it: each doubt a line."""
+"""Doubts about a calibration: a line each, for its user."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from psdmc.calibration.verdict.findings import Findings
 from psdmc.calibration.verdict.verdict import listed
 
 ALONE = ("Motor", "Friction")
-"""Steps that excite one joint alone, so that each must be followed."""
+"""Steps that move one joint alone, so that each of them must fit."""
 MOST_LISTED = 4
 """Names in one line; the rest is counted."""
 
 
 def doubts(found: Findings) -> Iterator[str]:
-    """All that there are."""
+    """All doubts."""
     yield from _few(found)
     yield from _fair(found)
     yield from _earlier_steps(found)
@@ -32,7 +32,7 @@ def doubts(found: Findings) -> Iterator[str]:
 
 
 def fits_poorly(found: Findings) -> bool:
-    """Whether R^2 or gains raise a doubt: then another reading of the log's columns is believed."""
+    """Whether R^2 or gains raise a doubt. Only then are other readings of the log's columns considered."""
     return any(True for _ in (*_fair(found), *_odd_gains(found)))
 
 
@@ -57,7 +57,7 @@ def _fair(found: Findings) -> Iterator[str]:
 
 
 def _earlier_steps(found: Findings) -> Iterator[str]:
-    """Motors and friction; gravity and inertia alone may be too small at a joint to follow."""
+    """Doubts about motors and friction. Gravity and inertia are left out, as they may be too small at a joint to fit."""
     for step in found.record.steps[:-1]:
         named = [
             f"joint {name} {both.held_out.r2:.3g}"
@@ -80,7 +80,7 @@ def _odd_gains(found: Findings) -> Iterator[str]:
 
 
 def _unlike_limits(found: Findings) -> Iterator[str]:
-    """Torques that are no share of what the file says the motors can give, or several times that."""
+    """Torques that are far below the file's limits for the motors, or several times as large."""
     limits = np.array([joint.limits.effort for joint in found.evidence.model.mechanism.joints])
     known = np.isfinite(limits) & (limits > 0)
     if not known.any():
@@ -133,7 +133,7 @@ def _not_carried_over(found: Findings) -> Iterator[str]:
 
 
 def _open_parameters(found: Findings) -> Iterator[str]:
-    """What the data leave open, or know so badly that it matters to the torque."""
+    """Parameters that the data leave open, or determine so badly that it matters to the torque."""
     rows = found.record.parameters
     fixed = np.array([np.isfinite(row.std) for row in rows])
     unseen = [row.name for row, seen in zip(rows, fixed, strict=True) if not seen]
@@ -156,7 +156,7 @@ def _open_parameters(found: Findings) -> Iterator[str]:
 
 
 def _indefinite(found: Findings) -> Iterator[str]:
-    """What the model file cannot do, where that was tested."""
+    """A mass matrix that is not positive definite, where that was tested."""
     mass = found.record.facts.get("mass_matrix", {})
     if mass.get("failing"):
         yield (

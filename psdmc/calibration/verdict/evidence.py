@@ -1,4 +1,4 @@
-"""What a verdict is judged from: independent samples of the exciting motion, as the log has them."""
+"""The data that a verdict is based on: independent samples of the exciting motion, as the log has them."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from psdmc.model.dynamics_model import DynamicsModel
 SIGN_SPEED = 0.03
 """rad/s over which Coulomb friction changes sign, as in the linear fit."""
 MOST_ROWS = 4000
-"""Samples that a verdict looks at; longer logs are thinned further, evenly."""
+"""Samples that a verdict uses; longer logs are thinned further, evenly."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A run to judge by: its log and what the tip carried."""
+    """A run to judge by: its log and the known load at the tip."""
 
     log: AnyLog
     tool: Load | None = None
@@ -77,7 +77,7 @@ class Evidence:
         return replace(self, **kept)
 
     def turned(self, signs: Array, order: Sequence[int]) -> Evidence:
-        """As if joint k's position were `signs[k]` times column `order[k]` of the log."""
+        """The samples as if joint k's position were `signs[k]` times column `order[k]` of the log."""
         columns = list(order)
         moved = {name: signs * getattr(self, name)[:, columns] for name in ("q", "qd", "qdd", "sign")}
         return replace(self, **moved)
@@ -100,8 +100,8 @@ def evidence_of(
 def _samples(
     model: DynamicsModel, motion: Motion, motors: Motors, options: FilterOptions
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Of one motion: q, qd, qdd, sign and torque of its samples, and the RMS noise that passes the filter, were noise as
-    dense there as above the cut-off."""
+    """For one motion: q, qd, qdd, sign and torque of its samples, and the RMS noise that passes the filter if noise has
+    the same density below the cut-off as above."""
     log = checked(motion.log, model.mechanism, options.cutoff)
     parts, above, count = [], np.zeros(model.n), 0
     for stretch in stretches(log, options):

@@ -1,8 +1,8 @@
-"""How well a joint explains a column of efforts, as it is and with its sign turned.
+"""How well a joint explains a column of efforts, with either sign.
 
-By the file's own parameters where it states them: the joint's torque times a gain that is not negative. Else by the
-joint's regressor, fitted to the first part of the data and judged on the rest. Either way with friction that takes power,
-so that signs count where the rigid torque says nothing.
+Where the file states parameters: by the joint's torque times a gain that is not negative. Else by the joint's
+regressor, fitted to the first part of the data and judged on the rest. Both include friction that takes power, so that
+signs are found where the rigid torque does not show them.
 """
 
 from __future__ import annotations

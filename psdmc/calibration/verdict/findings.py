@@ -1,4 +1,4 @@
-"""What a verdict's reasons and doubts are found in: the record's figures beside the log's, joint by joint."""
+"""The figures from which a verdict's reasons and doubts follow: the record's and the log's, joint by joint."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from psdmc.calibration.verdict.verdict import JointFigures, listed
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 
 NOISE_FLOOR = 1e-4
-"""Of the torque's variation: less noise above the cut-off is a log that was smoothed, or no sensor's."""
+"""Share of the torque's variation: less noise above the cut-off means a log that was smoothed, or that is no sensor's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """A step's independent samples that were fitted, and how many unknowns the data determined from them."""
+    """A step's independent samples that were fitted, and the number of unknowns that the data determined from them."""
 
     step: str
     samples: int
@@ -34,7 +34,7 @@ class Demand:
 
 
 class Findings:
-    """A record and the log that it was found from, and figures of both.
+    """A record and the log that it was fitted to, with figures of both.
 
     variation, speed   (n,) standard deviation of the torque; RMS speed
     fitted, held_out   per joint, of the whole torque: RMSE and R^2
@@ -57,11 +57,11 @@ class Findings:
         return any(demand.per_unknown < self.limits.fewest_samples for demand in self.demands)
 
     def follows_badly(self, k: int) -> bool:
-        """Also where R^2 is no number though there is a torque to follow."""
+        """Whether a joint's R^2 is too low, or not a number though there is a torque to predict."""
         return not self.held_out[k].r2 >= self.limits.poor_r2 and bool(self.variation[k] > 0)
 
     def excused(self, k: int) -> bool:
-        """A joint that hardly moves, or whose torque is sensor noise, has nothing to follow."""
+        """Whether a joint hardly moves, or its torque is sensor noise, so that there is nothing to predict."""
         noise = float(self.evidence.noise[k])
         noisy = noise > NOISE_FLOOR * self.variation[k] and self.held_out[k].rmse < self.limits.sure * noise
         return bool(self.speed[k] < self.limits.hardly) or noisy
@@ -109,7 +109,7 @@ class Findings:
 
 
 def _whole_torque(record: Calibration, joint: str, held_out: bool) -> Quality:
-    """Of the last step: there the whole torque is predicted."""
+    """The quality in the last step, where the whole torque is predicted."""
     both = record.steps[-1].joints.get(joint)
     if both is None:
         return Quality(float("nan"), float("nan"))

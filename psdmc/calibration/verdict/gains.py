@@ -11,8 +11,8 @@ from psdmc.calibration.verdict.evidence import Evidence
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 VISIBLE_SHARE = 0.05
-"""The file's torque, friction and drive inertia apart, over the measured torque's variation (RMS), from which its gain
-says something: below it a wrong wrist mass in the file looks like a wrong unit."""
+"""Least ratio of the file's torque, without friction and drive inertia, to the measured torque's variation (RMS) for
+its gain to count: below it a wrong wrist mass in the file looks like a wrong unit."""
 SETTLED = 0.25
 """Largest standard deviation of a gain that counts, relative to the gain (or to the whole log's gain)."""
 LEADING = 0.5
@@ -28,7 +28,7 @@ DRIVE_INERTIA = PARAMETERS_PER_LINK - 1
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """Measured torque per torque by the file; NaN where there is none. `visible`: whether it says something."""
+    """Measured torque per torque by the file; NaN where there is none. `visible`: whether it counts."""
 
     value: float
     std: float
@@ -37,7 +37,7 @@ class Gain:
 
 @dataclass(frozen=True, slots=True)
 class Power:
-    """W, mean power that friction takes of a joint, with its standard deviation; NaN where it cannot be told."""
+    """W, mean power that friction takes of a joint, with its standard deviation; NaN where it cannot be determined."""
 
     value: float
     std: float
@@ -92,7 +92,8 @@ def nuisance(evidence: Evidence, k: int) -> Array:
 
 
 def _scale(lines: list[_Line]) -> float:
-    """The log's unit: gain of the joint whose torque by the file is largest, one where that joint does not follow it."""
+    """The log's unit: gain of the joint whose torque by the file is largest; one where that joint's torque does not
+    follow it."""
     first = max(lines, key=lambda line: line.size)
     return abs(first.gain) if first.correlation >= LEADING else 1.0
 
@@ -128,7 +129,7 @@ def _power(evidence: Evidence, rigid: Array, k: int) -> Power:
 
 
 def basis(columns: Array) -> Array:
-    """(N, rank) orthonormal; directions of the scaled columns that are noise are left out."""
+    """(N, rank) orthonormal basis of the columns; directions of the scaled columns that are noise are left out."""
     scale: Array = np.linalg.norm(columns, axis=0)
     kept: Array = columns[:, scale > 0] / scale[scale > 0]
     if not kept.shape[1]:
@@ -138,7 +139,7 @@ def basis(columns: Array) -> Array:
 
 
 def _less(explained: Array, values: Array) -> Array:
-    """Values less their part in an orthonormal basis."""
+    """The values without their part in an orthonormal basis."""
     return np.asarray(values - explained @ (explained.T @ values))
 
 

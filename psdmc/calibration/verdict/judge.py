@@ -1,9 +1,9 @@
 """The verdict on a calibration, from its record and from the log's own evidence.
 
-What refuses: too few samples, a joint whose torque has the wrong size or sign beside the file's, friction that gives
-power, held-out data that the model does not follow. What raises a doubt only: a fit that is fair, a joint that hardly
-moves, an effect that the model lacks, parameters that the data leave open. docs/calibration.md lists the limits, decision
-0021 says why.
+A calibration is refused for too few samples, a joint whose torque has the wrong size or sign compared with the file's,
+friction that gives power, and held-out data that the model does not predict. Doubts only are a fair fit, a joint that
+hardly moves, an effect that the model lacks, and parameters that the data leave open. docs/calibration.md lists the
+limits, decision 0021 their reasons.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def judge(
 
 
 def _suspects(found: Findings) -> tuple[str, ...]:
-    """None of a log too short to tell."""
+    """Explanations of a bad fit; none for a log too short to tell."""
     if found.starved:
         return ()
     named = (suspect(found.evidence), unit_suspect(found.gains))

@@ -1,4 +1,4 @@
-"""A calibration's record completed by what its file delivers: R^2, the price of physical consistency, the mass matrix."""
+"""A calibration's record with the figures of its model file: R^2, the price of physical consistency, the mass matrix."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ def judged_record(
 
 
 def _cost(before: Sequence[StepQuality], after: Sequence[StepQuality]) -> dict[str, float]:
-    """Held-out R^2 of the whole torque that is given up, by joint."""
+    """Held-out R^2 of the whole torque that is lost, by joint."""
     was, now = ({step.step: step for step in steps}[WHOLE].joints for steps in (before, after))
     return {name: was[name].held_out.r2 - now[name].held_out.r2 for name in now}
 
 
 def _cost_of_friction(before: Sequence[StepQuality], after: Sequence[StepQuality]) -> float | None:
-    """The most that any joint's friction run gives up of its held-out R^2; None where there are no such runs."""
+    """The largest loss of held-out R^2 in any joint's friction run; None where there are no such runs."""
     was, now = ({step.step: step for step in steps}.get("Friction") for steps in (before, after))
     if was is None or now is None:
         return None

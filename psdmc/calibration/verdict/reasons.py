@@ -1,4 +1,4 @@
-"""Why a calibration cannot be used: each reason a line."""
+"""Reasons why a calibration cannot be used: a line each."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from psdmc.calibration.verdict.findings import Findings
 from psdmc.calibration.verdict.verdict import listed
 
 NOT_PHYSICAL = "not_physical"
-"""Fact of a record whose physically consistent version could not be found: why not."""
+"""Name of the fact that tells why a record has no physically consistent version."""
 
 
 def reasons(found: Findings) -> Iterator[str]:
-    """All that there are; none where it is usable."""
+    """All reasons; none where it is usable."""
     yield from _unphysical(found)
     yield from _too_few(found)
     yield from _wrong_gains(found)

@@ -1,4 +1,4 @@
-"""What a calibration found, as tables: the report and the model file are made from it."""
+"""The results of a calibration as tables, from which the report and the model file are made."""
 
 from __future__ import annotations
 
@@ -66,13 +66,14 @@ class NumberRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """Everything a calibration hands on.
+    """The whole result of a calibration.
 
     model       the calibrated model, its provenance carrying these numbers
-    motors      torque constants; friction: seven per joint, or Coulomb, viscous and offset
-    steps       table 3's columns, by what the model's file holds (delivered.delivered_quality)
+    motors      torque constants
+    friction    seven per joint, or Coulomb, viscous and offset
+    steps       table 3's columns, computed from the model file's content (delivered.delivered_quality)
     prediction  what else a prediction needs
-    notes       what a reader should know and need not worry about
+    notes       remarks without consequences for its use
     facts       plain values: ranks, condition numbers, singular values, delay, options
     verdict     whether it can be used; None before it was judged
     """
@@ -151,7 +152,7 @@ def _quality(step: StepQuality) -> dict[str, Any]:
 def four_step_record(
     model: DynamicsModel, found: FourSteps, theta_b: Array, options: CalibrationOptions
 ) -> Calibration:
-    """The record of a campaign with these base parameters; its quality is still to be found."""
+    """The record of a campaign with these base parameters, without its quality."""
     inertial, gravity = found.inertial, found.gravity
     groups = ["inertial"] * model.l
     for k in gravity.split.pivots:
@@ -202,7 +203,7 @@ def four_step_record(
 def linear_record(
     model: DynamicsModel, found: LinearResult, values: Array, options: LinearOptions
 ) -> Calibration:
-    """The record of a linear fit with these values of the whole vector; its quality is still to be found."""
+    """The record of a linear fit with these values of the whole vector, without its quality."""
     problem, solved = found.problem, found.estimate
     kept_at = _kept_at(model, values, found.prior.scale)
     seen = visibility(problem.names, values, solved.std, solved.unseen, kept_at)
@@ -250,36 +251,37 @@ def linear_record(
 
 
 def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration:
-    """The record whose model carries its numbers as they now are; with these base parameters, where given."""
+    """The record with a model that carries its present numbers, and these base parameters where given."""
     provenance = {**record.model.provenance, "calibration": record.as_json()}
     theta = record.model.theta_b if theta_b is None else theta_b
     return replace(record, model=replace(record.model, theta_b=theta, provenance=provenance))
 
 
 def with_data(record: Calibration, logs: Sequence[AnyLog]) -> Calibration:
-    """The record that says which logs it is of."""
+    """The record with the names, lengths and dates of its logs."""
     data = [{"log": log.name, "rows": len(log), "seconds": log.duration, "date": log.date} for log in logs]
     return replace(record, facts={**record.facts, "data": data})
 
 
 def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:
-    """The same calibration with its verdict, in the model's provenance, too."""
+    """The calibration with its verdict, which is also in the model's provenance."""
     return with_model(replace(record, verdict=verdict))
 
 
 def verdict_of(record: Calibration) -> Verdict:
-    """The verdict of a record that calibration has finished."""
+    """The verdict of a finished calibration's record."""
     if record.verdict is None:
         raise InternalError(f"{record.robot}: calibrated, but not judged")
     return record.verdict
 
 
 MOVED = 1e-6
-"""Of what is believable: further from the prior, an invisible parameter was moved by physical consistency."""
+"""Distance from the prior, in units of what is believable, from which an invisible parameter counts as moved by
+physical consistency."""
 
 
 def _kept_at(model: DynamicsModel, values: Array, scale: Array) -> list[str]:
-    """Where each value stays that the data do not show: friction at zero, theta_b at the file's."""
+    """The value that each unseen parameter is kept at, in words: friction at zero, theta_b at the file's."""
     prior = np.zeros(len(values))
     prior[: model.l] = 0.0 if model.theta_b is None else model.theta_b
     names = ["zero" if model.theta_b is None else "the file's value"] * model.l
@@ -313,7 +315,7 @@ def _parameter_rows(
 
 
 def _motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) -> tuple[NumberRow, ...]:
-    """None where torques were logged; a constant that was given, not identified, is marked as not seen."""
+    """Rows of the torque constants; none where torques were logged. A given constant is marked as not seen."""
     constants, relative = motors.torque_constant, motors.relative_std
     if step is None and np.all(constants == 1.0):
         return ()
@@ -325,7 +327,7 @@ def _motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) 
 
 
 def _lugre_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
-    """The seven per joint; forces carry the torque constant's uncertainty too."""
+    """The seven per joint; the uncertainty of forces includes the torque constant's."""
     relative = dict(zip(model.joint_names, found.motors.relative_std.tolist(), strict=True))
     rows: list[NumberRow] = []
     for name, joint in found.friction.joints.items():

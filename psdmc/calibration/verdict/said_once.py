@@ -1,4 +1,4 @@
-"""Warnings that the verdict has not said already."""
+"""Warnings that the verdict does not repeat."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SAME = (
     ("torque constant is negative", "the torque constant is negative"),
     ("stand still", "hardly move"),
 )
-"""Words of a warning, and of the doubt that says the same."""
+"""Words of a warning, and of the doubt with the same meaning."""
 
 
 def unsaid_warnings(record: Calibration) -> tuple[str, ...]:

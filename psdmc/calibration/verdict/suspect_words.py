@@ -14,7 +14,8 @@ def in_words(
     effort_order: Sequence[int],
     effort_signs: Sequence[int],
 ) -> str:
-    """What a log would have wrong were joint k's position signs[k] times column order[k], and its effort likewise."""
+    """A sentence for the hypothesis that joint k's position is signs[k] times column order[k] of the log, and its
+    effort likewise."""
     parts = []
     if order == effort_order:
         parts += _permutation(order, names, "position and effort")
@@ -52,7 +53,7 @@ def _permutation(order: Sequence[int], names: Sequence[str], what: str) -> list[
 
 
 def cycles(order: Sequence[int]) -> list[list[int]]:
-    """Of a permutation, those longer than one."""
+    """The cycles of a permutation that are longer than one."""
     seen: set[int] = set()
     found = []
     for start in range(len(order)):
@@ -68,5 +69,5 @@ def cycles(order: Sequence[int]) -> list[list[int]]:
 
 
 def exchanges(order: Sequence[int]) -> int:
-    """Pairs that must be exchanged to get a permutation."""
+    """Number of exchanges of pairs that make a permutation."""
     return sum(len(cycle) - 1 for cycle in cycles(order))

@@ -1,8 +1,8 @@
-"""What would explain a bad fit: columns of joints exchanged, signs turned.
+"""Explanations of a bad fit: columns of joints exchanged, signs reversed.
 
-Hypotheses on positions (a sign turned, two columns exchanged) are tried one after the other, the best kept. Under each,
-every effort column is explained by every joint with either sign (`explain`), and an assignment finds which column is
-whose. A change must explain enough more to be named.
+Hypotheses on positions (a sign reversed, two columns exchanged) are tried one after the other, the best kept. Under
+each, every effort column is explained by every joint with either sign (`explain`), and an assignment finds which column
+is whose. A change must improve the explanation enough to be named.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from psdmc.calibration.verdict.explain import Explainer
 from psdmc.calibration.verdict.suspect_words import exchanges, in_words
 
 ROWS = 500
-"""Samples that hypotheses are tried on."""
+"""Samples on which hypotheses are tried."""
 PRICE = 0.3
-"""Explained share, summed over joints, that a change must gain to be believed: a turned sign gains about 0.9 ..."""
+"""Explained share, summed over joints, that a change must add to be accepted: a reversed sign adds about 0.9 ..."""
 FACTOR = 4.0
 """... or the factor by which what is left unexplained must fall, where little was, as with whole joints swapped ..."""
 LEAST = 0.05
 """... by at least this much, summed over joints."""
 CLOSE = 0.2
-"""Share of a change's worth by which another hypothesis may fall short of the best and still be named."""
+"""Share of a change's worth by which another hypothesis may be worse than the best and still be named."""
 MOST_NAMED = 3
-"""Hypotheses that explain a log equally well and are named; beyond, only the best."""
+"""Number of equally good hypotheses that are named; where there are more, only the best is."""
 CHANGES = 3
 """Changes of positions that are tried on top of each other."""
 BELIEVED = 0.7
-"""Mean explained share that a hypothesis must reach: of so many, some explains even noise a little better."""
+"""Least mean explained share of a hypothesis: of many hypotheses, some explain even noise a little better."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Hypothesis:
 
     @property
     def changes(self) -> int:
-        """Signs turned and pairs exchanged; all signs at once, or one change of position and effort, are one."""
+        """Signs reversed and pairs exchanged; all signs at once, or one change of position and effort, count as one."""
         swaps = exchanges(self.order)
         if self.effort_order != self.order:
             swaps += exchanges(self.effort_order)
@@ -61,7 +61,8 @@ class Hypothesis:
         return swaps + sum(-1 in both for both in zip(self.signs, self.effort_signs, strict=True))
 
     def worth(self, stated: Hypothesis) -> float:
-        """Changes that would pay for what this explains more than the log as it is, less the changes it makes."""
+        """The number of changes that the better explanation justifies, compared with the log as it is, less the changes
+        made."""
         gained = self.score - stated.score
         left = max(len(self.signs) - self.score, 1e-12)
         fallen = np.log((left + max(gained, 0.0)) / left) / np.log(FACTOR) if gained > LEAST else 0.0
@@ -72,7 +73,7 @@ class Hypothesis:
 
 
 def suspect(evidence: Evidence, positions: bool = True) -> str | None:
-    """The best explanation of a log that differs from what it says, in words; None where none is much better.
+    """The best explanation, in words, of a log that is not what it says; None where none is much better.
 
     positions   whether positions are suspected, too, or efforts alone
     """
@@ -92,7 +93,7 @@ def suspect(evidence: Evidence, positions: bool = True) -> str | None:
 
 
 def _searched(evidence: Evidence, stated: Hypothesis, rounds: int) -> list[Hypothesis]:
-    """Everything that was tried, the log as it is first."""
+    """All hypotheses that were tried, the log as it is first."""
     best = _assigned(evidence, stated, stated.signs, stated.order)
     tried = [stated, best]
     for _ in range(rounds):
@@ -106,7 +107,7 @@ def _searched(evidence: Evidence, stated: Hypothesis, rounds: int) -> list[Hypot
 
 
 def _stated(evidence: Evidence) -> Hypothesis:
-    """The log as it is."""
+    """The hypothesis that the log is right."""
     explain = Explainer(evidence)
     score = sum(explain(k, evidence.torque[:, k])[0] for k in range(evidence.n))
     here = tuple(range(evidence.n))
@@ -114,7 +115,7 @@ def _stated(evidence: Evidence) -> Hypothesis:
 
 
 def _moves(one: Hypothesis) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Positions with one more sign turned, or one more pair exchanged."""
+    """Positions with one more sign reversed, or one more pair exchanged."""
     n = len(one.signs)
     for k in range(n):
         yield tuple(-s if j == k else s for j, s in enumerate(one.signs)), one.order
@@ -127,7 +128,8 @@ def _moves(one: Hypothesis) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]
 def _assigned(
     evidence: Evidence, stated: Hypothesis, signs: tuple[int, ...], order: tuple[int, ...]
 ) -> Hypothesis:
-    """The efforts' best signs and order for these positions; efforts that stay, or go with the positions, cost nothing."""
+    """The efforts' best signs and order for these positions. Efforts that stay, or change with the positions, cost
+    nothing."""
     n = evidence.n
     explain = Explainer(evidence.turned(np.array(signs, dtype=np.float64), order))
     shares = np.array([[explain(k, evidence.torque[:, i]) for i in range(n)] for k in range(n)])
@@ -140,7 +142,8 @@ def _assigned(
 
 
 def _chosen(shares: Array, moving: Array, turning: Array) -> tuple[tuple[int, ...], tuple[int, ...], float]:
-    """Per joint the sign and the column that explain most, at what turning and moving cost; and the share explained."""
+    """Per joint the sign and the column that explain most, at the costs of reversing and moving; and the explained
+    share."""
     worth = shares - turning
     turned = np.argmax(worth, axis=2)
     joints, columns = linear_sum_assignment(np.max(worth, axis=2) - moving, maximize=True)

@@ -1,4 +1,4 @@
-"""The unit that a log's gains against the file point to."""
+"""The unit that a log's gains against the file suggest."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from psdmc.calibration.verdict.gains import Gain
 
 UNITS = ((1e-3, "kN m (or kN)?"), (1e3, "mN m (or mN)?"))
-"""Gains that a unit would give."""
+"""Units, and the gains that each would give."""
 ABOUT = 2.5
-"""Factor within which a gain is about another: a file's own masses may be wrong by as much."""
+"""Factor within which two gains count as similar: a file's own masses may be wrong by as much."""
 ALIKE = 12.0
-"""Largest over smallest gain of a log whose joints have one fault: torque constants differ by a few times."""
+"""Largest over smallest gain of a log whose joints share one fault: torque constants differ by a few times."""
 MOTOR_SIDE = (1.0 / 300.0, 1.0 / ABOUT)
 """Gains that amperes, or torque before a gear, would give."""
 
 
 def unit_suspect(gains: Sequence[Gain]) -> str | None:
-    """In words; None where the visible gains are about one, or contradict each other."""
+    """The suspected unit, in words; None where the visible gains are about one, or contradict each other."""
     seen = np.array([gain.value for gain in gains if gain.visible])
     if not len(seen) or np.any(seen <= 0) or seen.max() > ALIKE * seen.min():
         return None

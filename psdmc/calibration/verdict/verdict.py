@@ -1,4 +1,4 @@
-"""What a calibration is worth: usable, usable with these doubts, or not usable, and the figures that say so."""
+"""The verdict on a calibration: usable, usable with doubts, or not usable, with the figures behind it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ NOT_USABLE_STATUS = 6
 
 @dataclass(frozen=True, slots=True)
 class JointFigures:
-    """What one joint's share of the verdict is judged from; NaN where a figure does not exist.
+    """The figures by which one joint is judged; NaN where a figure does not exist.
 
     r2, rmse       on held-out data, whole torque (N m, N where the joint slides)
-    gain, gain_std measured torque, friction apart, per torque by the file's own theta_b: one where the file is right
-    visible        whether the file's torque stands out enough for its gain to say anything
-    friction_power, friction_power_std   W, mean power that friction takes: positive on any real joint
+    gain, gain_std measured torque, without friction, per torque by the file's own theta_b: one where the file is right
+    visible        whether the file's torque is large enough for its gain to count
+    friction_power W, mean power that friction takes: positive on any real joint;  friction_power_std
     noise_ratio    residual over the sensor noise that passes the filter
     speed          rad/s (m/s), RMS
     """
@@ -39,11 +39,11 @@ class JointFigures:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The verdict with everything that speaks against the calibration.
+    """The verdict with all reasons and doubts.
 
     reasons    why it is not usable; empty where it is
     doubts     what a user should know before using it
-    suspects   what would explain a bad fit: joints swapped, signs turned, units
+    suspects   possible explanations of a bad fit: joints swapped, signs reversed, units
     joints     figures, in the model's order
     samples_per_unknown   independent samples per fitted unknown, the smallest of all steps
     """
@@ -66,11 +66,11 @@ class Verdict:
 
     @property
     def exit_status(self) -> int:
-        """Of the command line: 0 for both usable verdicts."""
+        """Exit status of the command line: 0 for both usable verdicts."""
         return 0 if self.usable else NOT_USABLE_STATUS
 
     def lines(self) -> list[str]:
-        """The verdict as text: the word first, then what it rests on."""
+        """The verdict as text: the word first, then its grounds."""
         return [
             f"verdict: {self.word}",
             *(f"  not usable: {reason}" for reason in self.reasons),

@@ -1,4 +1,4 @@
-"""The limits of a verdict: docs/calibration.md lists them, decision 0021 says why they are what they are."""
+"""The limits of a verdict. docs/calibration.md lists them, decision 0021 gives the reasons."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from dataclasses import dataclass
 class VerdictOptions:
     """The limits of a verdict.
 
-    fewest_samples, few_samples   independent samples per fitted unknown: below, refused; doubted
-    poor_r2, fair_r2              held-out R^2 of a joint's whole torque: below, refused; doubted
-    gains, sure_gains             measured torque per torque by the file: outside, refused; doubted
-    hardly                        rad/s (m/s) RMS, below which a joint hardly moves: friction's sign is not settled there
-    noise_ratio                   residual over sensor noise above which the model lacks an effect
-    worse                         held-out RMSE over fitted RMSE above which a fit does not carry over
-    carried                       held-out RMSE over the torque's variation below which it does not matter that it is worse
-    noticeable                    the same for an effect that the model lacks
-    settled                       torque that one parameter's standard deviation stands for, over the torque's variation
-    sure                          standard deviations by which friction's power must be negative
-    friction_share                of the motor's power below which friction is not judged
-    of_limit                      largest torque over the file's effort limit: doubted outside
+    fewest_samples, few_samples  independent samples per fitted unknown: below, refused; doubted
+    poor_r2, fair_r2             held-out R^2 of a joint's whole torque: below, refused; doubted
+    gains, sure_gains            measured torque per torque by the file: outside, refused; doubted
+    hardly                       rad/s (m/s) RMS, below which a joint hardly moves: friction's sign is then unknown
+    noise_ratio                  residual over sensor noise above which the model lacks an effect
+    worse                        held-out RMSE over fitted RMSE above which a fit does not predict other data
+    carried                      held-out RMSE over the torque's variation below which `worse` does not matter
+    noticeable                   the same for an effect that the model lacks
+    settled                      torque for one standard deviation of a parameter, over the torque's variation
+    sure                         standard deviations by which friction's power must be negative
+    friction_share               of the motor's power below which friction is not judged
+    of_limit                     largest torque over the file's effort limit: doubted outside
     """
 
     fewest_samples: float = 8.0

@@ -1,4 +1,4 @@
-"""A calibration's record with the verdict on it: evidence from the same logs that were fitted."""
+"""A calibration's record with its verdict, whose evidence is the logs that were fitted."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def with_verdict_on_logs(
     options: FilterOptions,
     limits: VerdictOptions,
 ) -> Calibration:
-    """Of plain logs.
+    """The record of a fit of plain logs, with its verdict.
 
     model   as it was given, whose theta_b is the file's; record holds the calibrated one
     """
@@ -44,7 +44,7 @@ def with_verdict_on_campaign(
     options: FilterOptions,
     limits: VerdictOptions,
 ) -> Calibration:
-    """Of a campaign: gains and friction are judged on its exciting motions."""
+    """The record of a campaign with its verdict: gains and friction are judged on its exciting motions."""
     motions = [Motion(run.log, run.tool) for run in runs.inertial]
     evidence = evidence_of(model, regressor, motions, motors, options)
     demands = [
