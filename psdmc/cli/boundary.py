@@ -1,4 +1,4 @@
-"""Where errors end: one line, a hint and an exit status; a traceback only with --debug."""
+"""Errors of the command line: one line, a hint and an exit status; a traceback only with --debug."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from psdmc.cli.one_line import one_line
 from psdmc.errors import InternalError, PsdmcError, ToolchainError
 
 CLOSED_STATUS = 1
-"""Whoever read the output went away (`psdmc show m.npz | head`): nothing is wrong, and not everything was said."""
+"""Exit status where the reader of the output has closed it (`psdmc show m.npz | head`): nothing failed, but the output
+is incomplete."""
 INTERNAL_STATUS = 70
 
 
@@ -40,7 +41,7 @@ def run(arguments: list[str] | None = None) -> None:
 
 
 def _run(words: list[str]) -> None:
-    """The command, and all that it said on its way out: a full disk behind standard output shows here."""
+    """Run the command and flush its output: a full disk behind standard output raises here."""
     if needs_measuring(words):
         with interrupt.at_once():
             from psdmc.cli.measuring import add_commands
@@ -54,7 +55,7 @@ def _run(words: list[str]) -> None:
 
 
 def _described(error: OSError) -> str:
-    """What the system refused, where no stage said it in words of its own."""
+    """The message of an OSError that no stage has described."""
     if error.filename is None:
         _silence(sys.stdout)
         return f"standard output: {error.strerror or error}"
@@ -62,7 +63,7 @@ def _described(error: OSError) -> str:
 
 
 def _fail(words: list[str], message: str, hint: str | None, status: int) -> None:
-    """Print and leave; inside an `except`, so that --debug can show where it came from."""
+    """Print and exit; called inside an `except`, so that --debug can show the traceback."""
     if "--debug" in words:
         raise
     said = [f"error: {one_line(message)}", *([f"hint: {one_line(hint)}"] if hint else [])]
@@ -80,7 +81,7 @@ def _accept_any_text() -> None:
 
 
 def _silence(stream: object) -> None:
-    """What is still in a stream's buffer goes nowhere: Python would complain of it after the last word."""
+    """Discard what is still in a stream's buffer: Python would otherwise report it when it ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         target = os.open(os.devnull, os.O_WRONLY)
         os.dup2(target, stream.fileno())  # type: ignore[attr-defined]

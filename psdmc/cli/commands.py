@@ -1,4 +1,5 @@
-"""The commands and their arguments. What a command does is imported when it runs: `--version` and `--help` wait for none."""
+"""The commands and their arguments. The modules of a command are imported when it runs, so that `--version` and
+`--help` are fast."""
 
 from __future__ import annotations
 
@@ -31,7 +32,7 @@ LARGEST_EXPANDED = 2000
 """`show --cost` prints the expanded lowering too up to this many monomials; beyond, it takes minutes."""
 
 ROBOT_SUFFIXES = (".urdf", ".xml", ".toml")
-"""Of files that `show` reads as a robot; all others are models."""
+"""Endings of files that `show` reads as a robot; all others are models."""
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT", help="URDF, or DH table (.toml)")]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="model file made by psdmc derive (.npz)")]
@@ -279,6 +280,7 @@ PIPELINE = frozenset({"derive", "show", "check", "emit-c", "build", "cache", "--
 
 
 def needs_measuring(words: list[str]) -> bool:
-    """Whether a command line may be about the commands beside the pipeline, or about all: those load for a second."""
+    """Whether a command line may be about the commands beside the pipeline, or about all commands: importing those
+    takes a second."""
     first = next((word for word in words if word != "--debug"), "")
     return first not in PIPELINE

@@ -1,4 +1,4 @@
-"""Ctrl-C: at once while modules load, as an error of one line afterwards; never a traceback."""
+"""Ctrl-C: exit at once while modules load, an error of one line afterwards; never a traceback."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 
 STATUS = 130
-"""Of a process that Ctrl-C ended, as shells say it: 128 + SIGINT."""
+"""Exit status of a process that Ctrl-C ended, as shells define it: 128 + SIGINT."""
 
 
 class Interrupted(BaseException):
-    """Ctrl-C. Not KeyboardInterrupt: libraries on the way up turn that into statuses and words of their own."""
+    """Ctrl-C. Not a KeyboardInterrupt, which libraries turn into statuses and messages of their own."""
 
 
 def at_once() -> contextlib.AbstractContextManager[None]:
-    """Leave where Ctrl-C comes: nothing is half done yet, and modules that load pass no exception on unharmed."""
+    """Exit where Ctrl-C comes: no work has begun, and modules that are being loaded do not pass exceptions on."""
     return _handled(_leave)
 
 
@@ -38,7 +38,7 @@ def _raise(number: int, frame: FrameType | None) -> None:
 
 @contextlib.contextmanager
 def _handled(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """In place of Python's own handler only: a caller's, or a shell's wish to ignore Ctrl-C, stays."""
+    """Replace Python's own handler, and no other: a caller's handler, or a shell's choice to ignore Ctrl-C, stays."""
     before = signal.getsignal(signal.SIGINT)
     is_ours = before is signal.default_int_handler and threading.current_thread() is threading.main_thread()
     if not is_ours:

@@ -1,4 +1,4 @@
-"""Whether a command may write where it was told: said before its work, not after."""
+"""Check whether a command may write to its output path, before its work."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def check_output(output: Path | None, *inputs: Path) -> None:
 
 
 def check_report(report: Path | None, *others: Path) -> None:
-    """The same for a report and for the JSON that is written beside it; its folder may be missing."""
+    """InputError as of check_output, for a report and the JSON that is written beside it; its folder may be missing."""
     if report is None:
         return
     numbers = report.with_suffix(".json")

@@ -1,4 +1,4 @@
-"""The step under way, shown where a terminal listens."""
+"""The current step of a command, shown on a terminal."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def megabytes(size: int) -> str:
 
 
 def print_check(rows: Sequence[CheckRow]) -> None:
-    """Each comparison and its verdict, and with which readers of the source."""
+    """Print each comparison, whether it passed, and the readers of the source."""
     from psdmc.verification.check import readers
 
     table = Table("quantity", "against", "relative error", "limit", "", "")
@@ -170,7 +170,7 @@ def print_mass_check(mass: MassCheck | None) -> None:
 
 
 def print_verdict(verdict: Verdict) -> None:
-    """Whether a calibration can be used, and what speaks against it."""
+    """Print whether a calibration can be used, with reasons and doubts."""
     for line in verdict.lines():
         print(one_line(line))
 

@@ -1,4 +1,4 @@
-"""python -m psdmc.report.bench_page RESULT.json PAGE.html: the benchmark's report, one file that needs nothing else."""
+"""python -m psdmc.report.bench_page RESULT.json PAGE.html: the benchmark's report as one self-contained file."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def write_page(result: BenchResult, path: Path, command: str = COMMAND) -> None:
 
 
 def page(result: BenchResult, command: str = COMMAND) -> str:
-    """The page's text; `command` is what made it."""
+    """The page's text; `command` is the command that made it."""
     view = {
         "result": result,
         "command": command,
@@ -85,7 +85,7 @@ def _scaling_plots(result: BenchResult) -> tuple[str, ...]:
 
 
 def _environment() -> Environment:
-    """HTML: whatever comes from a robot's file is escaped."""
+    """The environment for HTML: text from a robot's file is escaped."""
 
     def source(name: str) -> str | None:
         file = resources.files("psdmc.templates").joinpath(name)

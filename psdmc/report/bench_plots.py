@@ -1,4 +1,5 @@
-"""The benchmark's plots as inline SVG: no network, text stays text, colours that follow the page's light or dark."""
+"""The benchmark's plots as inline SVG: nothing is loaded from the network, text stays text, colours follow the page's
+theme."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from psdmc.report.bench_view import FUNCTION_TITLES, OURS, PINOCCHIO
 from psdmc.report.drawing import Figure, new_figure, style
 
 INK = "#010203"
-"""Stands for the page's own text colour, which it becomes after drawing."""
+"""Placeholder for the page's own text colour, which replaces it after drawing."""
 
 WIDTH = 5.2
 """inches: narrow, so that labels stay readable on a phone."""
@@ -75,7 +76,7 @@ def scaling(result: BenchResult, function: str) -> str:
 
 
 def svg(draw: Callable[[Figure], None], size: tuple[float, float]) -> str:
-    """What `draw` puts on a figure of `size` (inches), as an <svg> element that scales with the page."""
+    """The drawing by `draw` on a figure of `size` (inches), as an <svg> element that scales with the page."""
     with style(STYLE):
         figure = new_figure(figsize=size)
         draw(figure)

@@ -1,4 +1,4 @@
-"""What the benchmark's page says, decided before any template sees it."""
+"""The content of the benchmark's page, prepared for its templates."""
 
 from __future__ import annotations
 

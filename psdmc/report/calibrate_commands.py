@@ -1,4 +1,4 @@
-"""`psdmc excite | simulate | calibrate`: what the command line calls, files in and files out."""
+"""`psdmc excite | simulate | calibrate`: the functions that the command line calls, from files to files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Progress = Callable[[str], None]
 
 
 def silent(step: str) -> None:
-    """Progress that is not shown."""
+    """Ignore progress: the default of the functions below."""
 
 
 def excite_command(
@@ -45,7 +45,7 @@ def excite_command(
 ) -> Excitation:
     """Plan a whole campaign for a model file: trajectories, campaign.toml, excitation.json, .csv and .svg in `folder`.
 
-    force   replace the plan of a campaign that is there; without it, InputError before anything is searched
+    force   replace the plan of an existing campaign; without it, InputError before the search
     """
     options = options or CampaignOptions()
     if not force:
@@ -120,7 +120,7 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
 
 
 class CompiledWhenAsked:
-    """A model's regressor that is compiled when it is first asked for: a log that cannot be used is refused before."""
+    """A model's regressor, compiled when it is first used, so that an unusable log is refused before."""
 
     def __init__(self, model: DynamicsModel, progress: Progress) -> None:
         self._model, self._progress = model, progress

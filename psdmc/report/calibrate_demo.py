@@ -1,4 +1,4 @@
-"""`make calibrate-demo`: the virtual Denso from excitation to report, and what was found against what is true."""
+"""`make calibrate-demo`: the virtual Denso from excitation to report, and the result compared with the truth."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROBOT = EXAMPLES / "robots" / "denso_wall.toml"
 PLANT = EXAMPLES / "plants" / "denso_virtual.toml"
 
 WHOLE = CampaignOptions(table="npz")
-"""Half an hour of the robot's time."""
+"""Options of the whole campaign: half an hour of the robot's time."""
 
 Variant = tuple[str, bool, bool]
 VARIANTS: tuple[Variant, ...] = (("ideal", True, False), ("sensors", False, False), ("harness", False, True))
@@ -43,9 +43,9 @@ def run_demo(
     say: Callable[[str], None] = print,
     plan: CampaignOptions = WHOLE,
 ) -> dict[str, Comparison]:
-    """Plan, simulate, calibrate and report each variant; returns how its result compares with the truth.
+    """Plan, simulate, calibrate and report each variant; returns each result's comparison with the truth.
 
-    plan  what the campaign consists of
+    plan  options of the campaign
     """
     begin = time.monotonic()
 

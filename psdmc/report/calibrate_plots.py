@@ -13,7 +13,7 @@ from psdmc.calibration.motions.excite import Excitation
 from psdmc.report.drawing import Axes, Figure, new_figure, style
 
 POINTS = 600
-"""Points drawn per curve; more only make the file heavy."""
+"""Points drawn per curve; more would only make the file larger."""
 
 MEASURED, PREDICTED, RESIDUAL, HELD_OUT = "#4878a8", "#d95f02", "#888888", "#f3ead9"
 
@@ -51,7 +51,7 @@ def _sample(axis: Axes, sample: Sample) -> None:
 
 
 def _thin(count: int) -> Array:
-    """A contiguous stretch would hide the rest: evenly spread points, all of them where they are few."""
+    """Indices of evenly spread points, all of them where they are few. (A contiguous stretch would hide the rest.)"""
     return np.unique(np.linspace(0, count - 1, min(count, POINTS)).astype(int))
 
 
@@ -62,7 +62,7 @@ def _shade(axis: Axes, x: Array, held_out: Array) -> None:
 
 
 def excitation_figure(found: Excitation, joint_names: Sequence[str]) -> str:
-    """The exciting motion's positions, speeds and accelerations, and how its condition was reached."""
+    """The exciting motion's positions, speeds and accelerations, and its condition during the search."""
     motion = found.motion.sampled(tuple(joint_names), found.motion.duration / 400)
     figure = new_figure(figsize=(11, 6))
     axes = figure.subplots(2, 2)

@@ -1,4 +1,4 @@
-"""A calibration's report: one HTML page that needs nothing else, and the same numbers as JSON."""
+"""A calibration's report: one self-contained HTML page, and the same numbers as JSON."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CAPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class FigureView:
-    """One picture with its words."""
+    """One picture with its caption."""
 
     title: str
     svg: str
@@ -40,7 +40,7 @@ class FigureView:
 
 @dataclass(frozen=True, slots=True)
 class VerdictView:
-    """The verdict's word, what it rests on as (kind, text), and its figures joint by joint."""
+    """The verdict's word, its grounds as (kind, text), and its figures joint by joint."""
 
     word: str
     usable: bool
@@ -50,7 +50,7 @@ class VerdictView:
 
 @dataclass(frozen=True, slots=True)
 class ReportView:
-    """What the page's template fills in; tables are finished markup, all other text is escaped there."""
+    """The data of the page's template. Tables are finished markup; all other text is escaped there."""
 
     robot: str
     summary: str
@@ -103,7 +103,7 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
 
 
 def verdict_view(verdict: Verdict) -> VerdictView:
-    """What the page says first."""
+    """The first part of the page."""
     kinds = (
         ("not usable", verdict.reasons),
         ("likely", verdict.suspects),
@@ -114,7 +114,8 @@ def verdict_view(verdict: Verdict) -> VerdictView:
 
 
 def verdict_table(verdict: Verdict) -> str:
-    """What each joint was judged by; a gain in brackets says nothing, as the file's torque is too small there."""
+    """The figures by which each joint was judged. A gain in brackets does not count, as the file's torque is too small
+    there."""
     head = ["Joint", "R²", "RMSE", "Gain against the file", "Power of friction [W]", "Residual / noise"]
     rows = []
     for joint in verdict.joints:

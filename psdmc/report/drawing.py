@@ -1,4 +1,4 @@
-"""Matplotlib, loaded when the first picture is drawn and not before: it takes half a second and writes to the home."""
+"""Matplotlib, loaded when the first picture is drawn: it takes half a second and writes to the home folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Axes", "Figure", "new_figure", "style"]
 
 
 def new_figure(figsize: tuple[float, float]) -> Figure:
-    """An empty figure of that size in inches, whose parts make room for each other."""
+    """An empty figure of that size in inches, whose parts are laid out without overlaps."""
     _load()
     from matplotlib.figure import Figure
 
@@ -33,7 +33,7 @@ def style(settings: Mapping[Any, Any]) -> contextlib.AbstractContextManager[None
 
 
 def _load() -> None:
-    """Without a word on homes that cannot be written: it then works in a temporary folder, which is as good."""
+    """Load it without a message on home folders that cannot be written: it then uses a temporary folder."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     import matplotlib
 

@@ -1,9 +1,9 @@
-"""A finished model against other readers of the robot's source: nothing of the derivation, and of the chain only
-names, is used.
+"""A finished model compared with other readers of the robot's source. Nothing of the derivation is used, and of the
+chain only names.
 
 Pinocchio reads the file as it is written, MuJoCo too where it is installed and reads such files. Where rotations were
-snapped, the file has no such robot: then torques are compared with Pinocchio's bodies on joints placed as the chain's are,
-and that these differ from the file's by no more than snapping says is compared beside it.
+snapped, the file has no such robot. Then torques are compared with Pinocchio's bodies on joints placed as the chain's
+are, and the change by snapping is compared with the file's robot separately.
 """
 
 from __future__ import annotations
@@ -34,16 +34,14 @@ RANGES = (np.pi, 3.0, 5.0)
 """q (rad or m), qd and qdd are drawn from plus or minus these."""
 
 TORQUE_LIMIT = 1e-10
-"""Largest relative error that passes: a hundred times what rounding leaves, a million times less than any
-mistake."""
+"""Largest relative error that passes: a hundred times what rounding leaves, a million times less than any mistake."""
 
 CONDITION_LIMIT = 1e-12
-"""Forward dynamics passes within this times the mass matrix's condition number, and within TORQUE_LIMIT
-always."""
+"""Forward dynamics passes within this times the mass matrix's condition number, and always within TORQUE_LIMIT."""
 
 
 SINGULAR = 1e15
-"""Condition of a mass matrix that nobody can invert: a last link without inertia, for one."""
+"""Condition number from which a mass matrix cannot be inverted: that of a last link without inertia, for example."""
 
 PLACEMENT_LIMIT = 1e-11
 """rad, or share of the robot's reach: rounding leaves 1e-15, and what snapping cleans as noise 1e-13."""
@@ -52,14 +50,14 @@ MUJOCO_LIMIT = 1e-9
 """MuJoCo keeps inertias as principal moments and axes, found to 1e-12 or so."""
 
 MUJOCO_ROUNDING = 1e-10
-"""Share of the robot's largest torque, beside that: MuJoCo works about the whole robot's centre of mass, where a small
-joint's torque is a difference of large ones (2e-11 at most in robots whose lengths are 1e-3 to 1e3 m)."""
+"""A further allowance, as a share of the robot's largest torque: MuJoCo works about the whole robot's centre of mass,
+where a small joint's torque is a difference of large ones (2e-11 at most in robots whose lengths are 1e-3 to 1e3 m)."""
 
 ANGLES_ACTED_ON = 2.0
-"""An axis snapped by an angle turns what moves about it by up to twice that."""
+"""Factor: an axis snapped by an angle turns what moves about it by up to twice that."""
 
 MUJOCO = "MuJoCo's mj_inverse"
-"""What rows of the second reader say that they are against."""
+"""Text for what rows of the second reader are compared with."""
 NO_TORQUE = 1e-9
 """Share of the largest torque below which a joint's torque is rounding."""
 
@@ -69,7 +67,7 @@ class CheckRow:
     """One comparison.
 
     name     what was compared
-    against  with which function of Pinocchio, or with what else
+    against  the function of Pinocchio, or other reference, that it was compared with
     error    largest difference, relative to the largest magnitude (per joint where there is one per joint)
     limit    largest error that passes; None where nothing could be compared
     remark   why not, or what the limit allows for
@@ -96,11 +94,11 @@ def source_of(model: DynamicsModel) -> LoadedRobot:
 
 
 def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tuple[CheckRow, ...]:
-    """Every function of the model against Pinocchio's; `source` None: the source embedded in the model.
+    """Every function of the model compared with Pinocchio's; `source` None: the source embedded in the model.
 
-    A model with other parameters than its source is compared under its own where its chain has them (a
-    payload), and under random physical ones where no standard parameters are known (unknown or calibrated
-    theta_b). InputError where the source is another robot.
+    A model with other parameters than its source is compared under its own where its chain has them (a payload), and
+    under random physical ones where no standard parameters are known (unknown or calibrated theta_b). InputError where
+    the source is another robot.
     """
     loaded = source_of(model) if source is None else source
     _require_same_robot(model, loaded)
@@ -143,7 +141,7 @@ def readers(rows: Sequence[CheckRow]) -> str:
 
 
 def _parameters(model: DynamicsModel, loaded: LoadedRobot) -> tuple[Array, Array | None]:
-    """theta_b, and the standard parameters that Pinocchio must be given; None where its own are meant."""
+    """theta_b, and the standard parameters that Pinocchio must be given; None: its own."""
     if model.theta_b is not None:
         theta = np.asarray(model.theta_b)
         for known in (loaded.mechanism.parameters, model.mechanism.parameters):
@@ -198,7 +196,7 @@ def _compared(model: DynamicsModel, theta: Array, robot: Reference, condition: f
 
 
 def _functions(model: DynamicsModel, theta: Array, robot: Reference, condition: float) -> Iterator[CheckRow]:
-    """What functions compute that is no part of the expansion."""
+    """Rows of functions that are not part of the expansion."""
     if not model.is_reduced:
         remark = "a base parameter has no standard parameter of its own"
         yield CheckRow("base parameters", "their equations", np.inf, TORQUE_LIMIT, remark)
@@ -210,7 +208,7 @@ def _functions(model: DynamicsModel, theta: Array, robot: Reference, condition: 
 
 
 def _solved_limit(condition: float) -> float:
-    """What divides by the mass matrix loses digits with its condition number."""
+    """Limit for functions that divide by the mass matrix, which lose digits with its condition number."""
     return max(TORQUE_LIMIT, CONDITION_LIMIT * condition)
 
 
@@ -224,7 +222,7 @@ def _forward(robot: Reference, q: Array, qd: Array, qdd: Array, tau: Array, cond
 
 
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
-    """Where the chain puts links, tip and gravity, beyond what snapping says that it turned."""
+    """Rows for the placements of links and tip and for gravity, within the angles that snapping reports."""
     q, _, _ = _states(model.n)
     chain = model.mechanism
     links = [joint.link_name for joint in chain.joints]
@@ -244,7 +242,7 @@ def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tupl
 
 
 def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Array) -> CheckRow:
-    """What snapping changed: torques against the file's own rotations, within what its angles can do there."""
+    """The row for snapping: torques compared with the file's own rotations, within the change that its angles allow."""
     states = _states(model.n)
     expected = written.inverse_dynamics(*states)
     bound = torque_bound(written, angles, *states)
@@ -255,7 +253,7 @@ def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Ar
 
 
 def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) -> CheckRow:
-    """Torques of the source's own bodies as MuJoCo reads them."""
+    """The row for torques of the source's own bodies, compared with MuJoCo's."""
     states = _states(model.n)
     try:
         expected = mujoco_torques(loaded, *states)
@@ -294,7 +292,7 @@ def _largest(expected: Array) -> float:
 
 
 def _scales(expected: Array, least: float = 0.0) -> Array:
-    """(n,) what each joint's error is measured against."""
+    """(n,) scale that each joint's error is relative to."""
     overall = _largest(expected)
     if overall < least:
         return np.full(expected.shape[-1], least / NO_TORQUE)

@@ -1,4 +1,4 @@
-"""What functions are made of beyond E, P and theta_b, against Pinocchio: every recipe's own reference and counterpart."""
+"""Functions beyond E, P and theta_b compared with Pinocchio: each recipe's NumPy reference with its counterpart."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ STATES = 100
 SEED = 14_631
 
 NOTHING = 1e-9
-"""Values below this share of the largest torque (N m, N) and of one (m, J, kg m/s) are compared on that scale: a robot on
-which gravity acts along no joint has no potential energy but rounding."""
+"""Values below this share of the largest torque (N m, N) and of one (m, J, kg m/s) are compared on that scale: a robot
+on which gravity acts along no joint has a potential energy of rounding alone."""
 
 ROUNDING = 1e-12
-"""An output below this share of its function's largest one is rounding: the accelerations of a single joint do not depend
-on its rate."""
+"""An output below this share of its function's largest one is rounding, such as the change of a single joint's
+acceleration with its rate."""
 ROUNDED = 1e-4
-"""Share of that largest one on whose scale such an output is compared: to 1e-10 of it, 1e-14 of the largest."""
+"""Share of that largest output, on whose scale such an output is compared: 1e-10 of it is 1e-14 of the largest."""
 
 
 def function_errors(
@@ -78,7 +78,7 @@ def _error(
 
 
 def _most_beside(recipe: Recipe, robot: Reference, given: Mapping[str, Array]) -> float:
-    """The largest value of the function that this one stands beside; zero where there is none."""
+    """The largest value of the function that this one's values are differences of; zero where there is none."""
     if recipe.beside is None:
         return 0.0
     values = RECIPES[recipe.beside].pinocchio(robot, given).values()
@@ -86,5 +86,6 @@ def _most_beside(recipe: Recipe, robot: Reference, given: Mapping[str, Array]) -
 
 
 def _scale(largest: float, most: float) -> float:
-    """On which an output is compared whose largest value is given, and its function's; what is rounding on a larger one."""
+    """The scale for comparing an output with this largest value; `most` is the function's, relative to which small
+    outputs are rounding."""
     return largest if largest > ROUNDING * most else ROUNDED * most

@@ -1,4 +1,4 @@
-"""Where a model's chain puts its links, against the file as its own reader places them."""
+"""The placements of a model's links compared with those by an independent reader of the file."""
 
 from __future__ import annotations
 
