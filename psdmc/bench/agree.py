@@ -1,4 +1,4 @@
-"""Nothing is timed before it was seen to be right: outputs against psdmc's Newton-Euler on arrays."""
+"""Outputs of contestants compared with psdmc's Newton-Euler on arrays, before anything is timed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STRICT = 1e-10
 condition number."""
 
 SMALL = 1e-3
-"""Outputs that stay below this share of the largest one are compared on that scale: they may be zero."""
+"""Outputs that stay below this share of the largest one are compared on its scale: they may be zero."""
 
 
 def disagreement(runner: Runner, states: States) -> float:
@@ -36,7 +36,7 @@ def disagreement(runner: Runner, states: States) -> float:
 
 
 def relative_error(found: Array, expected: Array) -> float:
-    """Infinite where anything is not a number; absolute where all that is expected is zero."""
+    """Relative error; infinite where a value is not a number; absolute where all expected values are zero."""
     largest = np.max(np.abs(expected), axis=0)
     error = np.abs(found - expected) / np.maximum(largest, SMALL * np.max(largest) or 1.0)
     return float(np.max(error)) if np.isfinite(error).all() else float("inf")

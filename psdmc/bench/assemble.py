@@ -18,7 +18,7 @@ from psdmc.processes import in_processes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembled:
-    """One case's contestants, and who could not come."""
+    """One case's contestants, and those that could not be built."""
 
     case: Case
     contestants: tuple[Contestant, ...]
@@ -50,7 +50,8 @@ def assemble(
 
 
 def enter(job: tuple[Entrant, Case, bool]) -> list[Contestant | Unavailable]:
-    """One entrant's contestants for one case; with instruction counts where the job says so and they are possible."""
+    """One entrant's contestants for one case; with instruction counts where the job asks for them and they are
+    possible."""
     entrant, case, count = job
     entries = list(entrant.contestants(case))
     if not count or not entrant.counted:

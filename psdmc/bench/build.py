@@ -1,4 +1,4 @@
-"""Compile what the benchmark needs beside psdmc's own packages, once: results are kept by content."""
+"""Compile what the benchmark needs besides psdmc's own packages; results are kept by content."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def native_flags() -> tuple[str, ...]:
 
 
 def counted_flags() -> tuple[str, ...]:
-    """psdmc's own flags for counting instructions: valgrind knows no AVX-512, and every x86-64 runner counts alike."""
+    """psdmc's own flags for counting instructions: valgrind has no AVX-512, and every x86-64 machine counts the same."""
     return (*find_compiler().portable, *X86_64_V3.flags)
 
 
@@ -32,7 +32,7 @@ def built(
 
     command  argument list; runs only where no earlier result came from the same content
     sources  path inside the folder to text
-    depends  whatever else decides the result, such as versions of libraries
+    depends  what else the result depends on, such as versions of libraries
 
     ToolchainError where the command fails or makes no such file.
     """
@@ -51,7 +51,7 @@ def built(
 
 
 def produced(build: Callable[[Path], None], sources: Mapping[str, str], parts: Sequence[str]) -> Path:
-    """The folder that `build` fills, from the cache or filled now; `parts` are what decides beside sources."""
+    """The folder that `build` fills, from the cache or filled now; `parts` are what it depends on besides sources."""
     compiler = find_compiler()
     target = [compiler.target] if any("native" in part for part in parts) else []
     return cached(cache_key(sources, (compiler.version, *target, *parts)), build)

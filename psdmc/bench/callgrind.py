@@ -1,4 +1,5 @@
-"""Instructions per state, counted by callgrind: the same on a busy machine as on an idle one, so fit to gate."""
+"""Instructions per state, counted by callgrind: the same on a busy machine as on an idle one, so that a test may
+compare them."""
 
 from __future__ import annotations
 
@@ -18,13 +19,13 @@ from psdmc.robot.mechanism import Mechanism
 from psdmc.toolchain.compiler_command import run
 
 STATES = 512
-"""States counted; a handful of angles takes glibc's slow paths, the rest are alike."""
+"""States counted. Some angles take glibc's slow paths, the others are alike."""
 
 SEED = 512
 
 
 def valgrind() -> str:
-    """ToolchainError where it is not installed."""
+    """The command of valgrind; ToolchainError where it is not installed."""
     if shutil.which("valgrind") is None:
         raise ToolchainError("valgrind was not found", "install it (Debian: apt install valgrind)")
     return "valgrind"

@@ -1,4 +1,4 @@
-"""One robot as the benchmark sees it: its chain with every number known, and its name in tables."""
+"""One robot of the benchmark: its chain with every number known, and its name in tables."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ class Case:
 
 
 def generic_chain(chain: Mechanism, seed: int) -> Mechanism:
-    """The chain's geometry standing on the floor with generic physical inertias and no drive inertia.
+    """The chain's geometry standing on the floor, with generic physical inertias and no drive inertia.
 
-    Nobody's special zeros then make one contestant look better; the same seed gives the same robot.
+    So no contestant profits from particular zeros; the same seed gives the same robot.
     """
     rng = np.random.default_rng(seed)
     n = len(chain)
@@ -80,7 +80,8 @@ def physical_body(rng: np.random.Generator) -> Array:
 
 
 def robot_as_numbers(chain: Mechanism) -> str:
-    """The chain as plain text for rivals: exact placements, bodies about the joint frames, no parser in between.
+    """The chain as plain text for rivals: exact placements and bodies about the joint frames, so that no parser is
+    involved.
 
     n and gravity; then per joint Pinocchio's word for its type, parent (0 the base, else counted from 1), rotation (9,
     row-major), translation (3), body (10 standard parameters about the joint frame) and drive inertia.

@@ -1,4 +1,4 @@
-"""The robots that psdmc is measured on: published geometry, popular arms, and two that nobody has tuned for."""
+"""The robots of the benchmark: published geometry, popular arms, and two generic arms."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Mechanism, 
 from psdmc.robot.small import length
 
 SEED = 4
-"""Of generic inertias and geometry; printed with every result."""
+"""Seed of generic inertias and geometry; printed with every result."""
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "robots"
 
@@ -31,7 +31,7 @@ POPULAR = {
 
 
 def standard_chains(seed: int = SEED) -> dict[str, Callable[[], Mechanism]]:
-    """What makes each standard robot's chain, by name: two generic arms beside the known ones."""
+    """For each standard robot's name the function that makes its chain; two generic arms are among them."""
     makers: dict[str, Callable[[], Mechanism]] = {}
     for name in ("Denso", "KR6", "LBR7", "UR5", "Panda"):
         makers[name] = lambda name=name: generic_chain(_known(name), seed)  # type: ignore[misc]
@@ -60,7 +60,7 @@ def standard_cases(
 
 
 def oblique_chain(n: int, seed: int) -> Mechanism:
-    """n revolute joints about axes that neither meet nor stand parallel or square: nothing to exploit."""
+    """n revolute joints about axes that neither meet nor are parallel or perpendicular, so that nothing simplifies."""
     rng = np.random.default_rng(seed)
     joints = tuple(
         Joint(f"joint{i + 1}", f"link{i + 1}", REVOLUTE, _anywhere(rng), Placement.identity())
@@ -110,7 +110,7 @@ def _known(name: str) -> Mechanism:
 
 
 def _robot_data() -> Path:
-    """Where the example-robot-data wheel keeps its robots."""
+    """The folder in which the example-robot-data wheel keeps its robots."""
     try:
         wheel = distribution("example-robot-data")
     except PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""What is measured: one function of one library for one robot, behind the loops of rivals/loops.hpp."""
+"""One contestant: one function of one library for one robot, called by the loops of rivals/loops.hpp."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ Layout = Literal["state", "rows", "lanes"]
 """One state a call; many states as rows; many states lane by lane."""
 
 RING_BYTES = 1 << 18
-"""Outputs go round in this much: within any L2 cache, so that the code is measured and not memory."""
+"""Size of the ring buffer of outputs: within any L2 cache, so that the code is measured and not the memory."""
 
 BLOCK = 1024
-"""States per timed block: some 50 us, long against reading the clock, short against the scheduler's slices. Batch
-calls take what the ring holds."""
+"""States per timed block: some 50 us, long compared with reading the clock, short compared with the scheduler's slices.
+Batch calls take what the ring holds."""
 
 SEVERAL_SHARE = 4
-"""Functions with several outputs, which take rivals microseconds, go over this part of the states: `make bench` stays
-within minutes, and it is still far more than a branch predictor remembers."""
+"""Functions with several outputs, which take rivals microseconds, are timed over this part of the states, so that `make
+bench` takes minutes; these are still far more than a branch predictor remembers."""
 
 LATENCY_SHARE = 4
-"""Latency is taken over this part of the states: still far more than a branch predictor remembers."""
+"""Latency is measured over this part of the states: still far more than a branch predictor remembers."""
 
 TAIL_BLOCK = 64
 """Calls per block for the worst case: single calls are too short for the clock."""
@@ -37,7 +37,7 @@ TAIL_BLOCK = 64
 
 @dataclass(frozen=True, slots=True)
 class Unavailable:
-    """A rival that could not be built or run here, and why: shown, never silently dropped."""
+    """A rival that could not be built or run here, and the reason, which the tables show."""
 
     rival: str
     reason: str
@@ -52,7 +52,8 @@ class Contestant:
     library       shared library that exports `symbol`_throughput and so on
     outputs       numbers per state that it puts out
     variant       which of its ways, '' where there is one
-    layout        how states are handed over; `lanes` states per block where lane by lane
+    layout        how states are passed
+    lanes         states per block where the layout is lane by lane
     sections      reals per state of each array that a batch call fills one after the other; () where it fills one
     robot         text for its `setup`, None where the library knows its robot
     weights       where functions differ in what they put out (regressors): output rows times these are torques
@@ -111,7 +112,7 @@ class Runner:
         self.setup()
 
     def move(self) -> None:
-        """Put the output elsewhere in memory; see States.move."""
+        """Move the output to another place in memory; see States.move."""
         self._output = moved(self._output)
 
     def setup(self) -> None:
@@ -120,11 +121,11 @@ class Runner:
             self._library.setup(self.contestant.robot.encode())
 
     def throughput(self) -> Array:
-        """ns per state, block by block: median blocks are untouched by whatever else the machine does for a moment."""
+        """ns per state, block by block. The median block is not disturbed by the machine's other work."""
         return self._timed("throughput", self._output, self._block)
 
     def latency(self) -> Array:
-        """ns per state, block by block, where each state waits for the one before."""
+        """ns per state, block by block, where each state depends on the one before."""
         return self._timed("latency", self._output, self._block, self._count // LATENCY_SHARE)
 
     def tail(self) -> Array:

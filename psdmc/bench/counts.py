@@ -1,4 +1,4 @@
-"""What psdmc's code costs, counted rather than timed: operations on the PROGRAM, instructions under callgrind."""
+"""The cost of psdmc's code by counting: operations on the PROGRAM, instructions under callgrind."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Counts = dict[str, dict[str, dict[str, float]]]
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """Counts, and the compiler that instruction counts hold for; `without` says why there are none."""
+    """Counts, and the compiler that instruction counts are valid for; `without` is the reason where there are none."""
 
     compiler: str
     counts: Counts

@@ -1,4 +1,4 @@
-"""python -m psdmc.bench.demo MODEL: one table of what a model's generated code computes, how exactly, and how fast."""
+"""python -m psdmc.bench.demo MODEL: one table of a model's generated functions with their operations, errors and times."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from psdmc.verification.check import source_of
 FUNCTIONS = tuple(name for name, recipe in RECIPES.items() if recipe.benched and not recipe.times_theta)
 OURS, THEIRS = "psdmc factored", "Pinocchio"
 SETTINGS = Settings(rounds=3, rivals=(OURS, THEIRS), functions=FUNCTIONS)
-"""Fewer trials than `make bench`: a look, not a record."""
+"""Fewer trials than `make bench`: a quick estimate."""
 
 STATES = 1000
 RANGES = (np.pi, 3.0, 5.0)

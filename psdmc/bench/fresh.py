@@ -1,4 +1,4 @@
-"""Derivation in a process of its own, so that its time and memory are its own too."""
+"""Derivation in a new process, so that its time and memory can be measured."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ STATUS = Path("/proc/self/status")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Derivation:
-    """A MODEL and what it took. peak_bytes: of the whole process, None where the system does not say."""
+    """A MODEL and the time and memory of its derivation. peak_bytes: of the whole process, None where the system does
+    not say."""
 
     model: DynamicsModel
     seconds: float
@@ -34,7 +35,7 @@ def derive_fresh(chain: Mechanism) -> Derivation:
 
 
 def measured_derivation(chain: Mechanism) -> Derivation:
-    """Time a warm derivation here and now, and this process's peak of memory."""
+    """Time a warm derivation in this process, and read the process's peak of memory."""
     derive_model(chain, expand=False)  # imports and first calls are not what is measured
     start = time.perf_counter()
     try:

@@ -1,7 +1,7 @@
-"""python -m psdmc.bench.gate compare|save: counts against the committed baseline.
+"""python -m psdmc.bench.gate compare|save: counts compared with the committed baseline.
 
-Counts gate, times report: a count that grew fails until the baseline is changed in the same commit. Operation counts are
-compared everywhere, instruction counts where the baseline's own compiler is at work.
+A count that grew fails until the baseline is changed in the same commit; times are only reported. Operation counts are
+compared everywhere, instruction counts only with the baseline's own compiler.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from psdmc.errors import exit_status_of
 BASELINE = Path("benchmarks") / "baseline.json"
 
 SLACK = 0.002
-"""Relative growth of instructions that passes: the few that depend on where libraries happen to lie."""
+"""Relative growth of instructions that passes: some depend on where libraries are loaded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One count that differs from the baseline; None where a side lacks it."""
+    """One count that differs from the baseline; None where one side lacks it."""
 
     robot: str
     function: str
@@ -67,7 +67,7 @@ def changes(before: Baseline, after: Baseline) -> Iterator[Change]:
 
 
 def compare(before: Baseline, after: Baseline) -> tuple[str, bool]:
-    """What to say, and whether the gate is passed."""
+    """The report, and whether the counts pass."""
     found = list(changes(before, after))
     lines = [str(change) for change in found]
     if after.without is not None:
@@ -107,7 +107,8 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _save(path: Path, names: list[str]) -> int:
-    """Named robots replace theirs, the others stay; without instructions nothing is saved over a full baseline."""
+    """Save the baseline. Named robots replace theirs, others stay; a baseline with instruction counts is not replaced
+    by one without."""
     after = _counted(names)
     kept = Baseline.read(path).counts if names and path.is_file() else {}
     if after.without is not None:

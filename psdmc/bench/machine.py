@@ -1,4 +1,4 @@
-"""The machine that a figure was measured on, and whether it was idle meanwhile."""
+"""The machine of a measurement, and whether it was idle meanwhile."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from psdmc.errors import ToolchainError
 from psdmc.toolchain.compiler_command import find_compiler
 
 IDLE_SHARE = 0.05
-"""Cores that others may keep busy while a trial counts: beyond, a shared core costs up to a factor of two."""
+"""Cores that other processes may keep busy while a trial counts: beyond, a shared core costs up to a factor of two."""
 
 RESOLUTION = 0.02
-"""s; /proc/stat counts in hundredths: less than two of them is no sign of anyone."""
+"""s; /proc/stat counts in hundredths: less than two of them do not show another process."""
 
 _TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What a reader needs to judge a time."""
+    """The properties of the machine that a time depends on."""
 
     processor: str
     cores: int
@@ -53,7 +53,7 @@ def this_machine() -> Machine:
 
 
 def others_share() -> Callable[[], float]:
-    """Starts watching; the returned call says how many cores' worth of time others have used since.
+    """Start watching; the returned function says how many cores' worth of time other processes have used since.
 
     Zero where the system does not say (no /proc/stat).
     """

@@ -1,4 +1,4 @@
-"""Interleaved trials: every contestant in turn, again and again, counted only while the machine is idle."""
+"""Interleaved trials: every contestant in turn, repeatedly, counted only while the machine is idle."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Tail:
-    """ns per call over blocks of 64 calls, the clock's own cost subtracted: what a control loop must expect."""
+    """ns per call over blocks of 64 calls, the clock's own cost subtracted: the worst case for a control loop."""
 
     median: float
     percentile_99_99: float

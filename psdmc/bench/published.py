@@ -1,4 +1,4 @@
-"""Times that the method's authors published, quoted beside ours: other machines, other inertias, so no ratios to them."""
+"""Times that the method's authors published, shown beside ours without ratios, as machines and inertias differ."""
 
 from __future__ import annotations
 

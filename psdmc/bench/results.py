@@ -1,4 +1,4 @@
-"""What a benchmark run found, as plain values: JSON out, report and gate in."""
+"""The results of a benchmark run as plain values, for JSON, report and gate."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class CaseResult:
     def ratio(
         self, function: str, layout: str = "state", *, over: str, rival: str = "psdmc factored"
     ) -> float | None:
-        """How many times faster `rival` is than `over`'s better way for one state a call."""
+        """How many times faster `rival` is than the better way of `over`, for one state a call."""
         ours, theirs = self.best(rival, function, layout), self.best(over, function)
         return theirs.ns / ours.ns if ours and theirs else None
 
@@ -102,7 +102,7 @@ class BenchResult:
 
     @staticmethod
     def from_json(text: str) -> BenchResult:
-        """What to_json wrote; InputError where the text is something else."""
+        """The run in a text of to_json; InputError where the text is something else."""
         try:
             content = json.loads(text)
             if content.pop("schema") != SCHEMA:

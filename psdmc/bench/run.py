@@ -1,4 +1,4 @@
-"""A benchmark run from top to bottom: build the contestants, see that they are right, then time them."""
+"""A benchmark run from top to bottom: build the contestants, compare their results, then time them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from psdmc.bench.versions import versions
 
 SEED = 20_260
 ROUNDS = 10
-"""Trials that count; with 1,024 blocks each the 99.99th percentile rests on more than 10,000 blocks."""
+"""Trials that count; with 1,024 blocks each, the 99.99th percentile is taken from more than 10,000 blocks."""
 
 SCALED = psdmc_c.EXPANDED
 SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")
 SCALED_ROUNDS = 3
-"""What is shown against the number of joints."""
+"""Trials of what is shown against the number of joints."""
 
 Progress = Callable[[str], None]
 
@@ -64,7 +64,7 @@ def run(
     progress: Progress = _silent,
     scaling: Sequence[Case] = (),
 ) -> BenchResult:
-    """Measure every case; rivals that cannot be built are listed with the reason, wrong ones are not timed.
+    """Measure every case. Rivals that cannot be built are listed with the reason; wrong ones are not timed.
 
     scaling  the same robot with more and more joints, for which less is measured
     """
@@ -121,7 +121,7 @@ def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> Ca
 def checked(
     case: Case, contestants: Sequence[Contestant], seed: int
 ) -> tuple[list[Contestant], list[float], tuple[Unavailable, ...]]:
-    """Those whose outputs are right, their errors, and the others with what was wrong."""
+    """The contestants whose outputs are right, their errors, and the others with what is wrong."""
     states = States.random(case.chain, CHECKED, seed)
     right: list[Contestant] = []
     errors: list[float] = []

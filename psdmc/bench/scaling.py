@@ -1,4 +1,4 @@
-"""How cost grows with the number of joints: the LBR7, cut short, and with an eighth joint before its last."""
+"""Cost against the number of joints: the LBR7 with fewer joints, and with an eighth joint before its last."""
 
 from __future__ import annotations
 

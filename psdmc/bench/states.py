@@ -1,4 +1,4 @@
-"""Fresh random states, laid out as each contestant wants them."""
+"""Fresh random states in the memory layout of each contestant."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.robot.mechanism import Array, Mechanism
 
 COUNT = 65_536
-"""States per trial: with a thousand the branch predictor learns glibc's sincos by heart."""
+"""States per trial: with a thousand, the branch predictor learns the path of each sincos in glibc."""
 
 CACHE_LINE = 64
-"""Every contestant's arrays start at one, as a careful user's would; where malloc puts them is luck."""
+"""Alignment in bytes of every contestant's arrays, as a careful user's; malloc's own alignment varies."""
 
 
 def at_cache_line(size: int) -> Array:
@@ -29,7 +29,7 @@ def at_cache_line(size: int) -> Array:
 
 
 def _further(function: str) -> tuple[Quantity, ...]:
-    """What a function reads behind its third input; the loops hand over one such."""
+    """The quantities that a function reads after its third input; the loops pass on one such."""
     return RECIPES[function].signature.inputs[3:]
 
 
@@ -39,7 +39,7 @@ def output_sizes(function: str, n: int) -> tuple[int, ...]:
 
 
 def moved(array: Array) -> Array:
-    """A copy elsewhere, made while the array still takes its own place."""
+    """A copy at another place in memory, made while the array still exists."""
     copy = at_cache_line(len(array))
     copy[:] = array
     return copy
@@ -84,9 +84,9 @@ class States:
         return RobotOnArrays(self.chain, self.chain.parameters.reshape(-1), np.zeros((0, 0)))
 
     def expected(self, function: str) -> Array:
-        """(count, outputs) what a function must put out, by psdmc's own Newton-Euler on arrays.
+        """(count, outputs) expected outputs of a function, by psdmc's own Newton-Euler on arrays.
 
-        Regressors: the torques, which each one's parameters must turn it into.
+        For regressors the torques, into which each one's parameters must turn them.
         """
         if RECIPES[function].times_theta:
             return self.tau
@@ -107,8 +107,9 @@ class States:
         return sum(Sizes.of_chain(self.n, 0).size(quantity) for quantity in _further(function))
 
     def move(self) -> None:
-        """Put all inputs elsewhere. Which physical pages an array gets decides whose lines collide in the caches: up to
-        a fifth of a batch call's time. Moved between trials, that is a part of the spread and not luck of the run."""
+        """Move all inputs to another place in memory. Which physical pages an array gets decides whose lines collide in
+        the caches: up to a fifth of a batch call's time. Moved between trials, this shows in the spread instead of
+        biasing a run."""
         for key, array in self._layouts.items():
             self._layouts[key] = moved(array)
 
@@ -124,7 +125,7 @@ class States:
         return rng.uniform(-quantity.largest, quantity.largest, (self.count, size))
 
     def _laid_out(self, name: str, rows: Array, lanes: int) -> Array:
-        """Shared by all contestants, so that none finds a cache colder than another."""
+        """The values in one layout, shared by all contestants, so that caches are equally warm for each."""
         if (name, lanes) not in self._layouts:
             blocks = rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1)
             flat = at_cache_line(rows.size)

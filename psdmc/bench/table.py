@@ -1,4 +1,4 @@
-"""A run as text: what a terminal shows."""
+"""A run as text for a terminal."""
 
 from __future__ import annotations
 

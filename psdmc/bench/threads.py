@@ -1,4 +1,4 @@
-"""Batch calls from several threads at once: how the code scales over a machine's cores."""
+"""Batch calls from several threads at once, for the scaling over a machine's cores."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ THREADS = (1, 2)
 FUNCTIONS = psdmc_c.EXPANDED
 TRIALS = 5
 PASSES = 30
-"""Times that each thread goes through all states in a trial: some 20 ms, long against starting threads."""
+"""How often each thread goes through all states in a trial: some 20 ms, long compared with starting threads."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Installed versions of what is compared."""
+"""Installed versions of the libraries compared."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everyone who is measured, in the order of the tables."""
+"""All contestants, in the order of the tables."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def symbolic(case: Case) -> Any:
 
 
 def _generated(case: Case) -> Path:
-    """The C that the writer makes; what else it writes stands beside it."""
+    """The C file that the writer makes; its other output is beside it."""
     command = [str(_writer()), "robot.txt", "generated"]
     return built("generated.c", command, {"robot.txt": robot_as_numbers(case.chain)})
 
@@ -108,7 +108,7 @@ def _writer() -> Path:
 
 
 def _casadi() -> Path:
-    """Where the casadi wheel keeps headers and libraries."""
+    """The folder in which the casadi wheel keeps headers and libraries."""
     found = find_spec("casadi")
     if found is None or found.origin is None:
         raise ToolchainError("the wheel 'casadi' is not installed", "pip install casadi")
@@ -148,7 +148,7 @@ def _scalar(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
 
 
 def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
-    """The same C as C++, where its number is a vector."""
+    """The same C compiled as C++, with a vector as its number type."""
     size = {way: outputs_of(case, function) for function, ways in WAYS.items() for way in ways}
     lines = [
         '#include "loops.hpp"',

@@ -1,4 +1,4 @@
-"""CppADCodeGen's C from Pinocchio's algorithms recorded by CppAD: the road of Pinocchio's own code generation."""
+"""CppADCodeGen's C from Pinocchio's algorithms recorded by CppAD: the way of Pinocchio's own code generation."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def mjcf(chain: Mechanism) -> str:
 
 
 def _add_inertia(body: ElementTree.Element, x: Array) -> None:
-    """MuJoCo wants the inertia about the centre of mass."""
+    """Add a body's inertia about its centre of mass, as MuJoCo's format requires."""
     mass, com = float(x[0]), x[1:4] / x[0]
     about_com = inertia_matrix(x) - mass * (com @ com * np.eye(3) - np.outer(com, com))
     full = about_com[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]

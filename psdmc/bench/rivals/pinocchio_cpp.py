@@ -43,11 +43,11 @@ DEFINES = (
 
 
 INSTANTIATED = "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION"
-"""Take the library's own instantiations, as its users do: compiles in seconds, runs as shipped."""
+"""Use the library's own instantiations, as its users do: compiles in seconds, runs as shipped."""
 
 
 def library(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
-    """Pinocchio as its users get it: the wheel's own library."""
+    """Pinocchio as its users have it: the wheel's own library."""
     return contestants(case, "Pinocchio", compiled("library", flags))
 
 
@@ -78,7 +78,8 @@ def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contesta
 
 
 def outputs_of(case: Case, function: str) -> int:
-    """Numbers per state that a rival puts out: psdmc's, but for standard parameters in place of base parameters."""
+    """Numbers per state that a rival puts out: as many as psdmc, except with standard parameters in place of base
+    parameters."""
     return 10 * case.n**2 if function == "regressor" else sum(output_sizes(function, case.n))
 
 
@@ -112,7 +113,8 @@ def compiled(way: Way, flags: tuple[str, ...]) -> Path:
 
 @lru_cache
 def pinocchio_prefix() -> Path:
-    """Where the pin wheel keeps headers and libraries; ToolchainError where they, or Eigen's, are not installed."""
+    """The folder in which the pin wheel keeps headers and libraries; ToolchainError where they, or Eigen's, are not
+    installed."""
     found = find_spec("pinocchio")
     if found is None or found.origin is None:
         raise ToolchainError("the wheel 'pin' is not installed", "pip install pin")

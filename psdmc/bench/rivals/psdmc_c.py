@@ -1,4 +1,4 @@
-"""psdmc's own libraries: the compiled package behind the same loops as every rival."""
+"""psdmc's own libraries: the compiled package, called by the same loops as every rival."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from psdmc.recipes.recipe import Polynomials
 from psdmc.toolchain.compiler_command import find_compiler, run
 
 FUNCTIONS = tuple(name for name, recipe in RECIPES.items() if recipe.benched)
-"""What the benchmark measures, of all that psdmc generates."""
+"""The functions that the benchmark measures."""
 
 EXPANDED = tuple(
     name for name in FUNCTIONS if RECIPES[name].polynomials in (Polynomials.TORQUE, Polynomials.SOLVED)
 )
-"""What PSDM-2021 and Denso-2022 published times of."""
+"""The functions whose times PSDM-2021 and Denso-2022 published."""
 
 
 EXPANDED_LIMIT = 30_000
@@ -36,7 +36,7 @@ EXPANDED_LIMIT = 30_000
 
 
 def factored(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
-    """The factored lowering, what users get."""
+    """The factored lowering, which users get."""
     return contestants(case, "factored", FUNCTIONS, flags)
 
 
@@ -63,7 +63,7 @@ def contestants(
 
 @lru_cache(maxsize=2)
 def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, ...]) -> dict[str, Kernel]:
-    """Lowered once for all flags: searching for the cheapest arrangement takes longer than compiling."""
+    """Kernels, lowered once for all flags: searching for the cheapest arrangement takes longer than compiling."""
     return lower(model, lowering, functions, theta_variants=False)
 
 
@@ -122,7 +122,7 @@ def _library(files: dict[str, str], sources: tuple[str, ...], robot: str, flags:
 
 
 def glue(package: PackageView) -> str:
-    """C++ that puts the package's functions behind the loops."""
+    """C++ that connects the package's functions with the loops."""
     lines = ['#include "loops.hpp"', '#include "library.h"']
     for view in package.functions:
         symbol, given = f"{package.robot}_{view.name}", _given(view.signature)
@@ -146,7 +146,7 @@ def _given(function: Signature) -> str:
 
 
 def _arguments(function: Signature, sizes: Sequence[int], each: str) -> list[str]:
-    """What the function is called with: its inputs, and every output at its place in one array."""
+    """The function's arguments: its inputs, and every output at its place in one array."""
     starts = [0, *accumulate(sizes[:-1])]
     outputs = [f"out + {each}{start}" if start else "out" for start in starts]
     return [*INPUTS[: len(function.inputs)], *outputs]
