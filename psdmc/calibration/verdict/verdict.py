@@ -17,12 +17,14 @@ NOT_USABLE_STATUS = 6
 class JointFigures:
     """The figures by which one joint is judged; NaN where a figure does not exist.
 
-    r2, rmse       on held-out data, whole torque (N m, N where the joint slides)
-    gain, gain_std measured torque, without friction, per torque by the file's own theta_b: one where the file is right
-    visible        whether the file's torque is large enough for its gain to count
-    friction_power W, mean power that friction takes: positive on any real joint;  friction_power_std
-    noise_ratio    residual over the sensor noise that passes the filter
-    speed          rad/s (m/s), RMS
+    r2, rmse            on held-out data, whole torque (N m, N where the joint slides)
+    gain, gain_std      measured torque, without friction, per torque by the file's own theta_b: one where the file is
+                        right
+    visible             whether the file's torque is large enough for its gain to count
+    friction_power      W, mean power that friction takes: positive on any real joint
+    friction_power_std  its standard deviation
+    noise_ratio         residual over the sensor noise that passes the filter
+    speed               rad/s (m/s), RMS
     """
 
     joint: str
