@@ -18,6 +18,7 @@ from psdmc.errors import exit_status_of
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
+from psdmc.model.random_states import random_states
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.verification.check import source_of
@@ -28,7 +29,6 @@ SETTINGS = Settings(rounds=3, rivals=(OURS, THEIRS), functions=FUNCTIONS)
 """Fewer trials than `make bench`: a quick estimate."""
 
 STATES = 1000
-RANGES = (np.pi, 3.0, 5.0)
 SEED = 2021
 
 Progress = Callable[[str], None]
@@ -46,8 +46,7 @@ def errors_against_pinocchio(model: DynamicsModel, robot: CompiledRobot) -> dict
     """Largest error of each compiled function against Pinocchio's reading of the source, relative to each output's
     largest value over random states."""
     pinocchio = reference(source_of(model))
-    rng = np.random.default_rng(SEED)
-    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (STATES, model.n)) for limit in RANGES)
+    q, qd, qdd = random_states(np.random.default_rng(SEED), STATES, model.n)
     given = {"q": q, "qd": qd, "qdd": qdd, "tau": pinocchio.inverse_dynamics(q, qd, qdd)}
     errors: dict[str, float] = {}
     for name in FUNCTIONS:

@@ -14,6 +14,7 @@ from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor
 from psdmc.errors import DerivationError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_states import random_states
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
@@ -24,9 +25,6 @@ States = tuple[list[Array], list[Array], list[Array]]
 SEED = 19_041_490
 SAMPLES = 64
 """Fresh states per certificate."""
-
-RANGES = (np.pi, 3.0, 5.0)
-"""q (rad or m), qd and qdd are drawn from plus or minus these."""
 
 WORST_ALLOWED = 1e-8
 """Largest error that rounding explains for ordinary robots."""
@@ -79,7 +77,7 @@ def certificate(model: DynamicsModel) -> Array:
 def measured(model: DynamicsModel) -> Measured:
     rng = np.random.default_rng(SEED)
     x, theta = _parameters(model, rng)
-    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, size=(SAMPLES, model.n)) for limit in RANGES)
+    q, qd, qdd = random_states(rng, SAMPLES, model.n)
     chain, none = model.mechanism, np.zeros(model.n)
     states = (list(q.T), list(qd.T), list(qdd.T))
     with np.errstate(over="ignore", invalid="ignore"):

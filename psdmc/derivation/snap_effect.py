@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
+from psdmc.model.random_states import random_states
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
 
 SEED = 31_416
 SAMPLES = 256
-RANGES = (np.pi, 3.0, 5.0)
-"""q (rad or m), qd and qdd are drawn from plus or minus these."""
 
 
 def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
@@ -28,7 +27,7 @@ def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
 def _torques(chain: Mechanism) -> Array:
     """(n, SAMPLES)"""
     rng = np.random.default_rng(SEED)
-    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (len(chain), SAMPLES)) for limit in RANGES)
+    q, qd, qdd = random_states(rng, len(chain), SAMPLES)
     torques = inverse_dynamics(
         frames_of(chain),
         bodies_of(chain, chain.parameters),

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from psdmc.dynamics.frames import BASE, Frame, frames_of
 from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
+from psdmc.robot.inertia import LENGTH_ORDER
 from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement
+from psdmc.robot.zeros import leading_rows
 
 Array = NDArray[np.float64]
-
-_LENGTH_ORDER = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
-"""Exponent of metre in the unit of each of a body's standard parameters."""
 
 
 def length_unit(chain: Mechanism) -> float:
@@ -48,7 +47,7 @@ def frame_in_unit(frame: Frame, unit: float) -> Frame:
 def parameter_units(types: Sequence[JointType], unit: float) -> Array:
     """(11 n,) what one unit of each standard parameter is in SI."""
     drive = [joint.drive_order for joint in types]
-    orders = np.column_stack([np.tile(_LENGTH_ORDER, (len(types), 1)), drive])
+    orders = np.column_stack([np.tile(LENGTH_ORDER, (len(types), 1)), drive])
     units: Array = unit ** orders.reshape(len(types) * PARAMETERS_PER_LINK).astype(np.float64)
     return units
 
@@ -104,9 +103,3 @@ def scaled(chain: Mechanism) -> Scaled:
         leads,
         (x, y, z),
     )
-
-
-def leading_rows(span: Array) -> NDArray[np.int64]:
-    """(k,) row of each column's leading one, in reduced column echelon form."""
-    leads: NDArray[np.int64] = np.argmax(span != 0, axis=0).astype(np.int64)
-    return leads

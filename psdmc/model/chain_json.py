@@ -15,6 +15,7 @@ from psdmc.model.json_values import entries, number, numbers, part, text, whole
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.joints import joint_type
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Limits, Mechanism, NamedFrame, Placement
+from psdmc.robot.zeros import leading_rows
 
 MOST_JOINTS = 256
 """Largest number of joints in a model file: the span alone takes 0.5 kB times its square, 64 MB."""
@@ -126,7 +127,7 @@ def _span(data: object, n: int) -> Array:
             whole(place, "a column of the span", 0, columns - 1),
         )
         span[where] = number(value, "an entry of the span")
-    leads = np.argmax(span != 0.0, axis=0)
+    leads = leading_rows(span)
     if columns and not np.array_equal(span[leads], np.eye(columns)):
         raise ValueError("the span is not in reduced column echelon form")
     return span

@@ -14,6 +14,7 @@ from psdmc.errors import InputError
 from psdmc.model import equations, evaluate, payload, recursive, store
 from psdmc.model.expansion import Expansion
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array
+from psdmc.robot.zeros import leading_rows
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -112,7 +113,7 @@ class DynamicsModel:
 
         Each base parameter is placed on its pivot; the span's other coordinates are zero. B @ representative = 1.
         """
-        leads = np.argmax(self.mechanism.parameter_span != 0.0, axis=0)
+        leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
         return frozen_array(
             self.mechanism.parameter_span[:, [column_of[pivot] for pivot in self.pivots]],

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.robot.inertia import LENGTH_ORDER
 from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Joint, Mechanism
 
 Array = NDArray[np.float64]
@@ -27,7 +28,6 @@ SHORTEST = 1e-100
 """m; shorter ones have no name in equations: their squares would leave the range of doubles."""
 
 _UNITS = ("kg", "kg m", "kg m^2")
-_LENGTH_ORDER = (0, 1, 1, 1, 2, 2, 2, 2, 2, 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +99,8 @@ def _row_lengths(joint: Joint, convention: str) -> list[tuple[str, float]]:
 
 def _order(index: int, chain: Mechanism) -> int:
     joint, parameter = divmod(index, PARAMETERS_PER_LINK)
-    if parameter < len(_LENGTH_ORDER):
-        return _LENGTH_ORDER[parameter]
+    if parameter < len(LENGTH_ORDER):
+        return LENGTH_ORDER[parameter]
     return chain.joints[joint].type.drive_order
 
 

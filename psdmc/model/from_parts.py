@@ -19,6 +19,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Entries, Expansion
 from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
+from psdmc.robot.zeros import leading_rows
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -75,7 +76,7 @@ def _check_base_parameters(arrays: Arrays, chain: Mechanism, l: int, is_known: b
     first = np.argmax(alone & (B == 1.0), axis=1) if B.shape[1] else np.zeros(0, int)
     if not (alone[first] & (B[np.arange(l), first] == 1.0)).all():
         raise ValueError("a base parameter has no standard parameter of its own")
-    leads = np.argmax(span != 0.0, axis=0) if span.size else np.zeros(0, int)
+    leads = leading_rows(span) if span.size else np.zeros(0, int)
     if not np.isin(first, leads).all():
         raise ValueError("a base parameter lies outside the parameters' span")
 

@@ -13,6 +13,7 @@ from psdmc.robot import limits
 from psdmc.robot.inertia import physical_fault, six_of
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, NamedFrame, Placement
 from psdmc.robot.small import times
+from psdmc.robot.zeros import leading_rows
 
 Array = NDArray[np.float64]
 
@@ -148,7 +149,7 @@ def _check_admitted(chain: Mechanism, load: Array, body: int) -> None:
     x = np.zeros(PARAMETERS_PER_LINK * len(chain))
     x[body_parameters(body)] = load
     span = chain.parameter_span
-    leads = np.argmax(span != 0.0, axis=0)
+    leads = leading_rows(span)
     missed = np.abs(x - span @ x[leads]).max()
     if missed > SPAN_TOLERANCE * np.abs(x).max(initial=0.0):
         link = chain.joints[body].link_name

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from psdmc.dynamics.parameters import BODY_PARAMETERS, inertia_of, standard_parameters
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
+from psdmc.robot.zeros import leading_rows
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,6 @@ def random_parameters(chain: Mechanism) -> Array:
         link[:BODY_PARAMETERS] = standard_parameters(mass, mass * centre, inertia_of(second))
         link[BODY_PARAMETERS] = rng.uniform(0.1, 0.5)
     span = chain.parameter_span
-    leads = np.argmax(span != 0.0, axis=0)
+    leads = leading_rows(span)
     admitted: Array = span @ x.reshape(-1)[leads]
     return admitted

@@ -9,6 +9,9 @@ from psdmc.robot.mechanism import Array
 INERTIA_NAMES = ("xx", "xy", "yy", "xz", "yz", "zz")
 """Order of the six inertia components within the standard parameters."""
 
+LENGTH_ORDER = (0, 1, 1, 1, 2, 2, 2, 2, 2, 2)
+"""Exponent of the metre in the unit of each of a body's standard parameters: kg, kg m, kg m^2."""
+
 PRODUCT_NOISE = 1e-15
 """Relative to a link's largest first moment or inertia: smaller entries are rounding of changes of frames."""
 

@@ -16,6 +16,7 @@ from collections.abc import Collection, Iterable, Sequence
 from itertools import combinations_with_replacement
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.errors import InputError
 from psdmc.robot.inertia import INERTIA_NAMES, about_com, standard_parameters
@@ -122,6 +123,12 @@ def column_echelon(columns: Array, tolerance: float = 1e-12) -> Array:
         work[:, others] -= np.outer(work[:, rank], work[row, others])
         rank += 1
     return work[:, :rank] + 0.0
+
+
+def leading_rows(span: Array) -> NDArray[np.int64]:
+    """(k,) row of each column's leading one, for (rows, k) columns in reduced echelon form."""
+    leads: NDArray[np.int64] = np.argmax(span != 0.0, axis=0).astype(np.int64)
+    return leads
 
 
 def _vanishing_at(columns: Array, rows: Sequence[int]) -> Array:

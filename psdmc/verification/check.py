@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
+from psdmc.model.random_states import random_states
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
@@ -30,9 +31,6 @@ Array = NDArray[np.float64]
 
 STATES = 200
 SEED = 14_630
-RANGES = (np.pi, 3.0, 5.0)
-"""q (rad or m), qd and qdd are drawn from plus or minus these."""
-
 TORQUE_LIMIT = 1e-10
 """Largest relative error that passes: a hundred times what rounding leaves, a million times less than any mistake."""
 
@@ -160,9 +158,7 @@ def _gives(theta: Array, B: Array, parameters: Array) -> bool:
 
 def _states(n: int) -> tuple[Array, Array, Array]:
     """q, qd, qdd, (STATES, n) each."""
-    rng = np.random.default_rng(SEED)
-    q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, size=(STATES, n)) for limit in RANGES)
-    return q, qd, qdd
+    return random_states(np.random.default_rng(SEED), STATES, n)
 
 
 def _condition(model: DynamicsModel, robot: Reference) -> float:
