@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.equations import BaseParameter
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
 from psdmc.version import psdmc_version
@@ -28,15 +29,6 @@ class JointInfo:
     effort: float = math.inf
     unit: str = "rad"
     effort_unit: str = "N m"
-
-
-@dataclass(frozen=True, slots=True)
-class BaseParameterInfo:
-    """One base parameter: its equation in standard parameters, its unit, its value (None while unknown)."""
-
-    equation: str
-    unit: str
-    value: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +52,7 @@ class PackageInfo:
     gravity: tuple[float, float, float]
     base: str
     tip: str
-    parameters: tuple[BaseParameterInfo, ...]
+    parameters: tuple[BaseParameter, ...]
     model_hash: str
     psdmc_version: str
     options: Mapping[str, str] = field(default_factory=dict)
@@ -118,8 +110,8 @@ def package_info(
         gravity=(gx, gy, gz),
         base=chain.base_name,
         tip=chain.tip_name,
-        parameters=_parameters(model),
-        model_hash=str(getattr(model, "content_hash", "") or ""),
+        parameters=model.base_parameters,
+        model_hash=model.content_hash,
         psdmc_version=psdmc_version(),
         options=dict(options or {}),
         frames=tuple(frame.name for frame in chain.frames),
@@ -132,14 +124,3 @@ def _load_maps(model: DynamicsModel) -> tuple[NDArray[np.float64], ...]:
     is_tip_alone = [frame.name for frame in chain.frames] == [chain.tip_name]
     frames = (chain.tip_frame,) if is_tip_alone else (chain.tip_frame, *chain.frames)
     return tuple(load_map(chain, model.B, frame) for frame in frames)
-
-
-def _parameters(model: DynamicsModel) -> tuple[BaseParameterInfo, ...]:
-    values = [None] * model.l if model.theta_b is None else model.theta_b.tolist()
-    known = getattr(model, "base_parameters", None)
-    if known is None:
-        return tuple(BaseParameterInfo(f"theta_b[{i}]", "", value) for i, value in enumerate(values))
-    return tuple(
-        BaseParameterInfo(str(parameter.equation), str(parameter.unit), value)
-        for parameter, value in zip(known, values, strict=True)
-    )

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
+from psdmc.emit.info import JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.functions import SIGNATURES
+from psdmc.model.equations import BaseParameter
 from psdmc.program.kernel import Kernel
 from psdmc.program.text import parse
 
@@ -79,8 +80,8 @@ def pendulum_info(name: str = "pendulum", joint: str = "hinge") -> PackageInfo:
         base="wall",
         tip="bob",
         parameters=(
-            BaseParameterInfo("Izz1 + m1 0.5^2", "kg m^2", 0.25),
-            BaseParameterInfo("mx1", "kg m", 0.5),
+            BaseParameter("Izz1 + m1 0.5^2", "kg m^2", 0.25),
+            BaseParameter("mx1", "kg m", 0.5),
         ),
         model_hash="00ff",
         psdmc_version="0.1.0",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
+from psdmc.emit.info import JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
 from psdmc.emit.reference_states import ReferenceStates
+from psdmc.model.equations import BaseParameter
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Positive, Q, Quantity, Signature
 from psdmc.program.trace import Slot, Tracer
@@ -32,7 +33,7 @@ INFO = PackageInfo(
     gravity=(0.0, 0.0, -9.81),
     base="wall",
     tip="bob",
-    parameters=tuple(BaseParameterInfo(f"p{i}", "kg", 1.0 + i) for i in range(L)),
+    parameters=tuple(BaseParameter(f"p{i}", "kg", 1.0 + i) for i in range(L)),
     model_hash="",
     psdmc_version="0.1.0",
     frames=("camera", 'bo"b'),

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from direct import Direct, expected, shared_library, states
 
-from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
+from psdmc.emit.info import JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_view
 from psdmc.functions import SIGNATURES
+from psdmc.model.equations import BaseParameter
 from psdmc.program.kernel import Kernel
 from psdmc.program.text import parse
 
@@ -34,7 +35,7 @@ INFO = PackageInfo(
     gravity=(0.0, 0.0, -9.81),
     base="wall",
     tip="bob",
-    parameters=(BaseParameterInfo("Izz1", "kg m^2", 1.0),),
+    parameters=(BaseParameter("Izz1", "kg m^2", 1.0),),
     model_hash="",
     psdmc_version="0.1.0",
 )

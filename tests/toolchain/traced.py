@@ -12,11 +12,12 @@ from psdmc.dynamics.frames import Frame, frame_at
 from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
-from psdmc.emit.info import BaseParameterInfo, JointInfo, PackageInfo
+from psdmc.emit.info import JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.functions import DEFAULT, SIGNATURES
+from psdmc.model.equations import BaseParameter
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
 from psdmc.program.passes.drop_unused import drop_unused
@@ -160,7 +161,7 @@ def arm_info(name: str = "test arm", seed: int = 0) -> PackageInfo:
         gravity=(0.0, 0.0, -9.81),
         base="base",
         tip="tool",
-        parameters=tuple(BaseParameterInfo(f"p{i}", "kg", value) for i, value in enumerate(parameters)),
+        parameters=tuple(BaseParameter(f"p{i}", "kg", value) for i, value in enumerate(parameters)),
         model_hash="0123abcd",
         psdmc_version="0.1.0",
     )
