@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import PIVOTS, accelerations
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Polynomials, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -47,7 +47,6 @@ RECIPE = Recipe(
     pinocchio,
     starts="inverse_dynamics",
     polynomials=Polynomials.SOLVED,
-    needs=Needs.POSITIVE_MASS,
     default=True,
     benched=True,
 )

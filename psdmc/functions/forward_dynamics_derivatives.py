@@ -13,7 +13,7 @@ from psdmc.dynamics.solve import factorize, inverse, solve
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.accelerations import PIVOTS
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -89,6 +89,5 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    needs=Needs.POSITIVE_MASS,
     benched=True,
 )

@@ -10,7 +10,7 @@ from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import PIVOTS, accelerations
 from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along, solved, torque_slopes
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -52,5 +52,4 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    needs=Needs.POSITIVE_MASS,
 )

@@ -18,7 +18,7 @@ from psdmc.recipes.directions import (
     weighted,
 )
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -73,5 +73,4 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    needs=Needs.POSITIVE_MASS,
 )

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from psdmc.functions import forward_dynamics_vjp
-from psdmc.program.signature import Signature
-from psdmc.recipes.directions import GRADIENT_THETA, parameter_gradient, weighted
+from psdmc.recipes.directions import GRADIENT_THETA, parameter_gradient, weighted, with_parameter_gradient
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs
 from psdmc.recipes.regressor_rows import rows_on_arrays
 from psdmc.robot.mechanism import Array
 
@@ -40,22 +39,11 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     return found | {GRADIENT_THETA.name: -(found["grad_tau"] * given["tau"]).sum(axis=-1)}
 
 
-RECIPE = Recipe(
-    Signature(
-        "forward_dynamics_vjp_parameters",
-        186,
-        "qdd, and the gradient of cotangent . qdd by q, qd, tau and theta_b",
-        STATE.signature.inputs,
-        (*STATE.signature.outputs, GRADIENT_THETA),
-        theta=True,
-        positive=STATE.signature.positive,
-    ),
-    "gradient of forward dynamics, by parameters too",
+RECIPE = with_parameter_gradient(
+    STATE,
+    186,
+    "qdd, and the gradient of cotangent . qdd by q, qd, tau and theta_b",
     trace,
     reference,
-    STATE.against,
     pinocchio,
-    shares="inverse_dynamics",
-    gradient=GRADIENT_THETA.name,
-    needs=Needs.POSITIVE_MASS,
 )

@@ -6,10 +6,15 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from psdmc.functions import inverse_dynamics_vjp
-from psdmc.program.signature import Signature
-from psdmc.recipes.directions import COTANGENT, GRADIENT_THETA, parameter_gradient, weighted
+from psdmc.recipes.directions import (
+    COTANGENT,
+    GRADIENT_THETA,
+    parameter_gradient,
+    weighted,
+    with_parameter_gradient,
+)
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs
 from psdmc.recipes.regressor_rows import rows_on_arrays
 from psdmc.robot.mechanism import Array
 
@@ -36,20 +41,11 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
     return found | {GRADIENT_THETA.name: (given[COTANGENT.name] * found["tau"]).sum(axis=-1)}
 
 
-RECIPE = Recipe(
-    Signature(
-        "inverse_dynamics_vjp_parameters",
-        182,
-        "tau, and the gradient of cotangent . tau by q, qd, qdd and theta_b",
-        STATE.signature.inputs,
-        (*STATE.signature.outputs, GRADIENT_THETA),
-        theta=True,
-    ),
-    "gradient of inverse dynamics, by parameters too",
+RECIPE = with_parameter_gradient(
+    STATE,
+    182,
+    "tau, and the gradient of cotangent . tau by q, qd, qdd and theta_b",
     trace,
     reference,
-    STATE.against,
     pinocchio,
-    shares="inverse_dynamics",
-    gradient=GRADIENT_THETA.name,
 )

@@ -12,7 +12,7 @@ from psdmc.dynamics.solve import factorize, inverse
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.accelerations import PIVOTS
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -52,5 +52,4 @@ RECIPE = Recipe(
     pinocchio,
     starts="inverse_dynamics",
     matters=("fold_double_angle",),
-    needs=Needs.POSITIVE_MASS,
 )

@@ -10,7 +10,7 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, TAU, Positive, Q, Quantity, Signature
 from psdmc.recipes.accelerations import PIVOTS, accelerations
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
 from psdmc.robot.mechanism import Array
 
@@ -97,5 +97,4 @@ RECIPE = Recipe(
     "aba",
     pinocchio,
     shares="inverse_dynamics",
-    needs=Needs.POSITIVE_MASS,
 )

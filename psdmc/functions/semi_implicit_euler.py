@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from psdmc.program.signature import QD, TAU, Q, Signature
 from psdmc.recipes.accelerations import PIVOTS, accelerations
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
 from psdmc.robot.mechanism import Array
 
@@ -53,5 +53,4 @@ RECIPE = Recipe(
     "aba",
     pinocchio,
     starts="inverse_dynamics",
-    needs=Needs.POSITIVE_MASS,
 )

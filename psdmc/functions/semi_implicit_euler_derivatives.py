@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
 from psdmc.program.signature import Signature
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import (
     DT,
     A,
@@ -71,5 +71,4 @@ RECIPE = Recipe(
     "aba, computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    needs=Needs.POSITIVE_MASS,
 )

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.replay import substituted
-from psdmc.program.signature import Quantity
+from psdmc.program.signature import Quantity, Signature
 from psdmc.program.slopes import gradients, slopes
-from psdmc.recipes.recipe import Ingredients
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.torques import torques
 from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
 
 COTANGENT = Quantity("cotangent", ("nv",))
 """Weights of the outputs."""
@@ -78,3 +83,33 @@ def weighted(weights: Array, matrices: Array) -> Array:
 def along(matrices: Array, direction: Array) -> Array:
     """(k, n) matrix direction, state by state."""
     return np.asarray(np.einsum("kij,kj->ki", matrices, direction))
+
+
+def with_parameter_gradient(
+    state: Recipe,
+    order: int,
+    meaning: str,
+    trace: Callable[[Ingredients], Outputs],
+    reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays],
+    pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays],
+) -> Recipe:
+    """The recipe of `state`'s function with the gradient by theta_b as one more output, called NAME_parameters."""
+    known = state.signature
+    return Recipe(
+        Signature(
+            f"{known.name}_parameters",
+            order,
+            meaning,
+            known.inputs,
+            (*known.outputs, GRADIENT_THETA),
+            theta=True,
+            positive=known.positive,
+        ),
+        f"{state.title}, by parameters too",
+        trace,
+        reference,
+        state.against,
+        pinocchio,
+        shares=state.shares,
+        gradient=GRADIENT_THETA.name,
+    )

@@ -122,7 +122,7 @@ class Recipe:
     gradient     name of its output that is the gradient by theta_b of a number linear in theta_b. It is compared as that
                  number, times theta_b, which `pinocchio` gives
     beside       name of the function whose values this one's are differences of: errors are measured relative to those
-    needs        what the model must have
+    needs        what the model must have; left out: a positive definite mass matrix where the signature has `positive`
     default      whether it is generated where no functions are named
     benched      whether `make bench` measures it
     """
@@ -143,6 +143,10 @@ class Recipe:
     needs: Needs | None = None
     default: bool = False
     benched: bool = False
+
+    def __post_init__(self) -> None:
+        if self.needs is None and self.signature.positive is not None:
+            object.__setattr__(self, "needs", Needs.POSITIVE_MASS)
 
     @property
     def name(self) -> str:

@@ -11,6 +11,7 @@ import pytest
 import psdmc.functions
 from psdmc.functions import DEFAULT, RECIPES, SIGNATURES
 from psdmc.program.signature import WORDS
+from psdmc.recipes.recipe import Needs
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.stubs import STUB, stub
 
@@ -47,6 +48,11 @@ def test_nothing_else_lists_functions() -> None:
         if len(named) > 1 and not inside.startswith("functions/"):
             found[inside] = sorted(named)
     assert set(found) == set(NAMES_SEVERAL), found
+
+
+def test_functions_that_can_fail_need_a_positive_mass_matrix() -> None:
+    for recipe in RECIPES.values():
+        assert (recipe.needs is Needs.POSITIVE_MASS) == (recipe.signature.positive is not None), recipe.name
 
 
 def test_recipes_only_lean_on_functions_that_there_are() -> None:
