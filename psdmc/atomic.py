@@ -179,11 +179,7 @@ def _fill(own: Path, content: str | bytes) -> None:
 
 def _settle(own: Path, target: Path) -> None:
     """Write the file to the disk, with the mode that the old file had; a full disk raises here at the latest."""
-    handle = os.open(own, os.O_RDWR)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    _flush(own, os.O_RDWR)
     with contextlib.suppress(FileNotFoundError):
         own.chmod(target.stat().st_mode & 0o777)
 
@@ -191,8 +187,12 @@ def _settle(own: Path, target: Path) -> None:
 def _settle_folder(folder: Path) -> None:
     """Write the renaming to the disk, where the file system can; the file is whole in any case."""
     with contextlib.suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        _flush(folder, os.O_RDONLY)
+
+
+def _flush(path: Path, mode: int) -> None:
+    handle = os.open(path, mode)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

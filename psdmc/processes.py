@@ -41,8 +41,9 @@ def _elsewhere(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int)
             for future in futures:
                 yield future.result()
         except BaseException:
-            # The pool then finds itself broken and gives up what waits. Nothing is cancelled besides, as pool.map would:
-            # a cancelled future raises in the pool's own thread, which leaves another one writing to workers that are gone.
+            # The pool notices the ended workers and fails its remaining futures. They must not be cancelled besides, as
+            # pool.map does: a cancelled future raises in the pool's own thread, and another thread then keeps writing
+            # to workers that have ended.
             for process in set(multiprocessing.active_children()) - others:
                 process.terminate()
             raise
@@ -50,7 +51,8 @@ def _elsewhere(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int)
 
 @contextlib.contextmanager
 def _deaf_to_interrupts() -> Iterator[None]:
-    """Processes started inside do not hear Ctrl-C while they start. What this one is sent meanwhile it hears behind."""
+    """Block Ctrl-C in processes that are started inside, until they are ready. One sent to this process meanwhile is raised
+    at the end."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows: its consoles send Ctrl-C to every process
         yield
         return
@@ -67,11 +69,12 @@ def _deaf_to_interrupts() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _noted(heard: list[int]) -> Iterator[None]:
-    """Ctrl-C that another thread of this process takes, since this one does not, is only noted."""
+    """Append Ctrl-C to `heard` where it reaches another thread of this process, as this one blocks it."""
     is_main = threading.current_thread() is threading.main_thread()
-    if (
-        not is_main or signal.getsignal(signal.SIGINT) is None
-    ):  # handlers are the main thread's, or not Python's
+    is_pythons = signal.getsignal(signal.SIGINT) is not None
+    if not (
+        is_main and is_pythons
+    ):  # only the main thread may set a handler, and only Python's can be set again
         yield
         return
     handler = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
@@ -82,8 +85,8 @@ def _noted(heard: list[int]) -> Iterator[None]:
 
 
 def _leave_interrupts_to_programs() -> None:
-    """In a worker: Ctrl-C does nothing to it, since the process that started it answers for all; compilers that it runs
-    get the system's default back, and end."""
+    """Ignore Ctrl-C in a worker, which the process that started it ends; the compilers that it runs get the system's
+    default again, and end by themselves."""
     signal.signal(signal.SIGINT, lambda number, frame: None)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

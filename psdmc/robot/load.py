@@ -70,19 +70,9 @@ def load_robot(
     InputError where the file or an option is wrong, naming what and where.
     """
     file = Path(path)
-    return load_robot_text(
-        robot_text(file),
-        "dh" if file.suffix.lower() == ".toml" else "urdf",
-        source_name=file.name,
-        base=base,
-        tip=tip,
-        gravity=gravity,
-        drive_inertia=drive_inertia,
-        assume_zero=assume_zero,
-        snap=snap,
-        frames=frames,
-        tool=tool,
-    )
+    text = robot_text(file)
+    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool)
+    return _loaded(text, "dh" if file.suffix.lower() == ".toml" else "urdf", file.name, options)
 
 
 def load_robot_text(
@@ -102,11 +92,14 @@ def load_robot_text(
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
     options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool)
+    return _loaded(text, source_format, source_name, options)
+
+
+def _loaded(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> LoadedRobot:
     if not text.strip():
-        raise InputError(f"{source_name}: the file is empty", "give a URDF or a DH .toml file")
-    draft = _draft(text, source_format, source_name, options)
-    chain = _settled(draft, options, source_name)
-    return LoadedRobot(chain, text, source_format, source_name, draft.snaps, options)
+        raise InputError(f"{source}: the file is empty", "give a URDF or a DH .toml file")
+    draft = _draft(text, source_format, source, options)
+    return LoadedRobot(_settled(draft, options, source), text, source_format, source, draft.snaps, options)
 
 
 def _refuse_size(size: int, source: str) -> None:

@@ -59,12 +59,8 @@ def test_its_program_and_its_c(name: str):
     robot = subject(name, expand=name not in GENERIC)  # E and P of those are too large to be lowered
     questions = Questions(robot)
 
-    parts = (
-        robot.model.content_hash,
-        "auto",
-        repr(EmitOptions().target.costs),
-        *DEFAULT,
-    )  # as psdmc.compile's
+    costs = repr(EmitOptions().target.costs)
+    parts = (robot.model.content_hash, "auto", costs, *DEFAULT)  # the key that psdmc.compile uses
     kernels = lowered_once(parts, lambda: lower(robot.model))
 
     found = errors(questions, program_answers(kernels, robot.model, questions))

@@ -21,6 +21,7 @@ from psdmc.bench.rivals.pinocchio_cpp import (
     outputs_of,
     pinocchio_prefix,
     standard_parameters,
+    variant_of,
 )
 from psdmc.bench.versions import version_of
 from psdmc.errors import ToolchainError
@@ -62,7 +63,7 @@ def _entered(
             library,
             way,
             outputs_of(case, function),
-            variant=way.removeprefix(function).strip("_").upper(),
+            variant=variant_of(way, function),
             layout="lanes" if by_lane else "state",
             lanes=ctypes.CDLL(str(library)).lanes() if by_lane else 1,
             weights=standard_parameters(case) if function == "regressor" else None,

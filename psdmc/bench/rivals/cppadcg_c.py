@@ -8,7 +8,7 @@ from pathlib import Path
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, source
-from psdmc.bench.rivals.pinocchio_cpp import DEFINES, includes, outputs_of, pinocchio_prefix
+from psdmc.bench.rivals.pinocchio_cpp import DEFINES, includes, outputs_of, pinocchio_prefix, variant_of
 from psdmc.bench.versions import version_of
 from psdmc.errors import ToolchainError
 from psdmc.toolchain.compiler_command import find_compiler
@@ -32,12 +32,7 @@ def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
     library = _library(written(case), flags)
     return [
         Contestant(
-            RIVAL,
-            function,
-            library,
-            way,
-            outputs_of(case, function),
-            variant=way.removeprefix(function).strip("_").upper(),
+            RIVAL, function, library, way, outputs_of(case, function), variant=variant_of(way, function)
         )
         for function, ways in WAYS.items()
         for way in ways

@@ -66,7 +66,7 @@ def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contesta
             compiled_library,
             symbol,
             outputs_of(case, function),
-            variant=symbol.removeprefix(function).strip("_").upper(),
+            variant=variant_of(symbol, function),
             robot=robot,
             weights=standard_parameters(case) if function == "regressor" else None,
         )
@@ -75,6 +75,11 @@ def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contesta
         if is_comparable(case, function)
     ]
     return [*found, *incomparable(case, rival)]
+
+
+def variant_of(symbol: str, function: str) -> str:
+    """The way in which a symbol computes its function: what its name has beyond the function's."""
+    return symbol.removeprefix(function).strip("_").upper()
 
 
 def outputs_of(case: Case, function: str) -> int:
