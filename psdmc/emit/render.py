@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import resources
+from pathlib import Path
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
+from psdmc.emit.kept_templates import CodeBesideTemplates
 from psdmc.emit.names import c_comment, c_string
 
 
 def _source(name: str) -> str | None:
     file = resources.files("psdmc.templates").joinpath(name)
     return file.read_text(encoding="utf-8") if file.is_file() else None
+
+
+def _kept() -> CodeBesideTemplates | None:
+    """None where templates are no files, as in a zipped installation."""
+    folder = resources.files("psdmc.templates")
+    return CodeBesideTemplates(folder) if isinstance(folder, Path) else None
 
 
 @cache
@@ -25,6 +33,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=False,
+        bytecode_cache=_kept(),
     )
     made.filters["comment"] = c_comment
     made.filters["string"] = c_string

@@ -36,7 +36,7 @@ class Tableau:
         """
         others = np.setdiff1d(np.arange(columns.shape[1]), basis)
         rows, factors = _row_pivots(columns[:, list(basis)])
-        rest = columns[np.ix_(np.array(rows), others)]
+        rest = columns[rows][:, others]
         for k, factor in enumerate(factors[rows].T):
             behind = rest[k] / factor[k]
             rest -= factor[:, None] * behind
