@@ -51,21 +51,21 @@ def derive(
     drive_inertia: bool | Sequence[float] = False,
     assume_zero: Sequence[str] = (),
     snap: float = DEFAULT_SNAP,
-    expand: bool = True,
+    expand: bool | None = None,
     progress: Progress = silent,
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
 ) -> DynamicsModel:
     """The certified model (E, P, theta_b) of a robot file: URDF, or DH table in TOML.
 
-    base, tip      links that the chain starts and ends at; None: the root, the end of the longest chain
+    base, tip      links that a chain starts and ends at; None: the whole tree
     gravity        m/s^2 in the file's root frame; None: the file's own, or (0, 0, -9.81)
     drive_inertia  the joints' drive inertias are parameters: True, or one value a joint, kg m^2 (kg)
     assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com"
     snap           rad; constant rotations this near to one with exact zeros become it; 0 turns it off
-    expand         False leaves E and P out, for chains with too many monomials
+    expand         False leaves E and P out, for robots with too many monomials; None: for robots that branch
     progress       called with the name of each step as it begins
-    frames         links that kinematic functions are about, in this order; none: the tip
+    frames         links that kinematic functions are about, in this order; none: the tip, or all ends of a tree
     tool           x y z (m), roll pitch yaw (rad) of one more frame, 'tool', in the tip's
 
     Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.

@@ -58,7 +58,9 @@ def options(
 def derive(
     robot: RobotFile,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="MODEL.npz")] = None,
-    base: Annotated[str | None, typer.Option(metavar="LINK", help="link that the chain starts at")] = None,
+    base: Annotated[
+        str | None, typer.Option(metavar="LINK", help="link that a chain starts at; default: the whole tree")
+    ] = None,
     tip: Annotated[str | None, typer.Option(metavar="LINK", help="link that it ends at")] = None,
     gravity: Annotated[
         tuple[float, float, float] | None,
@@ -77,11 +79,16 @@ def derive(
         float, typer.Option(metavar="RAD", help="make rotations exact that are this near to exact; 0: off")
     ] = DEFAULT_SNAP,
     expand: Annotated[
-        bool, typer.Option("--expand/--no-expand", help="derive E and P beside theta_b")
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--expand/--no-expand", help="derive E and P beside theta_b", show_default="for serial chains"
+        ),
+    ] = None,
     frames: Annotated[
         str,
-        typer.Option(metavar="LINK,...", help="links that kinematic functions are about; default: the tip"),
+        typer.Option(
+            metavar="LINK,...", help="links that kinematic functions are about; default: the tip, or all ends"
+        ),
     ] = "",
     tool: Annotated[
         tuple[float, float, float, float, float, float] | None,
@@ -143,11 +150,11 @@ def show(
     from psdmc.model.load import load
 
     if model.suffix.lower() in ROBOT_SUFFIXES:
-        from psdmc.robot.urdf_whole import whole_robot
+        from psdmc.robot.load import load_robot
 
         if terms or cost:
             raise InputError(f"{model}: --terms and --cost are of models", "derive one first: psdmc derive")
-        print_mechanism(whole_robot(model))
+        print_mechanism(load_robot(model).mechanism)
         return
     found = load(model)
     if terms:

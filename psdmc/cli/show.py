@@ -22,7 +22,7 @@ from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
 from psdmc.robot.coordinates import leaders
 from psdmc.robot.derivable import require_derivable
-from psdmc.robot.mechanism import BASE, Joint, Mechanism
+from psdmc.robot.mechanism import BASE, Mechanism
 
 if TYPE_CHECKING:
     from psdmc.calibration.verdict.record import Calibration
@@ -46,11 +46,11 @@ def print_model(model: DynamicsModel) -> None:
     if calibrated is not None:
         print_calibration(out, calibrated)
     out.print(
-        f"[bold]{escape(found.name)}[/bold]  {escape(found.base)} to {escape(found.tip)}, {found.convention} frames"
+        f"[bold]{escape(found.name)}[/bold]  {escape(found.base)} to {escape(found.ends)}, {found.convention} frames"
     )
     out.print(f"gravity {_numbers(found.gravity)} m/s^2 in the base frame")
     out.print(_sizes(found))
-    out.print(_joints(found.joints, found.certificate))
+    out.print(_joints(model.mechanism, found.certificate))
     out.print(_parameters(found, calibrated or {}))
     out.print(f"largest torque error against Newton-Euler, relative: {max(found.certificate):.1e}")
     for note in found.notes:
@@ -64,19 +64,23 @@ def print_model(model: DynamicsModel) -> None:
 
 def _sizes(found: Summary) -> str:
     if found.sizes is None or found.p is None:
-        return f"l = {found.l} base parameters; monomials not expanded (--no-expand)"
+        why = "--no-expand" if found.is_serial else "a tree's are only with --expand"
+        return f"l = {found.l} base parameters; monomials not expanded ({why})"
     parts = ", ".join(f"{count} {kind}" for kind, count in found.sizes._asdict().items())
     return f"p = {found.p} monomials ({parts}), l = {found.l} base parameters, {found.entries} entries of P"
 
 
-def _joints(joints: Sequence[Joint], errors: Sequence[float]) -> Table:
-    table = Table("joint", "link", "type", "position", "speed", "acceleration", "effort", "error")
-    for joint, error in zip(joints, errors, strict=True):
+def _joints(robot: Mechanism, errors: Sequence[float]) -> Table:
+    """What each joint is; of a tree also the link that it hangs on."""
+    heads = ("type", "position", "speed", "acceleration", "effort", "error")
+    table = Table("joint", "link", *(() if robot.is_serial else ("hangs on",)), *heads)
+    for i, (joint, error) in enumerate(zip(robot.joints, errors, strict=True)):
         unit = joint.type.position_unit
         limits = joint.limits
         table.add_row(
             escape(joint.name),
             escape(joint.link_name),
+            *(() if robot.is_serial else (escape(_parent_link(robot, i)),)),
             joint.type.word,
             _range(limits.lower, limits.upper, unit),
             _limit(limits.speed, f"{unit}/s"),
@@ -206,18 +210,23 @@ def print_mechanism(found: Mechanism) -> None:
 
 def _bodies(found: Mechanism) -> Table:
     table = Table("joint", "link", "hangs on", "type", "q", "position", "mass")
-    for i, (joint, parent) in enumerate(zip(found.joints, found.parents, strict=True)):
+    for i, joint in enumerate(found.joints):
         unit, limits = joint.type.position_unit, joint.limits
         table.add_row(
             escape(joint.name),
             escape(joint.link_name),
-            escape(found.base_name if parent == BASE else found.joints[parent].link_name),
+            escape(_parent_link(found, i)),
             joint.type.word,
             escape(_followed(found, i)),
             _range(limits.lower, limits.upper, unit),
             f"{found.parameters[i, 0]:.6g} kg",
         )
     return table
+
+
+def _parent_link(found: Mechanism, i: int) -> str:
+    parent = found.parents[i]
+    return found.base_name if parent == BASE else found.joints[parent].link_name
 
 
 def _followed(found: Mechanism, i: int) -> str:

@@ -21,7 +21,7 @@ from psdmc.derivation.expand import (
     precision_for,
 )
 from psdmc.derivation.link_by_link import EFFECT
-from psdmc.derivation.memory import refuse_long
+from psdmc.derivation.memory import refuse_long, refuse_uncountable, types_along_ways
 from psdmc.derivation.reduce import PIVOT_TOLERANCE, Reduction
 from psdmc.derivation.rounding import merged
 from psdmc.derivation.sampled import reduction_of
@@ -54,25 +54,29 @@ LAST_DIGIT = 4e-16
 def derive_model(
     chain: Mechanism,
     *,
-    expand: bool = True,
+    expand: bool | None = None,
     progress: Progress | None = None,
     provenance: Mapping[str, Any] | None = None,
     memory: int | None = None,
 ) -> DynamicsModel:
     """The chain's dynamics as E, P and theta_b, certified.
 
-    expand      False leaves E and P out: base parameters alone, for chains of any length
+    expand      False leaves E and P out: base parameters alone, for robots of any size; None: for trees
     progress    called with the name of each step as it begins
     provenance  plain JSON values to keep with the model; the tolerances used are added
     memory      bytes that the expansion may take; default: most of what the machine has free
-    Raises InputError where the robot is no serial chain; DerivationError where the expansion would take too much memory
-    or time, the chain is longer than LARGEST_CHAIN, its numbers are beyond double precision, or no parameter has any effect.
+    Raises InputError where a joint has no coordinate of its own; DerivationError where the expansion would take too much
+    memory or time, the robot has more joints than LARGEST_CHAIN, its numbers are beyond double precision, or no parameter
+    has any effect.
     """
     tell = progress or _silent
     require_derivable(chain)
     _refuse_absurd(chain)
+    if expand is None:
+        expand = chain.is_serial
     if expand:
-        refuse_long(0, chain.types)
+        refuse_long(0, types_along_ways(chain.types, chain.parents), len(chain))
+        refuse_uncountable(chain.types)
     robot = scaled(chain)
     tell("base parameters")
     reduction = reduction_of(robot)
@@ -110,8 +114,8 @@ _expanded = expand
 def _refuse_absurd(chain: Mechanism) -> None:
     if len(chain) > LARGEST_CHAIN:
         raise DerivationError(
-            f"'{chain.name}': {len(chain)} joints, psdmc derives chains of up to {LARGEST_CHAIN}",
-            "cut the chain with --base and --tip",
+            f"'{chain.name}': {len(chain)} joints, psdmc derives robots of up to {LARGEST_CHAIN}",
+            "cut a chain out of it with --base and --tip",
         )
     unit = length_unit(chain)
     if not SIZES[0] < unit < SIZES[1]:

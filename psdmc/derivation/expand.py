@@ -18,6 +18,7 @@ from psdmc.derivation.memory import (
     largest_monomial_count,
     refuse_beyond,
     refuse_long,
+    types_along_ways,
     velocity_bytes,
 )
 from psdmc.derivation.monomials import Monomials
@@ -66,13 +67,15 @@ Some coefficients of 1e-18 that are rounding are kept: they add monomials, but c
 def expand(
     scaled: Scaled, reduction: Reduction, precision: Precision, progress: Progress, memory: int | None = None
 ) -> Expansion:
-    """E and P of a chain; DerivationError where they do not fit into `memory` bytes (default: most of the free memory)."""
+    """E and P; DerivationError where they do not fit into `memory` bytes (default: most of the free memory)."""
     types = scaled.types
     if precision is not IN_DOUBLE:
         scaled = extended(scaled)
     monomials = Monomials(types)
     available = available_memory() if memory is None else memory
-    refuse_beyond(grid_bytes(types), available, largest_monomial_count(types), len(types))
+    ways = types_along_ways(types, [frame.parent for frame in scaled.frames])
+    most = sum(map(largest_monomial_count, ways))
+    refuse_beyond(max(map(grid_bytes, ways)), available, most, len(types))
     progress("mass matrix")
     chosen = scaled.span[:, reduction.pivots]
     mass = _mass_matrix(scaled, chosen, monomials, precision.zero)
@@ -81,8 +84,8 @@ def expand(
     progress("velocity terms")
     carried = carried_by(scaled.frames)
     count, needed = velocity_bytes(mass, monomials, carried)
-    refuse_long(count, types)
-    refuse_beyond(needed, available, min(count, largest_monomial_count(types)), len(types))
+    refuse_long(count, ways, len(types))
+    refuse_beyond(needed, available, min(count, most), len(types))
     velocity = velocity_terms(mass, monomials, carried, precision.zero)
     progress("reduction matrices")
     terms = joined([gravity, acceleration_terms(mass, monomials), velocity])

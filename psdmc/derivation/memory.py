@@ -14,6 +14,7 @@ from psdmc.derivation.terms import Terms
 from psdmc.derivation.velocity import slope_count
 from psdmc.errors import DerivationError
 from psdmc.robot.joints import JointType
+from psdmc.robot.mechanism import BASE
 
 WITHOUT = "base parameters, regressor and generated code then come without E and P"
 
@@ -36,6 +37,25 @@ LARGEST_GRID = 5**8
 
 HEADROOM = 0.75
 """Part of the free memory that an expansion may plan for, as its need is estimated and other processes run."""
+
+
+def types_along_ways(types: Sequence[JointType], parents: Sequence[int]) -> tuple[tuple[JointType, ...], ...]:
+    """Joint types on the way from the base to each body that carries no other; of a serial chain, all of them once."""
+    ways: list[tuple[JointType, ...]] = []
+    for joint, parent in zip(types, parents, strict=True):
+        ways.append((*(ways[parent] if parent != BASE else ()), joint))
+    return tuple(way for i, way in enumerate(ways) if i not in parents)
+
+
+def refuse_uncountable(types: Sequence[JointType]) -> None:
+    """Raise DerivationError where the monomials cannot be numbered in 64 bits."""
+    monomials = Monomials(tuple(types))
+    if len(monomials.rate_exponents()) * monomials.codes < 2**63:
+        return
+    raise DerivationError(
+        f"expanding this {len(types)}-joint robot: its monomials are too many to be numbered",
+        "derive with --no-expand: " + WITHOUT,
+    )
 
 
 def largest_monomial_count(types: Sequence[JointType]) -> int:
@@ -86,17 +106,17 @@ def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
     )
 
 
-def refuse_long(terms: int, types: Sequence[JointType]) -> None:
-    """Raise DerivationError where an expansion would take more than about a minute: too many velocity terms or, while
-    their number is unknown (0), too large a grid."""
-    grid = int(np.prod(quadratic_sizes(types[1:]), dtype=float))
+def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None:
+    """DerivationError where an expansion of n joints would take more than about a minute: too many velocity terms, or, while
+    these are unknown (0), too large a grid on one of the ways to the robot's ends."""
+    grid = max(int(np.prod(quadratic_sizes(way[1:]), dtype=float)) for way in ways)
     if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:
         return
     what = f"{terms:,} velocity terms (limit {LARGEST_EXPANSION:,})"
     if not terms:
         what = f"a grid of {grid:,} points for the mass matrix alone (limit {LARGEST_GRID:,})"
     raise DerivationError(
-        f"expanding this {len(types)}-joint robot takes {what}: minutes",
+        f"expanding this {n}-joint robot takes {what}: minutes",
         "derive with --no-expand: " + WITHOUT,
     )
 

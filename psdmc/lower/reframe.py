@@ -249,10 +249,12 @@ def _orientations(
 
 
 def _own_normal(axis: Array, following: Array, step: Array, x: Array) -> Array:
-    """The common normal of a body's axis and a child's that is not its first; x where every perpendicular would do.
-    (The body's own x points along the normal to its first child.)"""
+    """The common normal of a body's axis and a further child's, on the side of x; x where every perpendicular would do: the
+    body's own x looks along the normal to its first child."""
     own = _normal(axis, following, step)
-    return x if own is None else own
+    if own is None:
+        return x
+    return -own if times(own, x) < -EXACT else own
 
 
 def _across(direction: Array, axis: Array) -> Array:

@@ -12,9 +12,18 @@ from typing import Any
 import numpy as np
 
 from psdmc.model.json_values import entries, number, numbers, part, text, whole
-from psdmc.robot.derivable import require_derivable
+from psdmc.robot.coordinates import Coordinate, own_coordinates
 from psdmc.robot.joints import joint_type
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Limits, Mechanism, NamedFrame, Placement
+from psdmc.robot.mechanism import (
+    BASE,
+    PARAMETERS_PER_LINK,
+    Array,
+    Joint,
+    Limits,
+    Mechanism,
+    NamedFrame,
+    Placement,
+)
 from psdmc.robot.zeros import leading_rows
 
 MOST_JOINTS = 256
@@ -30,27 +39,74 @@ _NO_LIMIT["effort"] = math.inf
 
 
 def chain_to_json(chain: Mechanism) -> dict[str, Any]:
-    """Plain values; InputError where the robot is no serial chain, which is all that a model file holds."""
-    require_derivable(chain)
+    """Plain values; a serial chain's are those of every file before there were trees."""
     rows, columns = np.nonzero(chain.parameter_span)
     values = chain.parameter_span[rows, columns]
+    return (
+        {
+            "name": chain.name,
+            "convention": chain.convention,
+            "base_name": chain.base_name,
+            "tip_name": chain.tip_name,
+            "gravity": chain.gravity.tolist(),
+            "tip": _placement_to_json(chain.tip),
+            "joints": [_joint_to_json(joint) for joint in chain.joints],
+            "parameters": [[None if math.isnan(v) else v for v in row] for row in chain.parameters.tolist()],
+            "parameter_span": {
+                "columns": chain.parameter_span.shape[1],
+                "rows": rows.tolist(),
+                "in_columns": columns.tolist(),
+                "values": values.tolist(),
+            },
+            "notes": list(chain.notes),
+        }
+        | _frames_to_json(chain)
+        | _tree_to_json(chain)
+    )
+
+
+def is_plain_chain(chain: Mechanism) -> bool:
+    """Whether every psdmc that reads model files knows such robots."""
+    return chain.is_serial and chain.coordinates == own_coordinates(len(chain))
+
+
+def _frames_to_json(chain: Mechanism) -> dict[str, Any]:
+    return {} if _is_tip_alone(chain) else {"frames": [_frame_to_json(frame) for frame in chain.frames]}
+
+
+def _tree_to_json(chain: Mechanism) -> dict[str, Any]:
+    """What each joint hangs on and follows, and where the tip is."""
+    if is_plain_chain(chain):
+        return {}
+    followed = [[c.leader, c.ratio, c.offset] for c in chain.coordinates]
+    return {"parents": list(chain.parents), "tip_body": chain.tip_body, "coordinates": followed}
+
+
+def _tree_from_json(data: object, n: int) -> dict[str, Any]:
+    """Keyword arguments of Mechanism; none in files of plain chains."""
+    if not isinstance(data, dict) or "parents" not in data:
+        return {}
+    parents = entries(data["parents"], "parents", n)
+    coordinates = entries(part(data, "coordinates", "the robot"), "coordinates", n)
+    if not len(parents) == len(coordinates) == n:
+        raise ValueError(f"{len(parents)} parents and {len(coordinates)} coordinates for {n} joints")
     return {
-        "name": chain.name,
-        "convention": chain.convention,
-        "base_name": chain.base_name,
-        "tip_name": chain.tip_name,
-        "gravity": chain.gravity.tolist(),
-        "tip": _placement_to_json(chain.tip),
-        "joints": [_joint_to_json(joint) for joint in chain.joints],
-        "parameters": [[None if math.isnan(v) else v for v in row] for row in chain.parameters.tolist()],
-        "parameter_span": {
-            "columns": chain.parameter_span.shape[1],
-            "rows": rows.tolist(),
-            "in_columns": columns.tolist(),
-            "values": values.tolist(),
-        },
-        "notes": list(chain.notes),
-    } | ({} if _is_tip_alone(chain) else {"frames": [_frame_to_json(frame) for frame in chain.frames]})
+        "parents": tuple(whole(parent, "a parent", BASE, n - 1) for parent in parents),
+        "tip_body": whole(part(data, "tip_body", "the robot"), "the tip's body", 0, n - 1),
+        "coordinates": tuple(_coordinate_from_json(coordinate, n) for coordinate in coordinates),
+    }
+
+
+def _coordinate_from_json(data: object, n: int) -> Coordinate:
+    values = entries(data, "a coordinate", 3)
+    if len(values) != 3:
+        raise ValueError(f"a coordinate has {len(values)} values, expected leader, ratio and offset")
+    leader, ratio, offset = values
+    return Coordinate(
+        None if leader is None else whole(leader, "a coordinate's leader", 0, n - 1),
+        number(ratio, "a coordinate's ratio"),
+        number(offset, "a coordinate's offset"),
+    )
 
 
 def _frames(data: object) -> Sequence[object]:
@@ -99,6 +155,7 @@ def chain_from_json(data: object) -> Mechanism:
             text(note, "a note") for note in entries(part(data, "notes", "the chain"), "notes", MOST_NOTES)
         ),
         frames=tuple(_frame_from_json(frame, len(listed)) for frame in _frames(data)),
+        **_tree_from_json(data, len(listed)),
     )
 
 

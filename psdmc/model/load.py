@@ -17,8 +17,10 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.from_parts import model_from
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
 
-_MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
-"""By schema, the function that turns a manifest into one of the next schema. Empty while there is only one."""
+_MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    1: lambda manifest: manifest | {"schema": 2}
+}
+"""By schema: what makes its manifest one of the next schema. A chain of schema 1 is read as it is."""
 
 LARGEST_MANIFEST = 64 << 20
 """Largest size in bytes of the manifest's text, at four bytes a letter; a nine-joint arm's has 0.1 MB besides its

@@ -20,12 +20,15 @@ from numpy.typing import NDArray
 
 from psdmc.atomic import write_whole
 from psdmc.errors import InputError
-from psdmc.model.chain_json import MOST_JOINTS, chain_to_json
+from psdmc.model.chain_json import MOST_JOINTS, chain_to_json, is_plain_chain
 from psdmc.model.expansion import Entries, Expansion
 from psdmc.robot.mechanism import Mechanism
 from psdmc.version import psdmc_version
 
-SCHEMA = 1
+CHAIN_SCHEMA = 1
+"""Of files with serial chains, which every psdmc reads."""
+SCHEMA = 2
+"""Of files with trees, or with joints that follow others: the newest."""
 FORMAT = "psdmc model"
 ARRAYS = ("E", "theta_b", "P_joint", "P_row", "P_col", "P_value", "B")
 
@@ -113,7 +116,7 @@ def _nothing(n: int, l: int) -> Expansion:
 def _manifest(model: Model) -> dict[str, Any]:
     return {
         "format": FORMAT,
-        "schema": SCHEMA,
+        "schema": CHAIN_SCHEMA if is_plain_chain(model.mechanism) else SCHEMA,
         "psdmc": psdmc_version(),
         "expanded": model.expansion is not None,
         "theta_b_known": model.theta_b is not None,

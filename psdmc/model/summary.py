@@ -27,6 +27,7 @@ class Sizes(NamedTuple):
 class Summary:
     """A model at a glance.
 
+    ends         the tip's name, or how many ends a tree has
     sizes        monomials by kind of acceleration; None where the model was not expanded
     entries      non-zero entries of P; None likewise
     certificate  largest torque error relative to the joint's largest torque, per joint
@@ -36,6 +37,8 @@ class Summary:
     convention: str
     base: str
     tip: str
+    ends: str
+    is_serial: bool
     gravity: tuple[float, float, float]
     joints: tuple[Joint, ...]
     p: int | None
@@ -59,6 +62,8 @@ def summary(model: DynamicsModel) -> Summary:
         convention=chain.convention,
         base=chain.base_name,
         tip=chain.tip_name,
+        ends=chain.tip_name if chain.is_serial else f"{len(chain.leaves)} ends, tip {chain.tip_name}",
+        is_serial=chain.is_serial,
         gravity=(gx, gy, gz),
         joints=chain.joints,
         p=model.p,

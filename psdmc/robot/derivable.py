@@ -1,40 +1,20 @@
-"""Which mechanisms psdmc derives, lowers and keeps in model files: serial chains only, so far."""
+"""Which mechanisms psdmc derives and lowers: trees of joints with a coordinate of their own, so far."""
 
 from __future__ import annotations
 
 from psdmc.errors import InputError
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import BASE, Mechanism
+from psdmc.robot.mechanism import Mechanism
 
-CUT = "choose a chain in it with --base and --tip"
-FREE = "make it a fixed joint, or leave out what it follows"
+FREE = "make it a fixed joint, leave out what it follows, or take a chain without it: --tip LINK"
 
 
 def require_derivable(chain: Mechanism) -> None:
-    """InputError with a remedy unless the robot is a serial chain whose joints have a coordinate each."""
-    fault = _fork(chain) or _inner_tip(chain)
-    if fault is not None:
-        raise InputError(f"{shown(chain.name)}: {fault}, and psdmc derives serial chains only", CUT)
+    """InputError where a joint has no coordinate of its own; the hint is the remedy."""
     follower = _follower(chain)
     if follower is not None:
         raise InputError(f"{shown(chain.name)}: {follower}, and psdmc derives independent joints only", FREE)
-
-
-def _fork(chain: Mechanism) -> str | None:
-    """The first link, or base, that carries several joints."""
-    for body in range(BASE, len(chain)):
-        carried = [shown(chain.joints[i].name) for i, parent in enumerate(chain.parents) if parent == body]
-        if len(carried) > 1:
-            link = chain.base_name if body == BASE else chain.joints[body].link_name
-            return f"link {shown(link)} carries joints {', '.join(carried[:-1])} and {carried[-1]}"
-    return None
-
-
-def _inner_tip(chain: Mechanism) -> str | None:
-    if chain.tip_body in chain.leaves:
-        return None
-    return f"the tip is on link {shown(chain.joints[chain.tip_body].link_name)}, which carries other joints"
 
 
 def _follower(chain: Mechanism) -> str | None:

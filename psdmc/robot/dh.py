@@ -6,16 +6,17 @@ import math
 import sys
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
+from psdmc.robot.dh_parents import parents_of
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import JOINT_TYPES, REVOLUTE, JointType
 from psdmc.robot.limits import Range, shown
-from psdmc.robot.mechanism import Limits
+from psdmc.robot.mechanism import BASE, Limits
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.numerals import WHITE_SPACE, decimal
 from psdmc.robot.zeros import ZERO_NAMES
@@ -24,7 +25,7 @@ Convention = Literal["standard", "modified"]
 Triple = tuple[float, float, float]
 
 ROBOT_KEYS = ("name", "convention", "gravity", "joint")
-JOINT_KEYS = ("name", "type", "a", "alpha", "d", "theta", "limits", "drive_inertia", "link")
+JOINT_KEYS = ("name", "parent", "type", "a", "alpha", "d", "theta", "limits", "drive_inertia", "link")
 LIMIT_KEYS = ("position", "speed", "acceleration", "effort")
 LINK_KEYS = ("mass", "com", "inertia_com", "zero")
 
@@ -43,7 +44,10 @@ class DhLink:
 
 @dataclass(frozen=True, slots=True)
 class DhJoint:
-    """One row of the table: a, d in m, alpha, theta in rad; drive_inertia in kg m^2 (kg), NaN if unknown."""
+    """One row of the table: a, d in m, alpha, theta in rad; drive_inertia in kg m^2 (kg), NaN if unknown.
+
+    parent   the row that this one's joint hangs on, counted from 0, or BASE
+    """
 
     name: str
     type: JointType
@@ -54,6 +58,7 @@ class DhJoint:
     limits: Limits
     drive_inertia: float | None
     link: DhLink
+    parent: int = BASE
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +159,12 @@ def _robot(value: object, problems: list[str]) -> DhRobot | None:
         return None
     joints = tuple(_joint(row, number, problems) for number, row in enumerate(rows, start=1))
     name = table.read("name", _text, "robot")
-    problems += name_faults(name, "robot") + naming_faults([joint.name for joint in joints], "joint")
+    names = [joint.name for joint in joints]
+    problems += name_faults(name, "robot") + naming_faults(names, "joint")
+    parents, faults = parents_of(
+        names, [row.get("parent") if isinstance(row, dict) else None for row in rows]
+    )
+    problems += faults
     lengths = [x for joint in joints for x in (joint.a, joint.d, *joint.link.com) if not math.isnan(x)]
     fault = limits.scale_fault(lengths)
     problems += [fault] if fault else []
@@ -162,7 +172,7 @@ def _robot(value: object, problems: list[str]) -> DhRobot | None:
         name=name,
         convention=table.read("convention", _one_of("standard", "modified"), "standard"),
         gravity=table.read("gravity", _gravity, (0.0, 0.0, -9.81)),
-        joints=joints,
+        joints=tuple(replace(joint, parent=k) for joint, k in zip(joints, parents, strict=True)),
     )
 
 

@@ -1,4 +1,4 @@
-"""From a DH table to a serial robot.
+"""From a DH table to a robot.
 
 Standard: each row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next, which is the
 link's frame; the joint frame sits after Rz(theta + q), and the rest is the link frame's constant placement in
@@ -14,10 +14,11 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot.dh import DhJoint, DhLink, DhRobot, read_dh
+from psdmc.robot.dh_parents import BASE_NAME
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, standard_parameters
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
+from psdmc.robot.mechanism import BASE, Array, Joint, NamedFrame, Placement
 from psdmc.robot.rotation import about
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, snap_rotation
@@ -28,20 +29,27 @@ def dh_draft(text: str, source: str, gravity: Array | None, snap: float, frames:
     """The robot in the file; gravity overrides the file's; rotations near exact ones snapped (rad)."""
     robot = read_dh(text, source)
     joints, snaps = _placed_joints(robot, snap)
+    parents = tuple(row.parent for row in robot.joints)
+    leaves = [i for i in range(len(joints)) if i not in parents]
+    ends = tuple(link_name(leaf + 1) for leaf in leaves) if len(leaves) > 1 else ()
+    named = tuple(_frame(joints, name, source) for name in frames or ends)
+    tip = named[0].joint if ends else len(joints) - 1
     return Draft(
         name=robot.name,
         convention=robot.convention,
-        base_name="base",
-        tip_name=joints[-1].link_name,
+        base_name=BASE_NAME,
+        tip_name=joints[tip].link_name,
         joints=joints,
         parameters=tuple(_parameters(row) for row in robot.joints),
         zeros=tuple(row.link.zero for row in robot.joints),
         drives=tuple(row.drive_inertia is not None for row in robot.joints),
         gravity=np.array(robot.gravity) if gravity is None else gravity,
-        tip=joints[-1].link_frame,
+        tip=joints[tip].link_frame,
         snaps=snaps,
         notes=_faults(robot),
-        frames=tuple(_frame(joints, name, source) for name in frames),
+        frames=named,
+        parents=parents,
+        tip_body=tip,
     )
 
 
@@ -62,8 +70,9 @@ def link_name(number: int) -> str:
 def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tuple[Snap, ...]]:
     snaps: list[Snap] = []
     joints: list[Joint] = []
-    before = Placement.identity()
+    links: list[Placement] = []
     for number, row in enumerate(robot.joints, start=1):
+        before = Placement.identity() if row.parent == BASE else links[row.parent]
         twist = _exact(about(0, row.alpha), f"alpha of joint '{row.name}'", snap, snaps, len(joints))
         turn = _exact(about(2, row.theta), f"theta of joint '{row.name}'", snap, snaps, len(joints))
         offset = Placement(turn, np.zeros(3))
@@ -74,7 +83,7 @@ def _placed_joints(robot: DhRobot, snap: float) -> tuple[tuple[Joint, ...], tupl
             placement = before @ Placement(twist, times(twist, np.array([row.a, 0.0, row.d]))) @ offset
             link = Placement.identity()
         joints.append(Joint(row.name, link_name(number), row.type, placement, link, row.limits))
-        before = link
+        links.append(link)
     return tuple(joints), tuple(snaps)
 
 

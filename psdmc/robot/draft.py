@@ -1,10 +1,12 @@
-"""What a reader returns: a chain whose assumptions are not applied yet."""
+"""What a reader hands over: a robot whose assumptions are not applied yet."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
+from psdmc.robot.coordinates import Coordinate
+from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 
 
@@ -12,8 +14,8 @@ from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 class Snap:
     """One rotation that was replaced by a near one with exact zeros: where, and the angle between them (rad).
 
-    segment   its place, counted by the joint at its end: 0 from the base to the first link and so on; n from the last
-              link to the tip; BASE from the root to the base
+    segment   the way it lies on, counted by the joint at its end: 0 from the base to the first link and so on; n from
+              the tip's link to the tip; BASE from the root to the base
     """
 
     where: str
@@ -27,13 +29,14 @@ BASE = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """A serial robot as its file states it. n joints.
+    """A robot as its file states it. n joints.
 
     parameters     n arrays (11,), about the link frames; NaN where unknown; Im 0 where the file says nothing
     zeros          n tuples of names assumed zero (psdmc.robot.zeros.ZERO_NAMES), by the file
     drives         n flags: the file makes this joint's drive inertia a parameter
     gravity        (3,) m/s^2 in the base frame
     frames         named frames; empty: the tip alone
+    parents, tip_body, coordinates   as in Mechanism; left out: those of a serial chain
     """
 
     name: str
@@ -49,3 +52,11 @@ class Draft:
     snaps: tuple[Snap, ...]
     notes: tuple[str, ...]
     frames: tuple[NamedFrame, ...] = ()
+    parents: tuple[int, ...] = ()
+    tip_body: int = ON_BASE
+    coordinates: tuple[Coordinate, ...] = ()
+
+    @property
+    def tip_frame(self) -> NamedFrame:
+        body = len(self.joints) - 1 if self.tip_body == ON_BASE else self.tip_body
+        return NamedFrame(self.tip_name, body, self.tip)

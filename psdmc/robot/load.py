@@ -161,12 +161,15 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         tip=draft.tip,
         notes=(*_snap_notes(draft.snaps), *draft.notes, *_zero_notes(draft, said, values)),
         frames=_frames(draft, options, source),
+        parents=draft.parents,
+        tip_body=draft.tip_body,
+        coordinates=draft.coordinates,
     )
 
 
 def _frames(draft: Draft, options: LoadOptions, source: str) -> tuple[NamedFrame, ...]:
     """The named frames, the tip where none are named, then the tool."""
-    tip = NamedFrame(draft.tip_name, len(draft.joints) - 1, draft.tip)
+    tip = draft.tip_frame
     if options.tool is None:
         return draft.frames
     named = draft.frames or (tip,)
@@ -191,7 +194,9 @@ def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float
 
 
 def _snap_notes(snaps: Sequence[Snap]) -> list[str]:
-    return [f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in snaps]
+    """Each turn once, though several joints of a tree may lie beyond it."""
+    said = [f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in snaps]
+    return list(dict.fromkeys(said))
 
 
 def _zero_notes(draft: Draft, said: Sequence[Sequence[str]], values: Sequence[Array]) -> list[str]:

@@ -166,15 +166,15 @@ class Reference:
 
     @property
     def path_length(self) -> float:
-        """Length of the path from the base to the tip over every frame between, fixed joints included, m, at q = 0."""
+        """Longest way from the base to the tip, or to an end of a tree, over every frame between, m, at q = 0; with every
+        fixed joint's detour."""
         model, data = self.model, self.model.createData()
         pinocchio.framesForwardKinematics(model, data, np.zeros(model.nq))
-        frame, length = model.getFrameId(self.tip_name), 0.0
-        while frame:
-            above = model.frames[frame].parentFrame
-            length += float(np.linalg.norm(data.oMf[frame].translation - data.oMf[above].translation))
-            frame = above
-        return length
+        parents = list(model.parents)
+        ends = [k for k in range(1, model.njoints) if k not in parents]
+        at_ends = [f for f, frame in enumerate(model.frames) if frame.parentJoint in ends]
+        tip = model.getFrameId(self.tip_name)
+        return max(_way_to(frame, model, data) for frame in ([tip] if len(ends) == 1 else [tip, *at_ends]))
 
     def each(self, function: Callable[..., Array], *states: Array) -> Array:
         """Values of a function of Pinocchio's (model, data, state ...) at every state of broadcast arrays."""
@@ -184,6 +184,15 @@ class Reference:
         flat = [np.broadcast_to(row, (*lead, row.shape[-1])).reshape(-1, row.shape[-1]) for row in rows]
         results = [np.array(function(self.model, data, *row)) for row in zip(*flat, strict=True)]
         return np.array(results).reshape(*lead, *results[0].shape)
+
+
+def _way_to(frame: int, model: pinocchio.Model, data: pinocchio.Data) -> float:
+    length = 0.0
+    while frame:
+        above = model.frames[frame].parentFrame
+        length += float(np.linalg.norm(data.oMf[frame].translation - data.oMf[above].translation))
+        frame = above
+    return length
 
 
 def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None) -> Reference:
@@ -211,7 +220,9 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     if root_gravity is not None:
         model.gravity.linear = np.array(root_gravity)
     base = model.frames[model.getFrameId(chain.base_name, pinocchio.FrameType.BODY)].placement
-    model.jointPlacements[1] = base.inverse() * model.jointPlacements[1]
+    for k in range(1, model.njoints):
+        if model.parents[k] == 0:
+            model.jointPlacements[k] = base.inverse() * model.jointPlacements[k]
     model.gravity.linear = base.rotation.T @ model.gravity.linear
     return model
 

@@ -76,8 +76,9 @@ def _moved_joint(k: int) -> Disturbance:
 def _moved_link(k: int) -> Disturbance:
     def disturb(model: pinocchio.Model, motion: pinocchio.SE3) -> None:
         model.inertias[k] = motion.act(model.inertias[k])
-        if k + 1 < model.njoints:
-            model.jointPlacements[k + 1] = motion * model.jointPlacements[k + 1]
+        for child in range(k + 1, model.njoints):
+            if model.parents[child] == k:
+                model.jointPlacements[child] = motion * model.jointPlacements[child]
 
     return disturb
 

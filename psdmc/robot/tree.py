@@ -1,9 +1,10 @@
-"""Which joints of a URDF's tree belong to the robot: those from the base link to the tip link."""
+"""Which joints of a URDF are the robot: its whole tree, or the chain from a base link to a tip link."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import shlex
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import MAX_JOINTS, shown
@@ -12,21 +13,29 @@ from psdmc.robot.urdf import LOCKABLE, MOVABLE, UrdfJoint, UrdfRobot
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """Joints of a URDF, fixed ones included: `to_base` from the root to the base link, `path` from there to the tip."""
+    """to_base: joints from the root to the base link; path: from there to the tip, fixed ones included.
+
+    ends   links that a whole tree ends in, where `path` is that: each branch in a row, joints on one link by name, which is
+           the order of Pinocchio's buildModelFromUrdf; empty for a chain
+    """
 
     base: str
     tip: str
     to_base: tuple[UrdfJoint, ...]
     path: tuple[UrdfJoint, ...]
     notes: tuple[str, ...]
+    ends: tuple[str, ...] = ()
 
     @property
     def movable(self) -> tuple[UrdfJoint, ...]:
         return tuple(joint for joint in self.path if joint.is_movable)
 
 
-def find_route(robot: UrdfRobot, base: str | None, tip: str | None, source: str) -> Route:
-    """The chain from base (default: the root) to tip (default: see default_tip).
+def find_route(
+    robot: UrdfRobot, base: str | None, tip: str | None, source: str, frames: Sequence[str] = ()
+) -> Route:
+    """The chain from base (default: the root) to tip (default: see default_tip); where neither is given and the joints
+    branch, the whole tree, whose tip is the first of `frames`, or of its ends.
 
     InputError where a link is unknown, the tip is not below the base, no joint moves, or joints cannot be
     modelled.
@@ -36,20 +45,78 @@ def find_route(robot: UrdfRobot, base: str | None, tip: str | None, source: str)
             raise InputError(
                 f"{source}: {role} link '{link}' does not exist", f"links: {listed(robot.inertials)}"
             )
+    is_tree = base is None and tip is None and len(_last_joints(robot)) > 1
+    route = _tree(robot, frames, source) if is_tree else _chain(robot, base, tip, source)
+    _refuse_many(route, source)
+    if not route.movable:
+        raise InputError(
+            f"{source}: no movable joint between '{route.base}' and '{route.tip}'",
+            "choose other --base or --tip",
+        )
+    _refuse_unsupported(robot, route, source)
+    return replace(route, notes=(*route.notes, *_locked_note(robot, route)))
+
+
+def _chain(robot: UrdfRobot, base: str | None, tip: str | None, source: str) -> Route:
     start = robot.root if base is None else base
     end, notes = (tip, ()) if tip is not None else default_tip(robot, start, source)
     path = joints_between(robot, start, end)
     if path is None:
         raise InputError(f"{source}: " + _not_below(robot, start, end), _way_out(robot, start, end))
-    to_base = joints_between(robot, robot.root, start) or ()
-    route = Route(start, end, to_base, path, notes)
-    _refuse_many(route, source)
-    if not route.movable:
-        raise InputError(
-            f"{source}: no movable joint between '{start}' and '{end}'", "choose other --base or --tip"
-        )
-    _refuse_unsupported(robot, route, source)
-    return Route(start, end, to_base, path, (*notes, *_locked_note(robot, route)))
+    return Route(start, end, joints_between(robot, robot.root, start) or (), path, notes)
+
+
+def _tree(robot: UrdfRobot, frames: Sequence[str], source: str) -> Route:
+    path = tuple(outward(robot))
+    last = _last_joints(robot)
+    ends = tuple(_fixed_end(robot, joint.child) for joint in path if joint in last)
+    moved = _moved_links(path)
+    tip = next((name for name in frames[:1] if name in moved), ends[0])
+    return Route(robot.root, tip, (), path, (_whole_note(robot, ends, source),), ends)
+
+
+def outward(robot: UrdfRobot) -> Iterator[UrdfJoint]:
+    """All joints from the root outward, each branch in a row, joints on one link by name."""
+    stack = [robot.root]
+    above = {joint.child: joint for joint in robot.joints}
+    below: dict[str, list[UrdfJoint]] = {}
+    for joint in robot.joints:
+        below.setdefault(joint.parent, []).append(joint)
+    while stack:
+        link = stack.pop()
+        if link in above:
+            yield above[link]
+        stack += [j.child for j in sorted(below.get(link, []), key=lambda j: j.name, reverse=True)]
+
+
+def _last_joints(robot: UrdfRobot) -> list[UrdfJoint]:
+    """Movable joints beyond which nothing moves, in the file's order."""
+    above = {joint.child: joint for joint in robot.joints}
+    carrying: set[str] = set()
+    for joint in robot.joints:
+        link = joint.parent
+        while joint.is_movable and link in above and link not in carrying:
+            carrying.add(link)
+            link = above[link].parent
+    return [joint for joint in robot.joints if joint.is_movable and joint.child not in carrying]
+
+
+def _moved_links(path: Sequence[UrdfJoint]) -> set[str]:
+    """Links of a tree that some joint moves."""
+    moved: set[str] = set()
+    for joint in path:
+        if joint.is_movable or joint.parent in moved:
+            moved.add(joint.child)
+    return moved
+
+
+def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
+    """What a tree is made of, and how to have the chain that psdmc took before it took trees."""
+    try:
+        before = f", as --tip {shlex.quote(default_tip(robot, robot.root, source)[0])}"
+    except InputError:
+        before = ""
+    return f"the whole tree, to its ends {listed(ends)}; --tip LINK takes one chain of it{before}"
 
 
 def _not_below(robot: UrdfRobot, start: str, end: str) -> str:
@@ -152,10 +219,10 @@ def _parting_link(robot: UrdfRobot, base: str, ends: Sequence[str]) -> str:
 
 
 def _refuse_many(route: Route, source: str) -> None:
+    where = "" if route.ends else f" from '{route.base}' to '{route.tip}'"
     if len(route.movable) > MAX_JOINTS:
         raise InputError(
-            f"{source}: {len(route.movable)} movable joints from '{route.base}' to '{route.tip}', psdmc reads at"
-            f" most {MAX_JOINTS}",
+            f"{source}: {len(route.movable)} movable joints{where}, psdmc reads at most {MAX_JOINTS}",
             "choose a shorter chain with --base and --tip",
         )
 
@@ -167,9 +234,9 @@ def _refuse_unsupported(robot: UrdfRobot, route: Route, source: str) -> None:
         for joint in robot.joints
         if joint.type not in (*MOVABLE, "fixed") and (joint.name in on_chain or joint.type not in LOCKABLE)
     ]
-    problems += [f"joint '{joint.name}': mimics another joint" for joint in route.movable if joint.is_mimic]
     if problems:
-        hint = "psdmc models independent revolute, continuous, prismatic and fixed joints"
+        cut = "; --tip LINK takes one chain of the tree" if route.ends else ""
+        hint = f"psdmc models revolute, continuous, prismatic and fixed joints{cut}"
         raise InputError(f"{source}: " + "; ".join(problems), hint)
 
 

@@ -83,10 +83,6 @@ class UrdfJoint:
     has_dynamics: bool
 
     @property
-    def is_mimic(self) -> bool:
-        return self.mimic is not None
-
-    @property
     def is_movable(self) -> bool:
         return self.type != "fixed"
 

@@ -1,16 +1,19 @@
-"""From a URDF to a serial robot: joints placed and bodies merged with the file's own numbers."""
+"""From a URDF to a robot: joints placed and bodies merged by the file's own numbers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.joints import URDF_TYPES
+from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
+from psdmc.robot.mimic import mimic_coordinates
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, snap_translation
 from psdmc.robot.tree import Route, find_route, listed
@@ -31,28 +34,28 @@ def urdf_draft(
     snap: float,
     frames: Sequence[str] = (),
 ) -> Draft:
-    """The chain from base to tip; gravity in the root frame; rotations near exact ones snapped (rad); the links `frames`
-    as named frames."""
+    """The chain from base to tip, or the whole tree (find_route); gravity in the root frame; rotations near exact ones
+    snapped (rad); the links `frames` as named frames, a tree's ends where none are named."""
     robot = read_urdf(text, source)
-    route = find_route(robot, base, tip, source)
-    joints, tip_frame, snaps = _placed_joints(route, snap)
+    route = find_route(robot, base, tip, source, frames)
+    placed = _placed(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)
     root_gravity = np.array(STANDARD_GRAVITY) if gravity is None else gravity
     bodies = merged_parameters(robot, route)
     hold_against_pinocchio(robot, route, bodies, text, source)
-    bare = [joint.link_name for joint, x in zip(joints, bodies, strict=True) if not x.any()]
+    bare = [joint.link_name for joint, x in zip(placed.joints, bodies, strict=True) if not x.any()]
     return Draft(
         name=robot.name,
         convention="urdf",
         base_name=route.base,
         tip_name=route.tip,
-        joints=joints,
+        joints=placed.joints,
         parameters=tuple(np.append(x, 0.0) for x in bodies),
-        zeros=tuple(("m",) if joint.link_name in bare else () for joint in joints),
-        drives=(False,) * len(joints),
+        zeros=tuple(("m",) if joint.link_name in bare else () for joint in placed.joints),
+        drives=(False,) * len(placed.joints),
         gravity=times(base_rotation.T, root_gravity) + 0.0,
-        tip=tip_frame,
-        snaps=(*base_snaps, *snaps),
+        tip=placed.tip.placement,
+        snaps=(*base_snaps, *placed.snaps),
         notes=(
             *robot.notes,
             *route.notes,
@@ -60,12 +63,11 @@ def urdf_draft(
             *_unmodelled(route),
             *_faults(robot),
         ),
-        frames=urdf_frames(robot, route, joints, _tip(route, joints, tip_frame), frames, source),
+        frames=urdf_frames(robot, route, placed.joints, placed.tip, frames or route.ends, source),
+        parents=placed.parents,
+        tip_body=placed.tip.joint,
+        coordinates=mimic_coordinates(route.movable, robot.joints, source),
     )
-
-
-def _tip(route: Route, joints: Sequence[Joint], place: Placement) -> NamedFrame:
-    return NamedFrame(route.tip, len(joints) - 1, place)
 
 
 def link_rotation(axis: Array) -> Array:
@@ -80,29 +82,65 @@ def link_rotation(axis: Array) -> Array:
     return np.array([x, np.cross(axis, x), axis]) + 0.0
 
 
-def _placed_joints(route: Route, snap: float) -> tuple[tuple[Joint, ...], Placement, list[Snap]]:
-    """Joint frames in their parents', the tip in the last, and the snapped rotations.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Placed:
+    """Joints one in the other, the bodies that they hang on, the tip, and what was snapped on the way."""
 
-    Each turn is snapped as it is read, so that products of exact rotations stay exact; then the product of several
-    merged turns is snapped once more.
+    joints: tuple[Joint, ...]
+    parents: tuple[int, ...]
+    tip: NamedFrame
+    snaps: tuple[Snap, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Way:
+    """Where a link is: on which body, at which place in its joint frame, and what was snapped since that joint."""
+
+    body: int
+    place: Placement
+    snapped: tuple[Snap, ...] = ()
+
+
+def _placed(route: Route, snap: float) -> _Placed:
+    """Each turn is snapped as it is read, so that products of exact rotations stay exact; then once more what
+    several merged ones came to.
+
+    A turn that several joints lie beyond was snapped on the way to each of them.
     """
-    snaps: list[Snap] = []
-    reach = sum(math.hypot(*joint.origin.xyz) for joint in route.path)
+    reach = _reach(route)
+    ways = {route.base: _Way(ON_BASE, Placement.identity())}
     joints: list[Joint] = []
-    so_far = Placement.identity()
+    parents: list[int] = []
+    snaps: list[Snap] = []
     for joint in route.path:
-        so_far = so_far @ _origin(joint, snap, snaps, len(joints))
+        outer, n = ways[joint.parent], len(joints)
+        turned = list(outer.snapped)
+        at = outer.place @ _origin(joint, snap, turned, n)
         if not joint.is_movable:
+            ways[joint.child] = _Way(outer.body, at, tuple(turned))
             continue
         axis, angle = snap_axis(np.array(joint.axis), snap)
-        _record(snaps, f"axis of joint '{joint.name}'", angle, len(joints))
+        _record(turned, f"axis of joint '{joint.name}'", angle, n)
         link = Placement(link_rotation(axis), np.zeros(3))
         where = f"joint '{joint.name}', merged"
-        placement = merged_placement(so_far @ link.inverse(), where, snap, snaps, len(joints), reach)
+        placement = merged_placement(at @ link.inverse(), where, snap, turned, n, reach)
         joints.append(movable_joint(joint, placement, link))
-        so_far = link
-    tip = merged_placement(so_far, f"tip '{route.tip}', merged", snap, snaps, len(joints), reach)
-    return tuple(joints), tip, snaps
+        parents.append(outer.body)
+        snaps += [replace(one, segment=n) for one in turned]
+        ways[joint.child] = _Way(n, link)
+    end, n = ways[route.tip], len(joints)
+    turned = list(end.snapped)
+    tip = merged_placement(end.place, f"tip '{route.tip}', merged", snap, turned, n, reach)
+    snaps += [replace(one, segment=n) for one in turned]
+    return _Placed(tuple(joints), tuple(parents), NamedFrame(route.tip, end.body, tip), tuple(snaps))
+
+
+def _reach(route: Route) -> float:
+    """The longest way from the base outward, m: every step as the file has it."""
+    far = {route.base: 0.0}
+    for joint in route.path:
+        far[joint.child] = far[joint.parent] + math.hypot(*joint.origin.xyz)
+    return max(far.values())
 
 
 def movable_joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:

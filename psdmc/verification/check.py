@@ -25,7 +25,7 @@ from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_versi
 from psdmc.robot.reference import Reference, pinocchio_version, reference
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
 from psdmc.verification.functions import function_errors
-from psdmc.verification.placements import chain_poses, gravity_error, placement_errors, reach_of
+from psdmc.verification.placements import chain_poses, frames_above, gravity_error, placement_errors, reach_of
 
 Array = NDArray[np.float64]
 
@@ -223,8 +223,9 @@ def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tupl
     chain = model.mechanism
     links = [joint.link_name for joint in chain.joints]
     expected = written.poses(q, links)
-    errors = placement_errors(chain_poses(chain, q), expected)
-    lever = max(1.0, written.path_length / reach_of(expected))
+    above = frames_above(chain)
+    errors = placement_errors(chain_poses(chain, q), expected, above)
+    lever = max(1.0, written.path_length / reach_of(expected, above))
     beyond = errors - ANGLES_ACTED_ON * lever * angles[:-1]
     gravity = gravity_error(chain.gravity, written.gravity_vector) - ANGLES_ACTED_ON * angles[-1]
     remark = f"beyond the {angles.sum():.2g} rad of snapping" if angles.any() else ""

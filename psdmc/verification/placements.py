@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,15 +17,16 @@ def chain_poses(chain: Mechanism, q: Array) -> Array:
     return np.array([_poses_at(chain, row) for row in q])
 
 
-def placement_errors(found: Array, expected: Array) -> Array:
-    """(n + 1,) largest error of each link's pose in the one before, and the tip's in the last link.
+def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Array:
+    """(n + 1,) largest error of each link's pose in the one that it hangs on, and the tip's in its link.
 
     found, expected   (k, n + 1, 4, 4), poses in the base frame
+    above             n + 1 of these that each hangs on, or BASE
 
     The larger of the angle between (rad) and the distance between, relative to the robot's reach.
     """
-    reach = reach_of(expected)
-    own, other = _in_the_one_before(found), _in_the_one_before(expected)
+    reach = reach_of(expected, above)
+    own, other = _in_the_one_above(found, above), _in_the_one_above(expected, above)
     chord = np.linalg.norm((own - other)[..., :3, :3], axis=(-2, -1)) / np.sqrt(8.0)
     angle = 2.0 * np.arcsin(np.minimum(1.0, chord))
     distance = np.linalg.norm((own - other)[..., :3, 3], axis=-1) / reach
@@ -36,15 +39,23 @@ def gravity_error(found: Array, expected: Array) -> float:
     return float(np.linalg.norm(found - expected)) / size
 
 
-def reach_of(poses: Array) -> float:
-    """Sum of the largest distances from each frame to the next, m; one where there are none."""
-    steps = np.linalg.norm(_in_the_one_before(poses)[..., :3, 3], axis=-1).max(axis=0)
-    return float(steps.sum()) or 1.0
+def reach_of(poses: Array, above: Sequence[int]) -> float:
+    """Longest way outward over the largest distances from each frame to the next, m; one where there are none."""
+    steps = np.linalg.norm(_in_the_one_above(poses, above)[..., :3, 3], axis=-1).max(axis=0)
+    far: list[float] = []
+    for step, outer in zip(steps.tolist(), above, strict=True):
+        far.append(step + (0.0 if outer == BASE else far[outer]))
+    return max(far) or 1.0
 
 
-def _in_the_one_before(poses: Array) -> Array:
+def frames_above(chain: Mechanism) -> tuple[int, ...]:
+    """What each of chain_poses hangs on: the joints' parents, and the tip's body."""
+    return (*chain.parents, chain.tip_body)
+
+
+def _in_the_one_above(poses: Array, above: Sequence[int]) -> Array:
     base = np.broadcast_to(np.eye(4), (len(poses), 1, 4, 4))
-    return np.linalg.inv(np.concatenate([base, poses[:, :-1]], axis=1)) @ poses
+    return np.linalg.inv(np.concatenate([poses, base], axis=1)[:, list(above)]) @ poses
 
 
 def _poses_at(chain: Mechanism, q: Array) -> list[Array]:

@@ -55,7 +55,7 @@ def test_a_long_chain_has_no_parameters_of_rounding() -> None:
 
 def test_longer_chains_are_refused() -> None:
     with pytest.raises(
-        DerivationError, match=f"'random0': {LARGEST_CHAIN + 1} joints, psdmc derives chains of up to 200"
+        DerivationError, match=f"'random0': {LARGEST_CHAIN + 1} joints, psdmc derives robots of up to 200"
     ) as caught:
         derive_model(random_chain(0, "R" * (LARGEST_CHAIN + 1)), expand=False)
     assert "--tip" in caught.value.hint

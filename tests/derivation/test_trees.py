@@ -1,6 +1,10 @@
-"""Trees are refused so far; but nothing in the derivation and lowering assumes that a body hangs on the one before."""
+"""Trees: base parameters, E and P where they are asked for, the model file, lowering; against Pinocchio."""
 
 from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -16,12 +20,12 @@ from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import moved
-from psdmc.errors import InputError
-from psdmc.lower import kernels
+from psdmc.errors import DerivationError
 from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe
-from psdmc.model import chain_json
+from psdmc.model.chain_json import chain_from_json, chain_to_json
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.load import load
 from psdmc.model.store import file_bytes
 from psdmc.program.interpret import interpret
 from psdmc.robot.mechanism import Placement
@@ -30,14 +34,7 @@ SMALL = [("a fork", "RRR"), ("a fork", "PRP"), ("two on the base", "RPR"), ("two
 LARGER = [("a trunk with two arms", "RRRPRR"), ("interleaved", "RPRRPRPR")]
 
 
-@pytest.fixture
-def lets_trees_pass(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the refusal, which is at one place."""
-    for module in (derive, kernels, chain_json):
-        monkeypatch.setattr(module, "require_derivable", lambda chain: None)
-
-
-def derived(tree: RandomTree, expand: bool = True) -> DynamicsModel:
+def derived(tree: RandomTree, expand: bool | None = None) -> DynamicsModel:
     return derive.derive_model(tree.mechanism(), expand=expand)
 
 
@@ -50,11 +47,10 @@ def rank_by_pinocchio(tree: RandomTree) -> int:
     return int(np.linalg.matrix_rank(np.vstack(rows), tol=1e-9))
 
 
-@pytest.mark.usefixtures("lets_trees_pass")
 @pytest.mark.parametrize(("name", "kinds"), SMALL)
 def test_e_and_p_of_small_trees_are_pinocchios_torques(name: str, kinds: str) -> None:
     tree = RandomTree(11, TREES[name], kinds)
-    model = derived(tree)
+    model = derived(tree, expand=True)
     q, qd, qdd = tree.states(20, 3)
     expected = tree.each(pin.rnea, q, qd, qdd)
     np.testing.assert_allclose(model.inverse_dynamics(q, qd, qdd), expected, rtol=0, atol=1e-11)
@@ -62,18 +58,16 @@ def test_e_and_p_of_small_trees_are_pinocchios_torques(name: str, kinds: str) ->
     assert model.l == rank_by_pinocchio(tree)
 
 
-@pytest.mark.usefixtures("lets_trees_pass")
 @pytest.mark.parametrize(("name", "kinds"), LARGER)
 def test_base_parameters_of_trees_are_as_many_as_pinocchios_rank(name: str, kinds: str) -> None:
     tree = RandomTree(12, TREES[name], kinds)
-    model = derived(tree, expand=False)
+    model = derived(tree)
     q, qd, qdd = tree.states(20, 3)
     expected = tree.each(pin.rnea, q, qd, qdd)
     np.testing.assert_allclose(model.inverse_dynamics(q, qd, qdd), expected, rtol=0, atol=1e-10)
     assert model.l == rank_by_pinocchio(tree)
 
 
-@pytest.mark.usefixtures("lets_trees_pass")
 @pytest.mark.parametrize("kinds", ["RRRR", "RPRR", "PRPP"])
 @pytest.mark.parametrize("parents", [(-1, 0, 1, 0), (-1, -1, 0, 1)])
 @pytest.mark.parametrize("parallel", [0.0, 0.6])
@@ -87,7 +81,6 @@ def test_link_by_link_finds_the_same_base_parameters(parents, kinds: str, parall
     np.testing.assert_allclose(across @ other.echelon, one.echelon, atol=1e-11)
 
 
-@pytest.mark.usefixtures("lets_trees_pass")
 @pytest.mark.parametrize(
     ("name", "kinds", "parallel"),
     [
@@ -100,7 +93,7 @@ def test_link_by_link_finds_the_same_base_parameters(parents, kinds: str, parall
 def test_lowered_trees_are_pinocchios(name: str, kinds: str, parallel: float) -> None:
     """Re-framed, searched, traced, optimised: every choice of the search on a tree."""
     tree = RandomTree(14, TREES[name], kinds, parallel)
-    model = derived(tree, expand=False)
+    model = derived(tree)
     made = lower(
         model,
         "factored",
@@ -140,12 +133,24 @@ def test_lowered_trees_are_pinocchios(name: str, kinds: str, parallel: float) ->
     np.testing.assert_allclose(run("jacobian", "J", 6 * n), expected, atol=1e-12)
 
 
-def test_a_second_child_may_lie_along_its_parents_x() -> None:
-    """Re-framing turns a body's x along the normal to its first child's axis: here the second child's axis."""
+ABOUT_X = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+ABOUT_Y = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+STEP = np.array([0.0, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    "children",
+    [
+        # The body's x is turned along the normal to its first child's axis: here the second child's axis,
+        (Placement(ABOUT_X, np.zeros(3)), Placement(ABOUT_Y, np.zeros(3))),
+        # and here the normals to its two children's axes are opposite: two arms on a torso.
+        (Placement(ABOUT_X, STEP), Placement(ABOUT_X.T, -STEP)),
+        (Placement(np.eye(3), STEP), Placement(np.eye(3), -STEP)),
+    ],
+)
+def test_any_two_children_are_reframed(children: tuple[Placement, Placement]) -> None:
     tree = RandomTree(17, TREES["a fork"], "RRR")
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    about_y = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    tree.places = [Placement.identity(), Placement(about_x, np.zeros(3)), Placement(about_y, np.zeros(3))]
+    tree.places = [Placement.identity(), *children]
     tree.model, tree.joints = tree._pinocchio()
     tree.data = tree.model.createData()
     chain = tree.mechanism()
@@ -163,21 +168,67 @@ def test_a_second_child_may_lie_along_its_parents_x() -> None:
         np.testing.assert_allclose(np.stack(tau, axis=1), expected, atol=1e-11)
 
 
-@pytest.mark.parametrize("name", TREES)
-def test_a_tree_is_refused_in_a_sentence(name: str) -> None:
-    chain = RandomTree(15, TREES[name], "RRRRRRRR").mechanism()
+def test_a_tree_is_derived_without_e_and_p_unless_they_are_asked_for() -> None:
+    tree = RandomTree(15, TREES["a fork"], "RRR")
+    assert derived(tree).E is None
+    assert derived(tree, expand=True).p == len(derived(tree, expand=True).E[0])
+
+
+def test_e_and_p_of_limbs_are_refused_by_the_longest_way_to_an_end() -> None:
+    """Sixteen joints in two limbs of eight: a grid of 5^7 points, not of 5^15; and too many numbers for its functions."""
+    joints = 32
+    limbs = (-1, *range(7)), (-1, *range(8, 15))
+    parents = tuple(i for limb in limbs for i in limb)
+    steps: list[str] = []
+    tree = RandomTree(15, parents, "R" * 16)
     with pytest.raises(
-        InputError, match=r"^'tree': link '\w+' carries joints .* derives serial chains only$"
+        DerivationError, match=r"expanding this 16-joint robot takes .* velocity terms"
     ) as refused:
-        derive.derive_model(chain)
-    assert "--tip" in str(refused.value.hint)
+        derive.derive_model(tree.mechanism(), expand=True, progress=steps.append)
+    assert "--no-expand" in str(refused.value.hint)
+    many = RandomTree(15, (-1,) * joints, "R" * joints)
+    with pytest.raises(DerivationError, match="too many to be numbered"):
+        derived(many, expand=True)
 
 
-def test_every_stage_refuses_a_tree(monkeypatch: pytest.MonkeyPatch) -> None:
-    tree = RandomTree(16, TREES["a fork"], "RRR")
-    with monkeypatch.context() as context:
-        context.setattr(derive, "require_derivable", lambda chain: None)
-        model = derived(tree)
-    for stage in (lambda: lower(model), lambda: file_bytes(model)):
-        with pytest.raises(InputError, match="link 'link0' carries joints 'joint1' and 'joint2'"):
-            stage()
+@pytest.mark.parametrize("name", TREES)
+def test_a_trees_model_file_gives_the_tree_back(name: str, tmp_path: Path) -> None:
+    tree = RandomTree(16, TREES[name], "RPRRPRRR")
+    model = derived(tree)
+    model.save(tmp_path / "tree.npz")
+    found = load(tmp_path / "tree.npz")
+    assert found.content_hash == model.content_hash
+    assert (found.mechanism.parents, found.mechanism.tip_body) == (tree.parents, model.mechanism.tip_body)
+    states = tree.states(5, 3)
+    np.testing.assert_array_equal(found.inverse_dynamics(*states), model.inverse_dynamics(*states))
+    assert file_bytes(found) == (tmp_path / "tree.npz").read_bytes()
+
+
+def test_a_chains_file_is_what_it_was_before_there_were_trees() -> None:
+    def manifest(parents: tuple[int, ...]) -> dict:
+        model = derived(RandomTree(16, parents, "RRR"))
+        with np.load(io.BytesIO(file_bytes(model))) as arrays:
+            return json.loads(str(arrays["manifest"]))
+
+    chain, tree = manifest((-1, 0, 1)), manifest((-1, 0, 0))
+    assert (chain["schema"], tree["schema"]) == (1, 2)
+    assert not {"parents", "tip_body", "coordinates"} & set(chain["chain"])
+    assert tree["chain"]["parents"] == [-1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"parents": [-1, 0, 2]}, "parent 2 of body 2 does not come before it"),
+        ({"parents": [-1, 0]}, "2 parents and 3 coordinates for 3 joints"),
+        ({"parents": [-1, 0, 0.5]}, "a parent"),
+        ({"tip_body": 3}, "the tip's body"),
+        ({"coordinates": [[0, 1.0, 0.0], [1, 1.0, 0.0], [5, 1.0, 0.0]]}, "a coordinate's leader"),
+        ({"coordinates": [[0, 1.0, 0.0], [2, 2.0, 0.0], [1, 1.0, 0.0]]}, "has no coordinate of its own"),
+    ],
+)
+def test_forged_trees_are_damaged_files(change: dict, message: str) -> None:
+    chain = chain_to_json(RandomTree(16, (-1, 0, 0), "RRR").mechanism())
+    assert chain_from_json(chain).parents == (-1, 0, 0)
+    with pytest.raises(ValueError, match=message):
+        chain_from_json(chain | change)

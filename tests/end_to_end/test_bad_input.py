@@ -40,7 +40,7 @@ def urdf(*parts: str) -> str:
 BASE, ARM, SHOULDER = link("base"), link("arm"), joint("shoulder", "base", "arm")
 BOMB = '<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>'
 EXTERNAL = '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><robot name="arm">&x;</robot>'
-MIMIC = joint("finger", "arm", "tip", extra='<mimic joint="shoulder"/>')
+MIMIC = joint("finger", "arm", "tip", extra='<mimic joint="finger"/>')
 
 ROBOTS = {
     "empty": ("", "the file is empty"),
@@ -53,7 +53,7 @@ ROBOTS = {
     "a zero axis": (urdf(BASE, ARM, joint("shoulder", "base", "arm", axis="0 0 0")), "'shoulder'"),
     "a mass that is no number": (urdf(BASE, link("arm", "nan"), SHOULDER), "'arm'"),
     "a negative mass": (urdf(BASE, link("arm", "-1"), SHOULDER), "'arm'"),
-    "a mimic joint": (urdf(BASE, ARM, link("tip"), SHOULDER, MIMIC), "'finger'"),
+    "a joint that mimics itself": (urdf(BASE, ARM, link("tip"), SHOULDER, MIMIC), "'finger'"),
     "a floating joint": (urdf(BASE, ARM, joint("loose", "base", "arm", "floating")), "'loose'"),
 }
 

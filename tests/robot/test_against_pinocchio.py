@@ -18,12 +18,12 @@ TOLERANCE = 1e-12
 FOREIGN = {
     "ur5_robot.urdf": 6,
     "ur10_robot.urdf": 6,
-    "panda.urdf": 7,
+    "panda.urdf": 9,
     "kinova.urdf": 6,
     "z1.urdf": 7,
     "xarm7.urdf": 7,
-    "tiago.urdf": 8,
-    "b1-z1.urdf": 7,
+    "anymal.urdf": 12,
+    "b1-z1.urdf": 19,
 }
 
 
@@ -166,11 +166,11 @@ def matrix(placement):
 
 @pytest.mark.parametrize("snapped", [True, False])
 def test_mass_matrix_and_jacobian(snapped):
-    loaded = load_robot(robot_data("panda.urdf"), snap=1e-5 if snapped else 0.0, drive_inertia=[0.1] * 7)
+    loaded = load_robot(robot_data("panda.urdf"), snap=1e-5 if snapped else 0.0, drive_inertia=[0.1] * 9)
     chain, oracle = loaded.chain, reference(loaded, snapped=snapped)
-    q = np.random.default_rng(3).normal(size=7)
+    q = np.random.default_rng(3).normal(size=9)
 
-    found = mass_matrix(frames_of(chain), bodies_of(chain, chain.parameters), [0.1] * 7, q)
+    found = mass_matrix(frames_of(chain), bodies_of(chain, chain.parameters), [0.1] * 9, q)
 
     np.testing.assert_allclose(found, oracle.mass_matrix(q), atol=1e-13)
     np.testing.assert_allclose(

@@ -15,7 +15,8 @@ from psdmc.dynamics.parameters import bodies_of
 from psdmc.errors import InputError
 from psdmc.robot.coordinates import leaders
 from psdmc.robot.derivable import require_derivable
-from psdmc.robot.urdf_whole import urdf_mechanism, whole_robot
+from psdmc.robot.load import load_robot_text
+from psdmc.robot.mechanism import Mechanism
 
 REAL = {
     "allegro_right_hand.urdf": (16, 16),
@@ -29,10 +30,14 @@ REAL = {
 """Movable joints, and those that mimic none."""
 
 
+def tree_of(text: str, **options: object) -> Mechanism:
+    return load_robot_text(text, "urdf", source_name="hand.urdf", **options).mechanism  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("name", REAL)
 def test_real_trees_have_pinocchios_joints_torques_and_mass_matrix(name: str) -> None:
     text = robot_data(name).read_text(encoding="utf-8")
-    tree = urdf_mechanism(text, name, snap=0.0)
+    tree = tree_of(text, snap=0.0)
     # A continuous joint is one angle here, a cosine and a sine in Pinocchio.
     model = pin.buildModelFromXML(text.replace('type="continuous"', 'type="revolute"'), mimic=True)
     data = model.createData()
@@ -69,7 +74,7 @@ HAND = urdf(
 
 
 def test_a_hand_as_data() -> None:
-    hand = urdf_mechanism(HAND, "hand.urdf")
+    hand = tree_of(HAND)
     assert hand.joint_names == ("wrist", "a_index", "last", "b_thumb")
     assert hand.parents == (-1, 0, 1, 0)
     assert [hand.joints[i].link_name for i in hand.leaves] == ["tip", "thumb"]
@@ -77,8 +82,70 @@ def test_a_hand_as_data() -> None:
     assert [(c.leader, c.ratio, c.offset) for c in hand.coordinates] == [
         (0, 1.0, 0.0), (3, -2.0, 0.5), (3, -6.0, 1.5), (3, 1.0, 0.0),
     ]  # fmt: skip
-    with pytest.raises(InputError, match="link 'palm' carries joints 'a_index' and 'b_thumb'"):
+    assert hand.notes[0] == (
+        "the whole tree, to its ends 'tip', 'thumb'; --tip LINK takes one chain of it, as --tip tip"
+    )
+    with pytest.raises(InputError, match="joint 'a_index' follows joint 'b_thumb'"):
         require_derivable(hand)
+
+
+def test_the_frames_of_a_tree_are_its_ends_and_the_first_is_its_tip() -> None:
+    hand = tree_of(HAND)
+    assert [(frame.name, frame.joint) for frame in hand.frames] == [("tip", 2), ("thumb", 3)]
+    assert (hand.tip_name, hand.tip_body) == ("tip", 2)
+
+
+def test_the_tip_of_a_tree_is_the_first_frame_that_is_named_and_may_carry_others() -> None:
+    hand = tree_of(HAND, frames=("flange", "thumb"), tool=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0))
+    assert [(frame.name, frame.joint) for frame in hand.frames] == [("flange", 0), ("thumb", 3), ("tool", 0)]
+    assert (hand.tip_name, hand.tip_body) == ("flange", 0)
+    assert hand.tip.translation.tolist() == [0.1, 0.2, 0.3]
+
+
+def test_a_frame_that_nothing_moves_is_refused() -> None:
+    with pytest.raises(InputError, match="frame 'base' is fixed to the root: no joint moves it"):
+        tree_of(HAND, frames=("base",))
+
+
+def test_base_and_tip_still_cut_a_chain() -> None:
+    chain = tree_of(HAND, tip="thumb")
+    assert chain.is_serial
+    assert chain.joint_names == ("wrist", "b_thumb")
+    assert "locked at zero" in chain.notes[0]
+    # Of the palm's own body, its flange, and the fingers that are locked.
+    assert chain.parameters[0, 0] == pytest.approx(4 * 1.5)
+
+
+def test_a_follower_needs_its_leader_on_the_chain() -> None:
+    with pytest.raises(InputError, match="joint 'a_index' mimics 'b_thumb', which does not move the chain"):
+        tree_of(HAND, tip="tip")
+
+
+def test_fixed_branches_make_no_tree() -> None:
+    arm = tree_of(
+        urdf(
+            link("base"), link("one"), link("two"), link("camera"),
+            joint("a", "base", "one"), joint("b", "one", "two"), joint("eye", "one", "camera", kind="fixed"),
+        )
+    )  # fmt: skip
+    assert arm.is_serial
+    assert [frame.name for frame in arm.frames] == ["two"]
+    assert not arm.notes
+
+
+def test_a_turn_that_two_joints_lie_beyond_is_snapped_for_both_and_said_once() -> None:
+    from psdmc.robot.snap_bound import angles_by_segment
+
+    parts = (
+        link("base"), link("torso"), link("left"), link("right"),
+        joint("mount", "base", "torso", kind="fixed", rpy="1.5708 0 0"),
+        joint("l", "torso", "left"), joint("r", "torso", "right"),
+    )  # fmt: skip
+    loaded = load_robot_text(urdf(*parts), "urdf", source_name="two.urdf")
+    angles = angles_by_segment(loaded.snap_report, 2, 1e-5)
+    assert angles[0] == angles[1] == pytest.approx(1.5708 - np.pi / 2, rel=1e-6)
+    said = [note for note in loaded.mechanism.notes if "turned by" in note]
+    assert said == ["joint 'mount': turned by 3.7e-06 rad to exact zeros"]
 
 
 @pytest.mark.parametrize(
@@ -95,35 +162,12 @@ def test_a_hand_as_data() -> None:
         ((joint("a", "base", "one", extra='<mimic joint="c"/>'),), "mimics 'c', which is no movable joint"),
         ((joint("a", "base", "one", extra='<mimic multiplier="x" joint="a"/>'),), "multiplier='x'"),
         ((joint("a", "base", "one", kind="floating"),), "joint 'a': type 'floating' is not supported"),
-        ((joint("a", "base", "one", kind="fixed"),), "no movable joint"),
+        ((joint("a", "base", "one", kind="fixed"),), "no movable joint below link 'base'"),
     ],
 )
 def test_what_no_mechanism_has_is_refused(parts: tuple[str, ...], message: str) -> None:
     links = [link("base"), link("one"), *([link("two")] if len(parts) > 1 else [])]
     with pytest.raises(InputError, match=message) as refused:
-        urdf_mechanism(urdf(*links, *parts), "arm.urdf")
-    assert str(refused.value).startswith("arm.urdf: ")
+        tree_of(urdf(*links, *parts))
+    assert str(refused.value).startswith("hand.urdf: ")
     assert refused.value.hint
-
-
-def test_a_chain_is_read_whole_as_it_is_read_alone(tmp_path) -> None:
-    from psdmc.robot.load import load_robot
-
-    path = tmp_path / "arm.urdf"
-    path.write_text(
-        urdf(link("base"), link("one"), link("two"), joint("a", "base", "one", rpy="1.5708 0 0"),
-             joint("b", "one", "two", kind="prismatic", axis="0 1 0")), encoding="utf-8"
-    )  # fmt: skip
-    whole, alone = whole_robot(path), load_robot(path).chain
-    assert whole.is_serial
-    require_derivable(whole)
-    for one, other in zip(whole.joints, alone.joints, strict=True):
-        assert (one.name, one.link_name, one.type, one.limits) == (
-            other.name,
-            other.link_name,
-            other.type,
-            other.limits,
-        )
-        np.testing.assert_array_equal(one.placement.rotation, other.placement.rotation)
-        np.testing.assert_array_equal(one.placement.translation, other.placement.translation)
-    np.testing.assert_array_equal(whole.parameters, alone.parameters)

@@ -148,13 +148,14 @@ def test_a_mistake_in_placing_a_urdfs_joints_is_noticed(make, mistake: str, monk
 
 
 def test_a_tip_in_the_wrong_place_is_noticed_though_no_torque_tells(monkeypatch) -> None:
-    real = urdf_chain._placed_joints
+    real = urdf_chain._placed
 
     def misplaced(route, snap):
-        joints, tip, snaps = real(route, snap)
-        return joints, shifted(tip, 1e-3), snaps
+        placed = real(route, snap)
+        tip = replace(placed.tip, placement=shifted(placed.tip.placement, 1e-3))
+        return replace(placed, tip=tip)
 
-    monkeypatch.setattr(urdf_chain, "_placed_joints", misplaced)
+    monkeypatch.setattr(urdf_chain, "_placed", misplaced)
 
     for make in (oblique, rounded):
         failed = {row.name for row in checked(make) if not row.passed}
