@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -49,3 +50,29 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+_MOVED = {
+    "psdmc.derive": "psdmc.derivation",
+    "psdmc.calibrate": "psdmc.calibration",
+    "psdmc.derivation.functions": "psdmc.derivation.monomials",
+    "psdmc.model.check": "psdmc.verification.check",
+    "psdmc.program.functions": "psdmc.program.signature",
+    "psdmc.robot.chain": "psdmc.robot.mechanism",
+}
+"""Packages and modules of psdmc 0.1 that have another name now."""
+
+
+class _Moved:
+    """Import finder that raises ModuleNotFoundError with the new name of a moved module; Python asks it last."""
+
+    @staticmethod
+    def find_spec(name: str, path: object = None, target: object = None) -> None:
+        for old, new in _MOVED.items():
+            if name == old or name.startswith(f"{old}."):
+                raise ModuleNotFoundError(
+                    f"no module {old!r}: after psdmc 0.1 it was renamed {new!r}", name=name
+                )
+
+
+sys.meta_path.append(_Moved)
