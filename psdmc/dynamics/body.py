@@ -25,9 +25,6 @@ class Body(NamedTuple):
     second: tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
 
 
-NO_BODY = Body(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-
-
 def body_from_parameters(x: Sequence[Scalar]) -> Body:
     """Ten standard parameters (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), about any frame, as a Body about it."""
     m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = x[:10]

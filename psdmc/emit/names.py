@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable
 from importlib import resources
 
 LONGEST = 63
@@ -53,19 +52,6 @@ def identifier(name: str) -> str:
         digest = _digest(name)
         cleaned = f"{cleaned[: LONGEST - len(digest) - 1].rstrip('_')}_{digest}"
     return cleaned
-
-
-def identifiers(names: Iterable[str]) -> tuple[str, ...]:
-    """One identifier per name, all different: equal ones get _2, _3 ... in order."""
-    taken: dict[str, None] = {}
-    for name in names:
-        first = identifier(name)
-        candidate, count = first, 1
-        while candidate in taken:
-            count += 1
-            candidate = f"{first[: LONGEST - 8].rstrip('_')}_{count}"
-        taken[candidate] = None
-    return tuple(taken)
 
 
 def c_string(text: str) -> str:

@@ -164,10 +164,6 @@ class PackageView:
         return ".".join(part or "0" for part in found.groups()) if found else "0.0.0"
 
     @property
-    def kernel_names(self) -> tuple[str, ...]:
-        return tuple(kernel.name for kernel in self.kernels)
-
-    @property
     def pivot_size(self) -> int:
         """Number of entries that must be positive, where the outputs that become NaN are one vector of that length."""
         found = (k.positive.size for k in self.kernels if k.positive and k.fails_alone)

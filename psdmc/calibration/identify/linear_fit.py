@@ -84,10 +84,6 @@ class LinearResult:
         """(n, f) in the order of problem.friction."""
         return self.estimate.values[self.problem.l :].reshape(len(self.problem.chain), -1)
 
-    @property
-    def friction_std(self) -> Array:
-        return self.estimate.std[self.problem.l :].reshape(len(self.problem.chain), -1)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearProblem:

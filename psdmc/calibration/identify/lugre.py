@@ -111,13 +111,6 @@ def friction_torque(friction: Lugre, qd: Array, period: float, z: float = 0.0) -
     return tau
 
 
-def steady_torque(friction: Lugre, qd: Array) -> Array:
-    """Friction torque in steady sliding: sigma_0 g(qd) sign(qd) plus the viscous part."""
-    peak = (friction.static - friction.coulomb) * np.exp(-((qd / friction.stribeck_velocity) ** 2))
-    magnitude = friction.coulomb + peak + friction.viscous * np.abs(qd) ** friction.viscous_exponent
-    return np.asarray(np.sign(qd) * magnitude)
-
-
 @cache
 def _compiled() -> tuple[Any, Any]:
     """The simulation, compiled once per machine and kept in psdmc's compile cache."""
