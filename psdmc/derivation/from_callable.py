@@ -21,6 +21,7 @@ from psdmc.derivation.monomials import Monomials
 from psdmc.derivation.reduce import Reduction, reduced, row_space
 from psdmc.derivation.terms import Terms, joined, restricted
 from psdmc.errors import InputError
+from psdmc.model.expansion import RowBlocks
 from psdmc.robot.joints import JOINT_TYPES, JointType
 from psdmc.robot.limits import shown
 
@@ -57,7 +58,7 @@ class SampledModel:
         """tau (states, n) from (states, n) arrays and parameters (k,)."""
         n = len(self.P)
         rows = np.concatenate([q.T, np.sin(q).T, np.cos(q).T, qd.T, qdd.T])
-        strength = np.where(self.E[3 * n :].any(axis=0), 1.0, gravity_scale)
+        strength = np.where(self.E[RowBlocks.of(n).rates].any(axis=0), 1.0, gravity_scale)
         values = strength[:, None] * np.prod(rows[:, None, :] ** self.E[:, :, None], axis=0)
         theta = self.B @ X
         return np.stack([(matrix @ theta) @ values for matrix in self.P], axis=1)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.model.expansion import BLOCKS, RowBlocks
 from psdmc.robot.joints import JointType
 
 Integers = NDArray[np.int64]
@@ -77,11 +78,12 @@ class Monomials:
 
     def exponents(self, keys: Integers) -> NDArray[np.uint8]:
         """E: (5n, p) uint8 for p monomial keys; row blocks q, sin q, cos q, qd, qdd."""
-        n = self.n
-        table = np.zeros((5 * n, len(keys)), dtype=np.uint8)
+        rows = RowBlocks.of(self.n)
+        table = np.zeros((BLOCKS * self.n, len(keys)), dtype=np.uint8)
+        position = table[rows.position].reshape(-1, self.n, len(keys))
         rates, codes = np.divmod(keys, self.codes)
         for j, joint in enumerate(self.types):
             powers = np.array(joint.basis.exponents, dtype=np.uint8)
-            table[[j, n + j, 2 * n + j]] = powers[self.digit(codes, j)].T
-        table[3 * n :] = self.rate_exponents()[rates].T
+            position[:, j] = powers[self.digit(codes, j)].T
+        table[rows.rates] = self.rate_exponents()[rates].T
         return table

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError
-from psdmc.model.expansion import Expansion
+from psdmc.model.expansion import Expansion, RowBlocks
 from psdmc.robot.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -48,12 +48,12 @@ class _Monomials:
     """
 
     def __init__(self, expansion: Expansion, chain: Mechanism) -> None:
-        n, exponents = expansion.n, expansion.E
-        moving = exponents[3 * n :].any(axis=0)
-        self.part, first = _alike(np.vstack([exponents[: 3 * n], moving]))
-        self.parts = exponents[: 3 * n, first]
+        rows, exponents = RowBlocks.of(expansion.n), expansion.E
+        moving = exponents[rows.rates].any(axis=0)
+        self.part, first = _alike(np.vstack([exponents[rows.position], moving]))
+        self.parts = exponents[rows.position, first]
         self.strength = np.where(moving, 1.0, np.linalg.norm(chain.gravity))[first]
-        self.factors = tuple(_factors(exponents[3 * n :]))
+        self.factors = tuple(_factors(exponents[rows.rates]))
 
     def values(self, q: Array, qd: Array, qdd: Array) -> Array:
         """(p, states) from (states, n) arrays; each monomial's factors in the order of E's rows."""
@@ -117,7 +117,7 @@ def regressor(expansion: Expansion, chain: Mechanism, arrays: list[Array]) -> Ar
 def mass_matrix(expansion: Expansion, chain: Mechanism, theta: Array, q: Array) -> Array:
     """M (states, n, n) at q (states, n): column j is the value of the monomials with qdd_j for qdd_j = 1."""
     n, weights = expansion.n, _weights(expansion, theta)
-    columns = [np.flatnonzero(expansion.E[4 * n + j]) for j in range(n)]
+    columns = [np.flatnonzero(row) for row in expansion.E[RowBlocks.of(n).qdd]]
     parts = [weights[:, own] for own in columns]
 
     def columns_of(y: Array) -> Array:

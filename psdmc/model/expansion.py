@@ -13,6 +13,30 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from scipy import sparse
 
+BLOCKS = 5
+"""Row blocks of E: exponents of q, sin q, cos q, qd and qdd."""
+
+
+class RowBlocks(NamedTuple):
+    """The rows of E by what they are exponents of: five blocks of n rows, and two ranges of blocks.
+
+    position  q, sin q and cos q
+    rates     qd and qdd
+    """
+
+    q: slice
+    sin: slice
+    cos: slice
+    qd: slice
+    qdd: slice
+    position: slice
+    rates: slice
+
+    @staticmethod
+    def of(n: int) -> RowBlocks:
+        q, sin, cos, qd, qdd = (slice(k * n, (k + 1) * n) for k in range(BLOCKS))
+        return RowBlocks(q, sin, cos, qd, qdd, slice(q.start, cos.stop), slice(qd.start, qdd.stop))
+
 
 class Entries(NamedTuple):
     """The entries of n sparse matrices P: joint by joint, row by row.
@@ -45,7 +69,7 @@ class Expansion:
 
     def __post_init__(self) -> None:
         exponents = np.array(self.E, dtype=np.uint8, order="C")
-        if exponents.ndim != 2 or exponents.shape[0] % 5:
+        if exponents.ndim != 2 or exponents.shape[0] % BLOCKS:
             raise ValueError(f"E has shape {exponents.shape}, expected (5n, p)")
         exponents.setflags(write=False)
         object.__setattr__(self, "E", exponents)
@@ -69,7 +93,7 @@ class Expansion:
         from scipy import sparse
 
         shapes = {matrix.shape for matrix in P}
-        if len(shapes) != 1 or 5 * len(P) != E.shape[0] or next(iter(shapes))[0] != E.shape[1]:
+        if len(shapes) != 1 or BLOCKS * len(P) != E.shape[0] or next(iter(shapes))[0] != E.shape[1]:
             raise ValueError(f"P has shapes {sorted(shapes)}, E {E.shape}")
         blocks = [sparse.coo_array(matrix) for matrix in P]
         entries = Entries(
@@ -83,7 +107,7 @@ class Expansion:
     @property
     def n(self) -> int:
         """Number of joints."""
-        return int(self.E.shape[0]) // 5
+        return int(self.E.shape[0]) // BLOCKS
 
     @property
     def p(self) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from psdmc.model import json_values as json
 from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.expansion import Entries, Expansion
+from psdmc.model.expansion import BLOCKS, Entries, Expansion
 from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 from psdmc.robot.zeros import leading_rows
@@ -82,7 +82,7 @@ def _check_base_parameters(arrays: Arrays, chain: Mechanism, l: int, is_known: b
 
 
 def _exponents(E: NDArray[Any], n: int) -> NDArray[np.uint8]:
-    if E.shape[0] != 5 * n:
+    if E.shape[0] != BLOCKS * n:
         raise ValueError(f"E has {E.shape[0]} rows for {n} joints")
     return E
 

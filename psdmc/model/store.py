@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from psdmc.atomic import write_whole
 from psdmc.errors import InputError
 from psdmc.model.chain_json import MOST_JOINTS, chain_to_json, is_plain_chain
-from psdmc.model.expansion import Entries, Expansion
+from psdmc.model.expansion import BLOCKS, Entries, Expansion
 from psdmc.robot.mechanism import Mechanism
 from psdmc.version import psdmc_version
 
@@ -110,7 +110,7 @@ def _arrays(model: Model) -> dict[str, NDArray[Any]]:
 
 def _nothing(n: int, l: int) -> Expansion:
     """The empty expansion that a file holds where the model has no E and P."""
-    return Expansion(np.zeros((5 * n, 0), np.uint8), Entries(*np.zeros((4, 0))), l)
+    return Expansion(np.zeros((BLOCKS * n, 0), np.uint8), Entries(*np.zeros((4, 0))), l)
 
 
 def _manifest(model: Model) -> dict[str, Any]:

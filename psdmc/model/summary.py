@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
+from psdmc.model.expansion import BLOCKS, RowBlocks
 from psdmc.robot.mechanism import Joint
 
 
@@ -81,8 +82,8 @@ def summary(model: DynamicsModel) -> Summary:
 
 def sizes_of(E: NDArray[np.uint8]) -> Sizes:
     """Count the monomials of E (5n, p) by kind of acceleration."""
-    n = E.shape[0] // 5
-    speeds, accelerations = E[3 * n : 4 * n], E[4 * n :]
+    rows = RowBlocks.of(E.shape[0] // BLOCKS)
+    speeds, accelerations = E[rows.qd], E[rows.qdd]
     accelerating, moving = accelerations.any(axis=0), speeds.any(axis=0)
     squared = (speeds == 2).any(axis=0)
     return Sizes(
@@ -96,10 +97,10 @@ def sizes_of(E: NDArray[np.uint8]) -> Sizes:
 def term_texts(model: DynamicsModel) -> Iterator[str]:
     """Every monomial y as text, in the order of E: 'g s2 c3', 'qdd1 c2^2', 'qd1 qd2 s2 c2'."""
     exponents = model.expanded().E
-    n = model.n
+    n, rows = model.n, RowBlocks.of(model.n)
     names = [f"{symbol}{j + 1}" for symbol in ("q", "s", "c", "qd", "qdd") for j in range(n)]
-    order = [*range(4 * n, 5 * n), *range(3 * n, 4 * n), *range(3 * n)]
+    order = np.concatenate([np.arange(len(names))[each] for each in (rows.qdd, rows.qd, rows.position)])
     for column in exponents.T:
         factors = [names[r] + ("^2" if column[r] == 2 else "") for r in order if column[r]]
-        is_gravity = not column[3 * n :].any()
+        is_gravity = not column[rows.rates].any()
         yield " ".join(["g", *factors] if is_gravity else factors)

@@ -24,6 +24,7 @@ from psdmc.lower.expanded.terms import (
 )
 from psdmc.lower.expanded.values import polynomial_values, row_symbols
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.expansion import BLOCKS
 from psdmc.program.cost import cost
 from psdmc.program.pipeline import optimize
 from psdmc.program.program import Program, Slot
@@ -67,7 +68,7 @@ def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool) -> Iterator[
     if theta:
         yield from _in_all_orders(symbolic, base_first(n))
         return
-    values = dict(enumerate(known_parameters(model).tolist(), start=5 * n))
+    values = dict(enumerate(known_parameters(model).tolist(), start=BLOCKS * n))
     present = _without_zero_rows(symbolic, values)
     yield from (with_constants(diagram, values) for diagram in _in_all_orders(present, base_first(n)))
     baked = _part(part, with_gravity(baked_torque_terms(model), model.mechanism), n)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from psdmc.model.expansion import BLOCKS
+
 Order = tuple[int, ...]
 Joints = tuple[int, ...]
 
@@ -30,7 +32,7 @@ def candidates(joints: Joints, rows: int) -> Iterator[Order]:
     the rows from 5 n on, stay innermost.
     """
     n = len(joints)
-    parameters = tuple(range(5 * n, rows))
+    parameters = tuple(range(BLOCKS * n, rows))
     for blocks in TRIGONOMETRY:
         position = _by_joint(joints, blocks, n)
         for rates in (joints[::-1], joints):

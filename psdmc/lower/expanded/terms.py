@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.expansion import Entries, Expansion
+from psdmc.model.expansion import Entries, Expansion, RowBlocks
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
@@ -120,13 +120,13 @@ def mass_matrix_terms(torque: Terms, n: int) -> Terms:
     """M[i, j], i <= j, as output i * n + j. The terms are those with qdd[j] in tau[i] or with qdd[i] in tau[j],
     whichever torque's coefficients are less uncertain: what is rounding beside an arm's inertia may matter for its
     finger."""
-    accelerations = torque.exponents[4 * n : 5 * n]
+    accelerations = torque.exponents[RowBlocks.of(n).qdd]
     own, other = torque.output, np.argmax(accelerations, axis=0)
     doubt = np.zeros(n)
     np.maximum.at(doubt, own, torque.uncertainty)
     is_better = (doubt[own] < doubt[other]) | ((doubt[own] == doubt[other]) & (own <= other))
     exponents = torque.exponents.copy()
-    exponents[4 * n : 5 * n] = 0
+    exponents[RowBlocks.of(n).qdd] = 0
     output = np.minimum(own, other) * n + np.maximum(own, other)
     entries = Terms(output, exponents, torque.coefficient, torque.uncertainty)
     return entries.where(accelerations.any(axis=0) & is_better)
@@ -134,18 +134,18 @@ def mass_matrix_terms(torque: Terms, n: int) -> Terms:
 
 def nonlinear_terms(torque: Terms, n: int) -> Terms:
     """h[i]: the terms of tau[i] without joint accelerations."""
-    return torque.where(np.asarray(~torque.exponents[4 * n : 5 * n].any(axis=0)))
+    return torque.where(np.asarray(~torque.exponents[RowBlocks.of(n).qdd].any(axis=0)))
 
 
 def gravity_terms(torque: Terms, n: int) -> Terms:
     """g[i]: the terms of tau[i] without joint rates and accelerations."""
-    return torque.where(np.asarray(~torque.exponents[3 * n : 5 * n].any(axis=0)))
+    return torque.where(np.asarray(~torque.exponents[RowBlocks.of(n).rates].any(axis=0)))
 
 
 def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
     """The terms with gravity's multiplied by |g| (m/s^2), which E leaves to the monomials y."""
     n = len(chain)
-    at_rest = ~terms.exponents[3 * n : 5 * n].any(axis=0)
+    at_rest = ~terms.exponents[RowBlocks.of(n).rates].any(axis=0)
     factor = np.where(at_rest, np.linalg.norm(chain.gravity), 1.0)
     return Terms(terms.output, terms.exponents, terms.coefficient * factor, terms.uncertainty * factor)
 
