@@ -9,10 +9,9 @@ import numpy as np
 from psdmc.dynamics.parameters import joint_frame_map, standard_parameters
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism
+from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism
 from psdmc.robot.small import times
 
-DRIVE = PARAMETERS_PER_LINK - 1
 FLOOR_MOUNT = (0.0, 0.0, -9.81)
 
 

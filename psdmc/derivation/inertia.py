@@ -27,11 +27,11 @@ from psdmc.derivation.terms import Terms, joined
 from psdmc.dynamics.frames import BASE, Frame, joint_angle, joint_offset
 from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.motion import JointState
-from psdmc.dynamics.regressor import DRIVE, Placed, Twist, carried, own_twist, twist_in
+from psdmc.dynamics.regressor import Placed, Twist, carried, own_twist, twist_in
 from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
 from psdmc.robot.joints import JointType
 from psdmc.robot.joints.basis import Basis
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from psdmc.derivation.extended import orthonormal
 from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
-from psdmc.dynamics.parameters import BODY_PARAMETERS, moving_map
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement
+from psdmc.dynamics.parameters import moving_map
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, Placement
 from psdmc.robot.small import times
 
 Array = NDArray[np.float64]

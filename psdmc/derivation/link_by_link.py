@@ -24,11 +24,11 @@ from psdmc.derivation.reduce import Reduction
 from psdmc.derivation.units import Scaled
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.motion import PLAIN, LinkMotion, sweep_outward
-from psdmc.dynamics.parameters import BODY_PARAMETERS, moving_map
-from psdmc.dynamics.regressor import DRIVE, unit_wrench
+from psdmc.dynamics.parameters import moving_map
+from psdmc.dynamics.regressor import unit_wrench
 from psdmc.dynamics.twist import effort
 from psdmc.robot.graded import graded_pivots, halving_shares, lengths
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK
 from psdmc.robot.small import times
 
 SEED = 20_210_157

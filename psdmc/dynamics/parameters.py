@@ -9,13 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.dynamics.body import Body, body_from_parameters
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, Placement
 from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
-
-BODY_PARAMETERS = PARAMETERS_PER_LINK - 1
-"""Standard parameters of one rigid body: all of a link's but the joint's drive inertia."""
 
 _INERTIA_ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 """Places of Ixx, Ixy, Iyy, Ixz, Iyz, Izz in the matrix, in the order of x."""

@@ -24,12 +24,10 @@ from psdmc.dynamics.scalar import (
     transpose,
 )
 from psdmc.dynamics.twist import axis_twist
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
 
 Twist = tuple[Vector, Vector]
 """Linear velocity of a frame's origin and angular velocity, along the frame's axes."""
-
-DRIVE = PARAMETERS_PER_LINK - 1
 
 
 class Placed(Protocol):

@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.parameters import BODY_PARAMETERS, joint_frame_map
-from psdmc.dynamics.regressor import DRIVE, regressor
+from psdmc.dynamics.parameters import joint_frame_map
+from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.tableau import Long, Tableau
 from psdmc.robot.graded import graded_pivots, halving_shares, lengths
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Placement
+from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK, Array, Placement
 from psdmc.robot.small import times
 
 PSEUDO_NAMES = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz", "Im")

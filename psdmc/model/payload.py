@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from psdmc.dynamics.parameters import BODY_PARAMETERS, moved, moving_map, standard_parameters
+from psdmc.dynamics.parameters import moved, moving_map, standard_parameters
 from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.inertia import physical_fault, six_of
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, NamedFrame, Placement
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, NamedFrame, Placement
 from psdmc.robot.small import times
 from psdmc.robot.zeros import leading_rows
 

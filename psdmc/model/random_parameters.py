@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.parameters import BODY_PARAMETERS, inertia_of, standard_parameters
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
+from psdmc.dynamics.parameters import inertia_of, standard_parameters
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism
 from psdmc.robot.zeros import leading_rows
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, NamedFrame
+from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
 from psdmc.robot.tool import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
@@ -23,8 +23,6 @@ from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_stat
 __all__ = ["DEFAULT_SNAP", "LoadOptions", "LoadedRobot", "SourceFormat", "load_robot", "load_robot_text"]
 
 SourceFormat = Literal["urdf", "dh"]
-
-DRIVE = PARAMETERS_PER_LINK - 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)

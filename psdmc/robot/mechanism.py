@@ -19,6 +19,11 @@ PARAMETER_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Iz
 """Standard parameters of one link, in the order of x; about the link frame, Im the joint's drive inertia."""
 
 PARAMETERS_PER_LINK = len(PARAMETER_NAMES)
+BODY_PARAMETERS = PARAMETERS_PER_LINK - 1
+"""Number of standard parameters of one rigid body: all of a link's but the joint's drive inertia."""
+
+DRIVE = BODY_PARAMETERS
+"""Place of the drive inertia among a link's standard parameters: behind those of the body."""
 
 BASE = -1
 """Parent of a body that hangs on the base."""

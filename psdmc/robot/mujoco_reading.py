@@ -10,7 +10,7 @@ import numpy as np
 
 from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array
+from psdmc.robot.mechanism import DRIVE, Array
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference import has_assumptions
 from psdmc.robot.urdf_chain import STANDARD_GRAVITY
@@ -28,7 +28,6 @@ COMPILER = {
 }
 """Settings by which MuJoCo keeps the file's numbers; bodies without a joint are merged into those that they hang on."""
 
-DRIVE = PARAMETERS_PER_LINK - 1
 REASON = 160
 """Characters of MuJoCo's own message that an error repeats."""
 

@@ -21,11 +21,9 @@ import pinocchio
 from psdmc.errors import InputError
 from psdmc.robot.dh_textbook import dh_model
 from psdmc.robot.load import LoadedRobot
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
+from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 from psdmc.robot.tool import TOOL
-
-DRIVE = PARAMETERS_PER_LINK - 1
 
 
 def reference_model(

@@ -20,14 +20,11 @@ from numpy.typing import NDArray
 
 from psdmc.errors import InputError
 from psdmc.robot.inertia import INERTIA_NAMES, about_com, standard_parameters
-from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Array
+from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETER_NAMES, PARAMETERS_PER_LINK, Array
 
 COM_NAMES = ("rx", "ry", "rz", *(f"I{name}@com" for name in INERTIA_NAMES))
 ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)
 """Parameters of one link that may be assumed zero."""
-
-BODY = PARAMETERS_PER_LINK - 1
-"""Parameters of the body alone; the drive inertia comes after them."""
 
 
 def canonical(names: Collection[str]) -> tuple[str, ...]:
@@ -35,7 +32,7 @@ def canonical(names: Collection[str]) -> tuple[str, ...]:
     the origin."""
     said = set(names)
     if "m" in said:
-        said |= set(PARAMETER_NAMES[:BODY]) | set(COM_NAMES)
+        said |= set(PARAMETER_NAMES[:BODY_PARAMETERS]) | set(COM_NAMES)
     for axis in "xyz":
         if {f"m{axis}", f"r{axis}"} & said:
             said |= {f"m{axis}", f"r{axis}"}
@@ -58,13 +55,13 @@ def link_values(parameters: Array, names: Collection[str]) -> Array:
     """(11,) standard parameters with the statements applied, those about the centre of mass first."""
     zero = canonical(names)
     values = np.array(parameters, dtype=float)
-    if any(name in COM_NAMES for name in zero) and not np.isnan(values[:BODY]).any():
+    if any(name in COM_NAMES for name in zero) and not np.isnan(values[:BODY_PARAMETERS]).any():
         mass, com, inertia = about_com(values)
         for k, axis in enumerate("xyz"):
             com[k] = 0.0 if f"r{axis}" in zero else com[k]
         for k, name in enumerate(INERTIA_NAMES):
             inertia[k] = 0.0 if f"I{name}@com" in zero else inertia[k]
-        values[:BODY] = standard_parameters(mass, com, inertia)
+        values[:BODY_PARAMETERS] = standard_parameters(mass, com, inertia)
     possible = np.any(link_span(zero) != 0.0, axis=1)
     return np.where(possible, values, 0.0)
 

@@ -10,12 +10,12 @@ from xml.etree import ElementTree
 import numpy as np
 
 from psdmc.bench.build import built, cxx
-from psdmc.bench.case import DRIVE, Case
+from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import inertia_matrix, joint_frame_map
 from psdmc.errors import ToolchainError
-from psdmc.robot.mechanism import BASE, Array, Mechanism
+from psdmc.robot.mechanism import BASE, DRIVE, Array, Mechanism
 
 RIVAL = "MuJoCo"
 FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")

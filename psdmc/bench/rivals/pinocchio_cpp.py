@@ -10,13 +10,13 @@ from typing import Literal
 import numpy as np
 
 from psdmc.bench.build import built, cxx
-from psdmc.bench.case import DRIVE, Case, robot_as_numbers
+from psdmc.bench.case import Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.states import output_sizes
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError
-from psdmc.robot.mechanism import Array
+from psdmc.robot.mechanism import DRIVE, Array
 from psdmc.target.flags import GCC_ONLY
 from psdmc.target.native import NATIVE
 

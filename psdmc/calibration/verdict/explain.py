@@ -12,7 +12,8 @@ from scipy.optimize import nnls
 
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import Evidence
-from psdmc.calibration.verdict.gains import DRIVE_INERTIA, RANK_TOLERANCE, basis
+from psdmc.calibration.verdict.gains import RANK_TOLERANCE, basis
+from psdmc.robot.mechanism import DRIVE
 
 TRAINING = 0.7
 """Share of the samples that a joint's own parameters are fitted to, where the file states none."""
@@ -42,7 +43,7 @@ class _ByFile:
 
     def __init__(self, evidence: Evidence, by_file: Array, k: int) -> None:
         columns = [by_file, evidence.sign[:, k], evidence.qd[:, k]]
-        if not evidence.model.mechanism.parameters[k, DRIVE_INERTIA] > 0:
+        if not evidence.model.mechanism.parameters[k, DRIVE] > 0:
             columns.append(evidence.qdd[:, k])
         design = np.stack(columns, axis=1)
         design = design - design.mean(axis=0)

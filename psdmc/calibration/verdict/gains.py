@@ -8,7 +8,7 @@ import numpy as np
 
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import Evidence
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import DRIVE
 
 VISIBLE_SHARE = 0.05
 """Least ratio of the file's torque, without friction and drive inertia, to the measured torque's variation (RMS) for
@@ -23,7 +23,6 @@ RANK_TOLERANCE = 1e-3
 """Share of the largest singular value below which a direction of scaled columns is noise."""
 FEWEST = 8
 """Samples per unknown of a joint below which its friction is not judged."""
-DRIVE_INERTIA = PARAMETERS_PER_LINK - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +84,7 @@ def _line(evidence: Evidence, by_file: Array, k: int) -> _Line:
 def nuisance(evidence: Evidence, k: int) -> Array:
     """(N, 3 or 4) joint k's Coulomb and viscous friction, offset, and acceleration where the file has no drive inertia."""
     columns = [evidence.sign[:, k], evidence.qd[:, k], np.ones(len(evidence))]
-    drive = evidence.model.mechanism.parameters[k, DRIVE_INERTIA]
+    drive = evidence.model.mechanism.parameters[k, DRIVE]
     if not drive > 0:
         columns.append(evidence.qdd[:, k])
     return np.stack(columns, axis=1)
