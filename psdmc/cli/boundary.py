@@ -10,7 +10,7 @@ import sys
 from psdmc.cli import interrupt
 from psdmc.cli.commands import app, needs_measuring
 from psdmc.cli.one_line import one_line
-from psdmc.errors import InternalError, PsdmcError, ToolchainError
+from psdmc.errors import INTERRUPTED_STATUS, InternalError, PsdmcError, ToolchainError
 
 CLOSED_STATUS = 1
 """Exit status where the reader of the output has closed it (`psdmc show m.npz | head`): nothing failed, but the output
@@ -29,7 +29,7 @@ def run(arguments: list[str] | None = None) -> None:
     except InternalError as error:
         _fail(words, f"internal: {error}", "this is a bug in psdmc: please report it", INTERNAL_STATUS)
     except (KeyboardInterrupt, interrupt.Interrupted):
-        _fail(words, "interrupted", None, interrupt.STATUS)
+        _fail(words, "interrupted", None, INTERRUPTED_STATUS)
     except BrokenPipeError:
         _silence(sys.stdout)
         sys.exit(CLOSED_STATUS)

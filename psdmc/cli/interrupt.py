@@ -9,8 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
-STATUS = 130
-"""Exit status of a process that Ctrl-C ended, as shells define it: 128 + SIGINT."""
+from psdmc.errors import INTERRUPTED_STATUS
 
 
 class Interrupted(BaseException):
@@ -29,7 +28,7 @@ def as_error() -> contextlib.AbstractContextManager[None]:
 
 def _leave(number: int, frame: FrameType | None) -> None:
     os.write(2, b"error: interrupted\n")
-    os._exit(STATUS)
+    os._exit(INTERRUPTED_STATUS)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
