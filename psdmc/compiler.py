@@ -55,6 +55,7 @@ def derive(
     progress: Progress = silent,
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
+    lock: Mapping[str, float] | None = None,
 ) -> DynamicsModel:
     """The certified model (E, P, theta_b) of a robot file: URDF, or DH table in TOML.
 
@@ -67,6 +68,7 @@ def derive(
     progress       called with the name of each step as it begins
     frames         links that kinematic functions are about, in this order; none: the tip, or all ends of a tree
     tool           x y z (m), roll pitch yaw (rad) of one more frame, 'tool', in the tip's
+    lock           joints that are held: their positions by name, rad or m
 
     Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.
     """
@@ -85,6 +87,7 @@ def derive(
         snap=snap,
         frames=frames,
         tool=tool,
+        lock=lock,
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
 

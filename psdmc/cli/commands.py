@@ -96,9 +96,14 @@ def derive(
             metavar="X Y Z R P Y", help="one more such frame, 'tool', in the tip's: m, rad as in URDF"
         ),
     ] = None,
+    lock: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT=VALUE", help="hold a joint there, rad or m; may be given several times"),
+    ] = None,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
+    from psdmc.robot.lock import parsed as parsed_lock
 
     target = output or Path(robot.stem + ".npz")
     check_output(target, robot)
@@ -115,6 +120,7 @@ def derive(
             progress,
             tuple(name.strip() for name in frames.split(",") if name.strip()),
             tool,
+            parsed_lock(lock or ()),
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"

@@ -141,6 +141,8 @@ def _check_options(options: dict[str, Any], n: int) -> None:
     json.number(options.get("snap", 0.0), "the option snap")
     for name in json.entries(options.get("frames", []), "the option frames", MOST_ROWS):
         json.text(name, "the option frames")
+    for value in json.record(options.get("lock", {}), "the option lock").values():
+        json.number(value, "an entry of the option lock")
     if options.get("tool") is not None:
         json.numbers(options["tool"], "the option tool", 6)
 

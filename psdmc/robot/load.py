@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -62,6 +62,7 @@ def load_robot(
     snap: float = DEFAULT_SNAP,
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
+    lock: Mapping[str, float] | None = None,
 ) -> LoadedRobot:
     """The robot in a URDF or DH TOML file (told apart by the suffix .toml). Options as in LoadOptions.
 
@@ -69,7 +70,7 @@ def load_robot(
     """
     file = Path(path)
     text = robot_text(file)
-    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool)
+    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock)
     return _loaded(text, "dh" if file.suffix.lower() == ".toml" else "urdf", file.name, options)
 
 
@@ -86,10 +87,11 @@ def load_robot_text(
     snap: float = DEFAULT_SNAP,
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
+    lock: Mapping[str, float] | None = None,
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
-    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool)
+    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock)
     return _loaded(text, source_format, source_name, options)
 
 
@@ -127,9 +129,13 @@ def robot_text(file: Path) -> str:
 def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> Draft:
     gravity = None if options.gravity is None else np.array(options.gravity)
     if source_format == "urdf":
-        return urdf_draft(text, source, options.base, options.tip, gravity, options.snap, options.frames)
+        return urdf_draft(
+            text, source, options.base, options.tip, gravity, options.snap, options.frames, options.lock
+        )
     if options.base is not None or options.tip is not None:
         raise InputError(f"{source}: --base and --tip name links of a URDF", "leave them out for a DH table")
+    if options.lock:
+        raise InputError(f"{source}: --lock holds joints of a URDF", "leave it out for a DH table")
     return dh_draft(text, source, gravity, options.snap, options.frames)
 
 

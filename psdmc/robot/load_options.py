@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from psdmc.errors import InputError
@@ -29,6 +29,7 @@ class LoadOptions:
     snap           rad; 0 keeps the file's rotations but for floating-point noise
     frames         names of the links that kinematic functions are about; empty: the tip
     tool           x y z (m), roll pitch yaw (rad) of a further frame 'tool' in the tip frame; None: no such frame
+    lock           joints of a URDF that are held: positions by name, rad or m
     """
 
     base: str | None = None
@@ -39,12 +40,15 @@ class LoadOptions:
     snap: float = DEFAULT_SNAP
     frames: tuple[str, ...] = ()
     tool: tuple[float, ...] | None = None
+    lock: dict[str, float] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """Keyword arguments of load_robot_text as plain JSON values. Frames are included only where there are any, so
         that models without them keep the hash of earlier versions."""
         plain = asdict(self)
-        return {name: value for name, value in plain.items() if name not in ("frames", "tool") or value}
+        return {
+            name: value for name, value in plain.items() if name not in ("frames", "tool", "lock") or value
+        }
 
 
 def checked_options(
@@ -56,6 +60,7 @@ def checked_options(
     snap: float,
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
+    lock: Mapping[str, float] | None = None,
 ) -> LoadOptions:
     """The options as LoadOptions; InputError names the first that is wrong."""
     for name, value in (("base", base), ("tip", tip)):
@@ -65,7 +70,15 @@ def checked_options(
         raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
     drives = _drive_inertia(drive_inertia)
     return LoadOptions(
-        base, tip, _gravity(gravity), drives, tuple(assume_zero), _snap(snap), _frames(frames), _tool(tool)
+        base,
+        tip,
+        _gravity(gravity),
+        drives,
+        tuple(assume_zero),
+        _snap(snap),
+        _frames(frames),
+        _tool(tool),
+        _lock(lock),
     )
 
 
@@ -90,6 +103,18 @@ def _tool(tool: Sequence[float] | None) -> tuple[float, ...] | None:
     if faults:
         raise InputError(f"tool: {faults[0]}", "x y z in m")
     return values
+
+
+def _lock(lock: Mapping[str, float] | None) -> dict[str, float]:
+    if lock is None:
+        return {}
+    hint = 'such as {"elbow": 0.5}, in rad or m'
+    if not isinstance(lock, Mapping) or not _all_are_texts(lock):
+        raise InputError(f"lock is {shown(lock)}, expected positions by joint", hint)
+    values = _floats(lock.values())
+    if values is None:
+        raise InputError(f"lock is {shown(dict(lock))}, expected finite positions", hint)
+    return dict(zip(lock, values, strict=True))
 
 
 def _all_are_texts(values: object) -> bool:

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
 
 from psdmc.errors import InputError
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.limits import shown
 from psdmc.robot.urdf import UrdfJoint
+
+
+class Followed(NamedTuple):
+    """The joint that another follows, in the end: q = ratio q_joint + offset."""
+
+    joint: UrdfJoint
+    ratio: float
+    offset: float
+
+    def position(self, q: float) -> float:
+        """Of the follower, where the joint is at q."""
+        return self.ratio * q + self.offset
 
 
 def mimic_coordinates(
@@ -21,17 +34,30 @@ def mimic_coordinates(
     """
     known = {joint.name: joint for joint in every}
     index = {joint.name: i for i, joint in enumerate(movable)}
-    return tuple(
-        Coordinate(i) if joint.mimic is None else _followed(joint, known, index, source)
-        for i, joint in enumerate(movable)
-    )
+    found = []
+    for i, joint in enumerate(movable):
+        if joint.mimic is None:
+            found.append(Coordinate(i))
+            continue
+        leader, ratio, offset = followed(joint, known, source)
+        if leader.name not in index:
+            raise InputError(
+                f"{source}: joint {shown(joint.name)} mimics {shown(leader.name)}, which does not move the chain",
+                "choose another --tip or --base, or none for the whole tree; or hold it with --lock",
+            )
+        found.append(Coordinate(index[leader.name], ratio, offset))
+    return tuple(found)
 
 
-def _followed(
-    joint: UrdfJoint, known: Mapping[str, UrdfJoint], index: Mapping[str, int], source: str
-) -> Coordinate:
+def followed(
+    joint: UrdfJoint, known: Mapping[str, UrdfJoint], source: str, ends: Collection[str] = ()
+) -> Followed:
+    """What a mimic joint follows: the first joint on the way that mimics none, or is among `ends`.
+
+    InputError where it goes round in a ring, or its leader is no movable joint.
+    """
     ratio, offset, here, passed = 1.0, 0.0, joint, [joint.name]
-    while here.mimic is not None:
+    while here.mimic is not None and (here is joint or here.name not in ends):
         ratio, offset = ratio * here.mimic.multiplier, offset + ratio * here.mimic.offset
         leader = here.mimic.joint
         if leader in passed:
@@ -46,9 +72,4 @@ def _followed(
             )
         passed.append(leader)
         here = known[leader]
-    if here.name not in index:
-        raise InputError(
-            f"{source}: joint {shown(joint.name)} mimics {shown(here.name)}, which does not move the chain",
-            "choose another --tip or --base, or none for the whole tree",
-        )
-    return Coordinate(index[here.name], ratio, offset)
+    return Followed(here, ratio, offset)

@@ -3,6 +3,7 @@ Pinocchio's."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
@@ -10,9 +11,11 @@ import numpy as np
 
 from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
+from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import DRIVE, Array
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference import has_assumptions
+from psdmc.robot.urdf import read_urdf
 from psdmc.robot.urdf_chain import STANDARD_GRAVITY
 from psdmc.robot.urdf_words import ATTRIBUTES
 from psdmc.robot.xml_text import parse_xml
@@ -48,19 +51,33 @@ def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Arra
     """
     mujoco = _mujoco()
     model = _model(mujoco, loaded)
-    names = [JOINT_PREFIX + name for name in loaded.mechanism.joint_names]
-    joints = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in names]
-    if -1 in joints or model.nv != len(joints):
+    held = _held(loaded)
+
+    def numbers(names: Iterable[str]) -> list[int]:
+        return [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, JOINT_PREFIX + name) for name in names]
+
+    joints, others = numbers(loaded.mechanism.joint_names), numbers(held)
+    if -1 in [*joints, *others] or model.nv != len(joints) + len(others):
         raise NotCompared("MuJoCo finds other joints")
     places, speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     model.dof_armature[speeds] = loaded.mechanism.parameters[:, DRIVE]
     data = mujoco.MjData(model)
+    data.qpos[model.jnt_qposadr[others]] = list(held.values())
     torques = np.zeros_like(q)
     for k in range(len(q)):
         data.qpos[places], data.qvel[speeds], data.qacc[speeds] = q[k], qd[k], qdd[k]
         mujoco.mj_inverse(model, data)
         torques[k] = data.qfrc_inverse[speeds]
     return torques
+
+
+def _held(loaded: LoadedRobot) -> dict[str, float]:
+    """Joints that are locked elsewhere than at zero: MuJoCo has them, without rates, and their torques are not asked for."""
+    if loaded.source_format != "urdf":
+        return {}
+    robot = read_urdf(loaded.source_text, loaded.source_name)
+    held = held_positions(robot, loaded.options.lock, loaded.source_name)
+    return {name: value for name, value in held.items() if value != 0.0}
 
 
 def _mujoco() -> Any:
@@ -83,7 +100,7 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     dropped = _massless(root)
     if dropped:
         raise NotCompared(f"MuJoCo drops inertia without mass, as link {shown(dropped)} has it")
-    text = dynamics_of(root, loaded.mechanism.joint_names, {})
+    text = dynamics_of(root, [*loaded.mechanism.joint_names, *_held(loaded)], {})
     SubElement(SubElement(text, "mujoco"), "compiler", COMPILER)
     try:
         model = mujoco.MjModel.from_xml_string(tostring(text, encoding="unicode"))

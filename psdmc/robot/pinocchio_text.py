@@ -48,6 +48,18 @@ def pinocchio_model(
         raise InputError(f"{source}: Pinocchio cannot read it: {reason}", "check_urdf may say more") from None
 
 
+def locked_at(model: pinocchio.Model, held: Mapping[str, float]) -> pinocchio.Model:
+    """The model with these joints, called JOINT_PREFIX + name, fixed where they are held; their bodies merged."""
+    if not held:
+        return model
+    q = pinocchio.neutral(model)
+    joints = [model.getJointId(JOINT_PREFIX + name) for name in held]
+    for joint, value in zip(joints, held.values(), strict=True):
+        if model.joints[joint].nq == 1:
+            q[model.joints[joint].idx_q] = value
+    return pinocchio.buildReducedModel(model, joints, q)
+
+
 def dynamics_of(root: Element, movable: Collection[str] | None, kinds: Mapping[str, str]) -> Element:
     """The elements and attributes of a <robot> that carry dynamics, numbers trimmed; arguments as of pinocchio_model."""
     robot = Element("robot", name=root.get("name") or "robot", version=VERSION)

@@ -21,9 +21,11 @@ import pinocchio
 from psdmc.errors import InputError
 from psdmc.robot.dh_textbook import dh_model
 from psdmc.robot.load import LoadedRobot
+from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
+from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
 from psdmc.robot.tool import TOOL
+from psdmc.robot.urdf import read_urdf
 
 
 def reference_model(
@@ -204,6 +206,10 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     """The file as Pinocchio reads it, all but the chain's joints locked at neutral, seen from the base."""
     chain = loaded.mechanism
     whole = pinocchio_model(loaded.source_text, loaded.source_name)
+    held = held_positions(
+        read_urdf(loaded.source_text, loaded.source_name), loaded.options.lock, loaded.source_name
+    )
+    whole = locked_at(whole, held)
     wanted = [JOINT_PREFIX + name for name in chain.joint_names]
     others = [k for k in range(1, whole.njoints) if whole.names[k] not in wanted]
     model = pinocchio.buildReducedModel(whole, others, pinocchio.neutral(whole)) if others else whole

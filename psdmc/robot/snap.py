@@ -114,3 +114,15 @@ def _one_zero(rotation: Array) -> list[Array]:
 def _unit(x: float, y: float) -> tuple[float, float]:
     length = math.hypot(x, y)
     return (x / length, y / length) if length else (1.0, 0.0)
+
+
+def link_rotation(axis: Array) -> Array:
+    """(3, 3) from a link's frame into a joint frame whose z is the unit axis given in the link.
+
+    x is the coordinate axis that is most perpendicular to the joint's axis, made perpendicular: coordinate axes thus
+    give exact signed permutations, and parallel axes parallel frames.
+    """
+    k = int(np.argmin(np.abs(axis)))
+    x = np.eye(3)[k] - axis[k] * axis
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(axis, x), axis]) + 0.0

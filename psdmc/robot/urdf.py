@@ -12,7 +12,7 @@ from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.mechanism import Limits
+from psdmc.robot.mechanism import Limits, Placement
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.urdf_tree import tree_faults
 from psdmc.robot.urdf_words import (
@@ -70,7 +70,8 @@ class Mimic:
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
     """One <joint>. `origin` places the child link in the parent at q = 0; `axis` is in the child; `mimic` is the joint
-    that it follows, if any; `has_dynamics` whether it has friction, damping or a spring."""
+    that it follows, if any; `has_dynamics` whether it has friction, damping or a spring; `held`, of a joint that was
+    locked, where its child is at `origin`."""
 
     name: str
     type: str
@@ -81,6 +82,7 @@ class UrdfJoint:
     limits: Limits
     mimic: Mimic | None
     has_dynamics: bool
+    held: Placement | None = None
 
     @property
     def is_movable(self) -> bool:

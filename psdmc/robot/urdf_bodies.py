@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from psdmc.errors import InputError
 from psdmc.robot.inertia import inertia_matrix, six_of, standard_parameters, without_noise
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.mechanism import Array, Placement
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
+from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
 from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.small import times
 from psdmc.robot.snap import snap_rotation
@@ -29,6 +29,14 @@ def placement_of(origin: Origin, snap: float = 0.0) -> Placement:
     return Placement(snap_rotation(from_quaternion(*origin.quaternion), snap)[0], np.array(origin.xyz))
 
 
+def place_of(joint: UrdfJoint, snap: float = 0.0) -> Placement:
+    """Where a joint puts its child link: at q = 0, or where it is held; turns snapped (rad)."""
+    place = placement_of(joint.origin, snap)
+    if joint.held is None:
+        return place
+    return place @ Placement(snap_rotation(joint.held.rotation, snap)[0], joint.held.translation)
+
+
 def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
     """Ten standard parameters per movable joint, of all that moves with it, about its child link's frame.
 
@@ -43,7 +51,7 @@ def merged_onto(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[Array]:
     moves = {joint.name for joint in movable}
     for joint in robot.joints:
         if joint.name not in moves:
-            below.setdefault(joint.parent, []).append((joint.child, placement_of(joint.origin)))
+            below.setdefault(joint.parent, []).append((joint.child, place_of(joint)))
     return [without_noise(_with_all_below(robot, joint.child, below)) for joint in movable]
 
 
@@ -57,12 +65,17 @@ def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
 
 
 def hold_against_pinocchio(
-    robot: UrdfRobot, route: Route, merged: Sequence[Array], text: str, source: str
+    robot: UrdfRobot,
+    route: Route,
+    merged: Sequence[Array],
+    text: str,
+    source: str,
+    held: Mapping[str, float],
 ) -> None:
     """InputError that names the first link whose body Pinocchio reads or merges differently.
 
     Each link is first compared alone (every joint made a revolute one, so that nothing is merged), then the merged
-    bodies.
+    bodies. `held` are the joints that are locked elsewhere than at neutral.
     """
     alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word))
     for joint in robot.joints:
@@ -71,7 +84,7 @@ def hold_against_pinocchio(
             own, alone.inertias[alone.getJointId(JOINT_PREFIX + joint.name)], joint.child, "the body", source
         )
     movable = [joint.name for joint in route.movable]
-    whole = pinocchio_model(text, source, movable)
+    whole = locked_at(pinocchio_model(text, source, [*movable, *held]), held)
     for joint, own in zip(route.movable, merged, strict=True):
         body = whole.inertias[whole.getJointId(JOINT_PREFIX + joint.name)]
         _compare(own, body, joint.child, "all that moves with it", source)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,18 +11,28 @@ import numpy as np
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.joints import URDF_TYPES
+from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 from psdmc.robot.mimic import mimic_coordinates
 from psdmc.robot.small import times
-from psdmc.robot.snap import ROUNDING, angle_between, snap_axis, snap_rotation, snap_translation
+from psdmc.robot.snap import (
+    ROUNDING,
+    angle_between,
+    link_rotation,
+    snap_axis,
+    snap_rotation,
+    snap_translation,
+)
 from psdmc.robot.tree import Route, find_route, listed
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
-from psdmc.robot.urdf_bodies import hold_against_pinocchio, merged_parameters, placement_of
+from psdmc.robot.urdf_bodies import hold_against_pinocchio, merged_parameters, place_of
 from psdmc.robot.urdf_frames import urdf_frames
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""
+
+NO_LOCK: Mapping[str, float] = {}
 
 
 def urdf_draft(
@@ -33,16 +43,18 @@ def urdf_draft(
     gravity: Array | None,
     snap: float,
     frames: Sequence[str] = (),
+    lock: Mapping[str, float] = NO_LOCK,
 ) -> Draft:
     """The chain from base to tip, or the whole tree (find_route); gravity in the root frame; rotations near exact ones
-    snapped (rad); the links `frames` as named frames, a tree's ends where none are named."""
-    robot = read_urdf(text, source)
+    snapped (rad); the links `frames` as named frames, a tree's ends where none are named; the joints `lock` held."""
+    read = read_urdf(text, source)
+    robot = locked(read, lock, source)
     route = find_route(robot, base, tip, source, frames)
     placed = _placed(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)
     root_gravity = np.array(STANDARD_GRAVITY) if gravity is None else gravity
     bodies = merged_parameters(robot, route)
-    hold_against_pinocchio(robot, route, bodies, text, source)
+    hold_against_pinocchio(robot, route, bodies, text, source, held_positions(read, lock, source))
     bare = [joint.link_name for joint, x in zip(placed.joints, bodies, strict=True) if not x.any()]
     return Draft(
         name=robot.name,
@@ -68,18 +80,6 @@ def urdf_draft(
         tip_body=placed.tip.joint,
         coordinates=mimic_coordinates(route.movable, robot.joints, source),
     )
-
-
-def link_rotation(axis: Array) -> Array:
-    """(3, 3) from a link's frame into a joint frame whose z is the unit axis given in the link.
-
-    x is the coordinate axis that is most perpendicular to the joint's axis, made perpendicular: coordinate axes thus
-    give exact signed permutations, and parallel axes parallel frames.
-    """
-    k = int(np.argmin(np.abs(axis)))
-    x = np.eye(3)[k] - axis[k] * axis
-    x /= np.linalg.norm(x)
-    return np.array([x, np.cross(axis, x), axis]) + 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,7 +161,7 @@ def _base_rotation(route: Route, snap: float) -> tuple[Array, list[Snap]]:
 
 def _origin(joint: UrdfJoint, snap: float, snaps: list[Snap], segment: int) -> Placement:
     """Where the child link's frame sits in the parent's at q = 0."""
-    place, unsnapped = placement_of(joint.origin, snap), placement_of(joint.origin)
+    place, unsnapped = place_of(joint, snap), place_of(joint)
     _record(snaps, f"joint '{joint.name}'", angle_between(place.rotation, unsnapped.rotation), segment)
     return place
 

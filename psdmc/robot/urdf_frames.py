@@ -9,7 +9,7 @@ from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Joint, NamedFrame
 from psdmc.robot.tree import Route, listed
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot
-from psdmc.robot.urdf_bodies import placement_of
+from psdmc.robot.urdf_bodies import place_of
 
 
 def urdf_frames(
@@ -55,7 +55,7 @@ def _placed(
     number = carriers[carrier.name]
     place = joints[number].link_frame
     for joint in fixed:
-        place = place @ placement_of(joint.origin)
+        place = place @ place_of(joint)
     return NamedFrame(name, number, place)
 
 

@@ -1,0 +1,94 @@
+"""Joints of a URDF that are held at a position: fixed ones, as far as everybody after this is concerned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from psdmc.errors import InputError
+from psdmc.robot.joints import URDF_TYPES
+from psdmc.robot.limits import shown
+from psdmc.robot.mimic import followed
+from psdmc.robot.placement import Placement
+from psdmc.robot.snap import link_rotation, snap_axis
+from psdmc.robot.tree import listed
+from psdmc.robot.urdf import UrdfJoint, UrdfRobot
+
+
+def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> dict[str, float]:
+    """Where each joint that does not move is held, rad or m: those in `lock`, those that follow one of them, and those that
+    follow a joint with a multiplier of zero.
+
+    InputError where `lock` names no movable joint, or a position that a joint does not have.
+    """
+    known = {joint.name: joint for joint in robot.joints}
+    movable = [joint.name for joint in robot.joints if joint.is_movable]
+    for name, value in lock.items():
+        if name not in movable:
+            what = "is fixed already" if name in known else "does not exist"
+            raise InputError(
+                f"{source}: joint {shown(name)}, to be locked, {what}", f"movable joints: {listed(movable)}"
+            )
+        if known[name].type not in URDF_TYPES and value != 0.0:
+            raise InputError(
+                f"{source}: joint {shown(name)} of type {shown(known[name].type)} is locked at {value:g}",
+                "such joints are locked where they are in the file: at 0",
+            )
+    found = dict(lock)
+    for joint in robot.joints:
+        if joint.mimic is None or joint.name in lock or not joint.is_movable:
+            continue
+        leader = followed(joint, known, source, lock)
+        if leader.joint.name in lock or leader.ratio == 0.0:
+            found[joint.name] = leader.position(lock.get(leader.joint.name, 0.0))
+    return found
+
+
+def locked(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> UrdfRobot:
+    """The robot with these joints fixed where they are held, and a note of each."""
+    held = held_positions(robot, lock, source)
+    if not held:
+        return robot
+    notes = [_note(joint, held[joint.name]) for joint in robot.joints if joint.name in held]
+    joints = tuple(
+        replace(joint, type="fixed", mimic=None, held=_moved(joint, held[joint.name]))
+        if joint.name in held
+        else joint
+        for joint in robot.joints
+    )
+    return replace(robot, joints=joints, notes=(*robot.notes, *notes))
+
+
+def _note(joint: UrdfJoint, value: float) -> str:
+    limits = joint.limits
+    beyond = "" if limits.lower <= value <= limits.upper else ", beyond its limits"
+    return f"joint '{joint.name}' is locked at {value:g}{beyond}"
+
+
+def _moved(joint: UrdfJoint, value: float) -> Placement:
+    """Where the child link is in the joint's frame of the file; where it sits at zero if its type has no one position."""
+    if joint.type not in URDF_TYPES:
+        return Placement.identity()
+    axis = Placement(link_rotation(snap_axis(np.array(joint.axis), 0.0)[0]), np.zeros(3))
+    return axis.inverse() @ URDF_TYPES[joint.type].transform(value) @ axis
+
+
+def parsed(texts: Sequence[str]) -> dict[str, float]:
+    """Positions by joint from texts such as "elbow=0.5" (rad or m), as the command line has them."""
+    found: dict[str, float] = {}
+    for text in texts:
+        name, equals, value = text.rpartition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = np.nan
+        if not equals or not name or not np.isfinite(number):
+            raise InputError(
+                f"--lock {shown(text)} is no JOINT=VALUE", "such as --lock elbow=0.5, in rad or m"
+            )
+        if name in found:
+            raise InputError(f"--lock names joint {shown(name)} twice", "name each once")
+        found[name] = number
+    return found
