@@ -160,5 +160,6 @@ class _Lowered:
                 baked,
                 geometry=self.geometry,
                 costs=self.costs,
+                known=self.model.theta_b,
             )
         return self._searches[theta]

@@ -15,6 +15,7 @@ from itertools import product
 import numpy as np
 
 from psdmc.dynamics.motion import Choices
+from psdmc.lower.accuracy import LIMIT, Accuracy
 from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS
 from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
 from psdmc.lower.geometry import Geometry
@@ -92,17 +93,41 @@ class Search:
         budget: int = BUDGET,
         geometry: Geometry | None = None,
         costs: Costs = COSTS,
+        known: Array | None = None,
     ) -> None:
         sizes = Sizes.of_chain(len(chain), representative.shape[1], len(chain.frames))
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
         self.budget = budget
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
+        known = theta_b if known is None else known
+        self._accuracy = None if known is None else Accuracy(self.robot, known)
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function. `start` is one found for another function, whose geometry is
-        kept."""
-        descent = _Descent(lambda a: scoring.weight(cost_of_dynamics(recipe, a, self.robot)), self.budget)
+        kept. Where the cheapest is not accurate enough, the search is made again among those that are."""
+        found = self._descended(recipe, scoring, start)
+        accuracy = self._accuracy
+        if accuracy is None or accuracy.error(found) <= LIMIT:
+            return found
+        firsts = [start] if start else [next(self.starts(feet)) for feet in self.geometry.feet]
+        return self._descended(recipe, scoring, start, min(firsts, key=accuracy.error))
+
+    def _descended(
+        self,
+        recipe: Recipe,
+        scoring: Scoring,
+        start: Arrangement | None,
+        accurate: Arrangement | None = None,
+    ) -> Arrangement:
+        """The end of the descent; from `accurate` on, if given, by candidates as accurate as LIMIT or as this one."""
+        descent = _Descent(
+            lambda a: scoring.weight(cost_of_dynamics(recipe, a, self.robot)),
+            self.budget,
+            self._admits(accurate),
+        )
+        if accurate is not None:
+            descent.consider(iter([accurate]))
         if start is not None:
             descent.consider(replace(start, choices=choices) for choices in distinct(recipe, CHOICES))
         else:
@@ -112,6 +137,13 @@ class Search:
         while descent.consider(self._exchanges(descent.arrangement)):
             pass
         return descent.arrangement
+
+    def _admits(self, accurate: Arrangement | None) -> Callable[[Arrangement], bool]:
+        accuracy = self._accuracy
+        if accuracy is None or accurate is None:
+            return lambda arrangement: True
+        limit = max(LIMIT, accuracy.error(accurate))
+        return lambda arrangement: accuracy.error(arrangement) <= limit
 
     def rearranged(self, recipe: Recipe, found: Arrangement, scoring: Scoring) -> Program:
         """The PROGRAM of a function in an arrangement that was found for another function or target. Only the choices
@@ -166,8 +198,14 @@ class _Descent:
 
     arrangement: Arrangement
 
-    def __init__(self, score: Callable[[Arrangement], float], budget: int) -> None:
+    def __init__(
+        self,
+        score: Callable[[Arrangement], float],
+        budget: int,
+        is_admitted: Callable[[Arrangement], bool],
+    ) -> None:
         self._score_of, self._left, self._score = score, budget, math.inf
+        self._is_admitted = is_admitted
 
     def consider(self, candidates: Iterator[Arrangement]) -> bool:
         """Try candidates in order, moving to each that is cheaper. Returns whether any was."""
@@ -177,6 +215,6 @@ class _Descent:
                 return False
             self._left -= 1
             score = self._score_of(candidate)
-            if score < self._score:
+            if score < self._score and self._is_admitted(candidate):
                 self.arrangement, self._score, improved = candidate, score, True
         return improved
