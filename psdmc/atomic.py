@@ -141,7 +141,7 @@ def _locked_new_file(target: Path) -> tuple[int, Path]:
         lock(handle)
         if sys.platform == "win32" or os.fstat(handle).st_nlink:
             return handle, own
-        os.close(handle)  # somebody took it for a leftover before it was locked
+        os.close(handle)  # another process removed it as a leftover before it was locked
 
 
 def lock(handle: int, wait: bool = True) -> bool:

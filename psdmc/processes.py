@@ -72,9 +72,8 @@ def _noted(heard: list[int]) -> Iterator[None]:
     """Append Ctrl-C to `heard` where it reaches another thread of this process, as this one blocks it."""
     is_main = threading.current_thread() is threading.main_thread()
     is_pythons = signal.getsignal(signal.SIGINT) is not None
-    if not (
-        is_main and is_pythons
-    ):  # only the main thread may set a handler, and only Python's can be set again
+    # Only the main thread may set a handler, and a handler that is not Python's could not be set again.
+    if not (is_main and is_pythons):
         yield
         return
     handler = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))

@@ -36,7 +36,7 @@ def derive_fresh(chain: Mechanism) -> Derivation:
 
 def measured_derivation(chain: Mechanism) -> Derivation:
     """Time a warm derivation in this process, and read the process's peak of memory."""
-    derive_model(chain, expand=False)  # imports and first calls are not what is measured
+    derive_model(chain, expand=False)  # imports and first calls are not measured
     start = time.perf_counter()
     try:
         model = derive_model(chain)
@@ -49,7 +49,7 @@ def measured_derivation(chain: Mechanism) -> Derivation:
 def _peak_bytes() -> int | None:
     if sys.platform == "win32":
         return None
-    if STATUS.is_file():  # Linux carries ru_maxrss over from the parent, this not
+    if STATUS.is_file():  # Linux inherits ru_maxrss from the parent, but not this
         kibibytes = next(
             line.split()[1] for line in STATUS.read_text().splitlines() if line.startswith("VmHWM")
         )

@@ -58,7 +58,8 @@ class Tracer:
 
     def constant(self, value: float) -> Symbol:
         """A constant; its sign is kept beside it."""
-        number = float(value)  # of NumPy's too: signs are told apart by identity, which its booleans lack
+        # A Python number even where it is NumPy's: signs are compared by identity, which fails for its booleans.
+        number = float(value)
         return Symbol(self, self.magnitude(abs(number)), number < 0)
 
     def magnitude(self, value: float) -> int:
@@ -237,7 +238,7 @@ def _scaled(a: Symbol, factor: Number) -> Symbol | float:
             inner = constants.get(this)
             if inner is not None:
                 return Symbol(tracer, rest, a.negative) * (inner * factor)
-    number = float(factor)  # of NumPy's too, as in `constant`
+    number = float(factor)  # also NumPy's numbers, as in `constant`
     constant = tracer.magnitude(abs(number))
     step = (_MUL, index, constant) if index < constant else (_MUL, constant, index)
     return Symbol(tracer, tracer.record(step), a.negative is not (number < 0))

@@ -98,6 +98,6 @@ def _body(link: Mapping[str, Any]) -> pinocchio.Inertia:
     about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     about_frame = about_com + mass * (com @ com * np.eye(3) - np.outer(com, com))
     entries = about_frame[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
-    # Pinocchio divides by the mass: without any, the smallest one stands in.
+    # Pinocchio divides by the mass: a body without any gets the smallest one.
     divisor = mass or float(np.finfo(float).tiny)
     return pinocchio.Inertia.FromDynamicParameters(np.array([divisor, *(mass * com), *entries]))

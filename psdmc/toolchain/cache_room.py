@@ -81,7 +81,8 @@ def new_folder(place: Path) -> tuple[int, Path]:
     while True:
         own = place / f".build-{secrets.token_hex(8)}"
         own.mkdir(mode=0o700)
-        with contextlib.suppress(FileNotFoundError):  # taken for a dead one before it was locked
+        # Another process may remove it as a leftover before it is locked.
+        with contextlib.suppress(FileNotFoundError):
             handle = _opened(own)
             lock(handle)
             if own.is_dir():

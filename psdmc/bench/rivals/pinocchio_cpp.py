@@ -104,8 +104,8 @@ def compiled(way: Way, flags: tuple[str, ...]) -> Path:
     """The shared library around Pinocchio's algorithms; ToolchainError says what is missing."""
     prefix = pinocchio_prefix()
     link = _library_flags(prefix) if way == "library" else ()
-    # The shipped library is plain x86-64, and Eigen's alignment follows the instruction set: the two never mix.
-    # What is good for psdmc's scalars (GCC_ONLY) would take a sixth off Eigen's speed.
+    # The shipped library is plain x86-64, and Eigen's alignment follows the instruction set: they cannot be mixed.
+    # Flags for psdmc's scalar code (GCC_ONLY) would slow Eigen by a sixth.
     machine = tuple(flag.partition("=")[0] for flag in NATIVE.host_flags)
     left_out = GCC_ONLY if way == "header-only" else (*GCC_ONLY, *machine)
     used = tuple(flag for flag in flags if not flag.startswith(left_out))

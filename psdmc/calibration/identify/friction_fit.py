@@ -259,7 +259,7 @@ def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptio
     covariance = turn @ spread @ turn.T
     relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction.as_array()), 1e-12)
     unseen = [PARAMETERS[j] for j in range(7) if not relative[j] < options.unseen]
-    no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: nothing hangs on v_s
+    no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: v_s has no effect
     if no_peak and "stribeck_velocity" not in unseen and options.law == "lugre":
         unseen.append("stribeck_velocity")
     return JointFriction(name, friction, covariance, tuple(unseen), float(p[7]), float(p[8]), float(p[9]))

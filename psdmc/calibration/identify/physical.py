@@ -129,7 +129,7 @@ def _nearest(
         constraints.append(extra[held] >= -values[l:][held] / size[held])
     settle = SETTLING * cp.sum_squares(inner - _known_inner(model))
     problem = cp.Problem(cp.Minimize(loss + settle + divergence), constraints)
-    with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; what matters is checked below
+    with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; the result is checked below
         warnings.simplefilter("ignore", UserWarning)
         try:
             problem.solve(solver=cp.CLARABEL)

@@ -246,9 +246,8 @@ class _Space:
     def coefficients(self, candidates: Array) -> tuple[Array, Array, Array]:
         """centre (c, n), sine and cosine (c, n, h), each joint scaled to a share of its first limit."""
         shaped = candidates.reshape(len(candidates), self.n, 2 * self.h + 2)
-        order = 1.0 / np.array(
-            self.options.harmonics
-        )  # equal weights would leave all room to the fastest sine
+        # With equal weights the fastest sine would use up the limits.
+        order = 1.0 / np.array(self.options.harmonics)
         sine, cosine = shaped[..., : self.h] * order, shaped[..., self.h : 2 * self.h] * order
         q, qd, qdd = (sine @ s + cosine @ c for s, c in self.basis)
         high, low = q.max(axis=-1), q.min(axis=-1)

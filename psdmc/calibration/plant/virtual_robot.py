@@ -197,7 +197,7 @@ def _friction(joint: JointTruth, trajectory: Trajectory, k: int, delay: float) -
         return [[-abs(v) / joint.bristle_limit(v)]]
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ODEintWarning)  # told below, with the joint's name
+        warnings.simplefilter("ignore", ODEintWarning)  # raised below, with the joint's name
         bend, told = odeint(
             bend_rate,
             [0.0],
