@@ -11,7 +11,7 @@ toolchain    PackageView                                shared library with its 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ from psdmc.errors import InputError
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.progress import Progress, silent
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.target.native import NATIVE
 from psdmc.target.presets import preset
@@ -35,12 +36,6 @@ from psdmc.toolchain.kept_libraries import compiled_once
 
 if TYPE_CHECKING:
     from psdmc.robot.load import LoadedRobot
-
-Progress = Callable[[str], None]
-
-
-def silent(step: str) -> None:
-    """Ignore progress: the default of the functions below."""
 
 
 def derive(

@@ -89,7 +89,7 @@ ROOMS = {
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
-SHARED = {"errors", "version", "atomic", "processes"}
+SHARED = {"errors", "version", "atomic", "processes", "progress"}
 ENTRY_POINTS = {"__init__", "__main__"}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.model.random_states import random_states
+from psdmc.progress import Progress
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.verification.check import source_of
@@ -30,8 +31,6 @@ SETTINGS = Settings(rounds=3, rivals=(OURS, THEIRS), functions=FUNCTIONS)
 
 STATES = 1000
 SEED = 2021
-
-Progress = Callable[[str], None]
 
 
 def demo(model: DynamicsModel, progress: Progress) -> str:

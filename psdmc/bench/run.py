@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psdmc.bench.agree import CHECKED, disagreement, tolerance
@@ -16,6 +16,7 @@ from psdmc.bench.rivals import EVERYONE, Entrant, psdmc_c
 from psdmc.bench.states import COUNT, States
 from psdmc.bench.threads import measure_threads
 from psdmc.bench.versions import versions
+from psdmc.progress import Progress, silent
 
 SEED = 20_260
 ROUNDS = 10
@@ -25,8 +26,6 @@ SCALED = psdmc_c.EXPANDED
 SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")
 SCALED_ROUNDS = 3
 """Trials of what is shown against the number of joints."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +53,10 @@ class Settings:
         return tuple(e for e in EVERYONE if self.rivals is None or e.name in self.rivals)
 
 
-def _silent(message: str) -> None:
-    del message
-
-
 def run(
     cases: Sequence[Case],
     settings: Settings = Settings(),
-    progress: Progress = _silent,
+    progress: Progress = silent,
     scaling: Sequence[Case] = (),
 ) -> BenchResult:
     """Measure every case. Rivals that cannot be built are listed with the reason; wrong ones are not timed.

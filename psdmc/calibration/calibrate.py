@@ -29,8 +29,7 @@ from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.calibration.verdict.verdict_on import with_verdict_on_campaign, with_verdict_on_logs
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-
-Progress = Callable[[str], None]
+from psdmc.progress import Progress
 
 
 @dataclass(frozen=True, slots=True)

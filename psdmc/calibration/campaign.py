@@ -35,9 +35,9 @@ from psdmc.calibration.motions.sweeps import (
 )
 from psdmc.calibration.motions.trajectory import Trajectory, sliding_joints, write_trajectory
 from psdmc.errors import InputError
+from psdmc.progress import Progress
 from psdmc.robot.mechanism import Mechanism
 
-Progress = Callable[[str], None]
 LARGEST_ACCELERATION = 1e6
 """rad/s^2 or m/s^2: above any joint's."""
 

@@ -15,7 +15,6 @@ from psdmc.derivation.expand import (
     EXTENDED,
     FINEST,
     Precision,
-    Progress,
     can_be_finest,
     expand,
     precision_for,
@@ -28,6 +27,7 @@ from psdmc.derivation.sampled import reduction_of
 from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 from psdmc.robot.small import times
@@ -69,7 +69,7 @@ def derive_model(
     memory or time, the robot has more joints than LARGEST_CHAIN, its numbers are beyond double precision, or no parameter
     has any effect.
     """
-    tell = progress or _silent
+    tell = progress or silent
     require_derivable(chain)
     _refuse_absurd(chain)
     if expand is None:
@@ -124,10 +124,6 @@ def _refuse_absurd(chain: Mechanism) -> None:
             f"{SIZES[0]:g} to {SIZES[1]:g}",
             "check the units of lengths: they are metres",
         )
-
-
-def _silent(step: str) -> None:
-    """Progress that is not shown."""
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

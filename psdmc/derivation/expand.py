@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,9 +30,9 @@ from psdmc.derivation.velocity import acceleration_terms, velocity_terms
 from psdmc.dynamics.kinematics import carried_by
 from psdmc.dynamics.scalar import Vector
 from psdmc.model.expansion import Expansion
+from psdmc.progress import Progress
 
 Array = NDArray[np.float64]
-Progress = Callable[[str], None]
 
 COEFFICIENT_TOLERANCE = 1e-12
 """Coefficients below this are zero, lengths in the robot's unit (units.py). Six joints with oblique axes have the same

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from psdmc.atomic import write_together, write_whole
@@ -26,14 +26,9 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.model.store import save
+from psdmc.progress import Progress, silent
 from psdmc.report.calibrate_plots import excitation_figure
 from psdmc.report.calibrate_report import write_report
-
-Progress = Callable[[str], None]
-
-
-def silent(step: str) -> None:
-    """Ignore progress: the default of the functions below."""
 
 
 def excite_command(

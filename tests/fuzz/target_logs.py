@@ -13,6 +13,7 @@ from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.motions.trajectory import read_trajectory
+from psdmc.progress import silent
 
 CUTOFF = 5.0
 """Hz"""
@@ -66,7 +67,3 @@ def _used(log: Log, deep: bool) -> None:
     if deep:
         constants = dict.fromkeys(model.joint_names, 2.0)
         calibrate_logs(model, [log], CalibrateOptions(), ChainRegressor(model), constants, silent)
-
-
-def silent(step: str) -> None:
-    """Nobody listens."""

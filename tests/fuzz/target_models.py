@@ -13,6 +13,7 @@ from psdmc.cli.show import print_model
 from psdmc.emit.package import package_files
 from psdmc.model.load import load
 from psdmc.model.store import file_bytes
+from psdmc.progress import silent
 from psdmc.verification.check import check_model
 
 
@@ -27,6 +28,4 @@ def model(data: bytes, folder: Path, deep: bool) -> None:
     if deep:
         file_bytes(found)
         check_model(found)
-        package_files(
-            compiler._package(found, "auto", ["gravity"], compiler.EmitOptions(), None, compiler.silent)
-        )
+        package_files(compiler._package(found, "auto", ["gravity"], compiler.EmitOptions(), None, silent))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +24,8 @@ from psdmc.calibration.identify.steps import (
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.errors import InputError
+from psdmc.progress import Progress
 from psdmc.robot.mechanism import Mechanism
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

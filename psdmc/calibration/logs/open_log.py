@@ -17,10 +17,10 @@ from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
 from psdmc.calibration.logs.table_limits import LARGEST_STORED_ROWS
 from psdmc.calibration.logs.table_pieces import PIECES
 from psdmc.errors import InputError
+from psdmc.progress import Progress
 
 SMALL_FILE = 64 * 1024**2
 """Bytes of a table that is read at once."""
-Progress = Callable[[str], None]
 
 
 def open_log(path: str | Path, progress: Progress = lambda step: None, held: int = HELD_BYTES) -> AnyLog:
