@@ -19,11 +19,13 @@ import jinja2.compiler
 from jinja2.bccache import Bucket, BytecodeCache
 
 SEAL = hashlib.sha256().digest_size
-"""Bytes in front of the code: of it and of all that it was made from. What was altered or cut short is made anew."""
+"""Bytes before the code: a digest of the code and of all that it was made from. Code that was altered or cut short is
+made again."""
 
 
 class CodeBesideTemplates(BytecodeCache):
-    """Where Jinja looks for a template's code before it compiles it, and leaves it afterwards."""
+    """The store in which Jinja looks for a template's code before it compiles it, and into which it puts the code
+    afterwards."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -41,7 +43,7 @@ class CodeBesideTemplates(BytecodeCache):
                 bucket.code = marshal.loads(code)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep the template's code, where Python would keep a module's; nothing where it may not be written."""
+        """Keep the template's code where Python would keep a module's; do nothing where that cannot be written."""
         if sys.dont_write_bytecode:
             return
         code = marshal.dumps(bucket.code)
@@ -69,6 +71,6 @@ def _seal(bucket: Bucket, code: bytes) -> bytes:
 
 @cache
 def _jinja() -> tuple[int, int]:
-    """What tells one installed Jinja from another without reading its metadata: size and time of its compiler's file."""
+    """Size and time of Jinja's compiler file, which distinguish installed versions without reading their metadata."""
     found = os.stat(jinja2.compiler.__file__)
     return found.st_size, found.st_mtime_ns

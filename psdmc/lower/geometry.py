@@ -1,4 +1,4 @@
-"""A model's frames by where they sit on their axes, and what can carry the model there: found once, for all searches."""
+"""Frames of a model by where they sit on their axes, and the carriers there: computed once, for all searches."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from psdmc.robot.mechanism import Array, Mechanism
 
 
 class Geometry:
-    """What does not depend on the function that is lowered, nor on whether theta_b is compiled in."""
+    """The geometry of one model, which does not depend on the function that is lowered, nor on whether theta_b is
+    compiled in."""
 
     def __init__(self, chain: Mechanism, representative: Array) -> None:
         self.chain, self.representative = chain, representative
@@ -35,15 +36,15 @@ class Geometry:
         return self._reframed[feet]
 
     def space(self, reframed: Reframed) -> CarrierSpace:
-        """What can carry the model in frames that are given here."""
+        """The sets of link parameters that can carry the model in these frames."""
         if reframed not in self._spaces:
             self._spaces[reframed] = carrier_space(reframed, self.representative)
         return self._spaces[reframed]
 
 
 def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
-    """Where frames may sit: all on the normal to the axis before, then one at a time on the next, then all of them. A leaf
-    has no next."""
+    """Where frames may sit: all on the normal to the axis before, then each single one on the next, then all on the
+    next. A leaf has no next axis."""
     n, leaves = len(chain), chain.leaves
     for moved in [(), *((i,) for i in range(n) if i not in leaves), tuple(range(n))]:
         yield tuple("next" if i in moved else "previous" for i in range(n))

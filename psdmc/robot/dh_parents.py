@@ -1,4 +1,4 @@
-"""What each row of a DH table hangs on: the row before, unless it names another."""
+"""The parent of each row of a DH table: the row before, unless the row names another."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BASE
 
 BASE_NAME = "base"
-"""What `parent` calls the base, as messages and frames do."""
+"""The name of the base in `parent`, as in messages and frames."""
 
 
 def parents_of(names: Sequence[str], given: Sequence[object]) -> tuple[tuple[int, ...], list[str]]:
-    """Each row's parent, counted from 0, or BASE; and what is wrong, one sentence each.
+    """Each row's parent, counted from 0, or BASE; and faults, one sentence each.
 
     names   of the rows' joints
     given   each row's `parent` as the file has it: the name of a joint, or "base"; None: the row before
 
-    A branch's rows stand together: a row hangs on the one before it, or on one that carries that.
+    The rows of a branch stand together: a row's parent is the row before it, or one that carries that row.
     """
     parents: list[int] = []
     faults: list[str] = []
@@ -46,7 +46,7 @@ def _row(names: Sequence[str], parent: object) -> int | None:
 
 
 def _carriers(parents: Sequence[int], row: int) -> list[int]:
-    """A row and those that carry it, from the base outward."""
+    """A row and the rows that carry it, from the base outward."""
     found: list[int] = []
     while row != BASE:
         found.append(row)

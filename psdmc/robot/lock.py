@@ -1,4 +1,4 @@
-"""Joints of a URDF that are held at a position: fixed ones, as far as everybody after this is concerned."""
+"""Joints of a URDF that are held at a position: later stages see them as fixed ones."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from psdmc.robot.urdf import UrdfJoint, UrdfRobot
 
 
 def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> dict[str, float]:
-    """Where each joint that does not move is held, rad or m: those in `lock`, those that follow one of them, and those that
-    follow a joint with a multiplier of zero.
+    """The position, rad or m, of each joint that is held: those in `lock`, those that follow one of them, and those
+    that follow a joint with a multiplier of zero.
 
-    InputError where `lock` names no movable joint, or a position that a joint does not have.
+    InputError where `lock` names no movable joint, or a position that a joint cannot have.
     """
     known = {joint.name: joint for joint in robot.joints}
     movable = [joint.name for joint in robot.joints if joint.is_movable]
@@ -47,7 +47,7 @@ def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> 
 
 
 def locked(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> UrdfRobot:
-    """The robot with these joints fixed where they are held, and a note of each."""
+    """The robot with these joints fixed at their positions, and a note for each."""
     held = held_positions(robot, lock, source)
     if not held:
         return robot
@@ -68,7 +68,8 @@ def _note(joint: UrdfJoint, value: float) -> str:
 
 
 def _moved(joint: UrdfJoint, value: float) -> Placement:
-    """Where the child link is in the joint's frame of the file; where it sits at zero if its type has no one position."""
+    """The placement of the child link in the file's joint frame; that at zero where the joint's type has no single
+    position."""
     if joint.type not in URDF_TYPES:
         return Placement.identity()
     axis = Placement(link_rotation(snap_axis(np.array(joint.axis), 0.0)[0]), np.zeros(3))
@@ -76,7 +77,7 @@ def _moved(joint: UrdfJoint, value: float) -> Placement:
 
 
 def parsed(texts: Sequence[str]) -> dict[str, float]:
-    """Positions by joint from texts such as "elbow=0.5" (rad or m), as the command line has them."""
+    """Positions by joint from texts of the command line such as "elbow=0.5" (rad or m)."""
     found: dict[str, float] = {}
     for text in texts:
         name, equals, value = text.rpartition("=")

@@ -1,4 +1,4 @@
-"""Mimic joints of a URDF as coordinates: q = ratio q_leader + offset, the leader's coordinate its own."""
+"""Mimic joints of a URDF as coordinates: q = ratio q_leader + offset; a leader has a coordinate of its own."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from psdmc.robot.urdf import UrdfJoint
 
 
 class Followed(NamedTuple):
-    """The joint that another follows, in the end: q = ratio q_joint + offset."""
+    """The joint that another one follows, directly or through others: q = ratio q_joint + offset."""
 
     joint: UrdfJoint
     ratio: float
     offset: float
 
     def position(self, q: float) -> float:
-        """Of the follower, where the joint is at q."""
+        """Position of the follower, for position q of the joint."""
         return self.ratio * q + self.offset
 
 
 def mimic_coordinates(
     movable: Sequence[UrdfJoint], every: Sequence[UrdfJoint], source: str
 ) -> tuple[Coordinate, ...]:
-    """Each movable joint's coordinate; one that follows a follower has the first leader's.
+    """Each movable joint's coordinate; a joint that follows a follower gets the first leader's.
 
     movable  the robot's joints, in order
     every    all joints of the file
-    InputError names followers that go round in a ring, and leaders that are no joints of the robot.
+
+    InputError names followers that form a ring, and leaders that are not joints of the robot.
     """
     known = {joint.name: joint for joint in every}
     index = {joint.name: i for i, joint in enumerate(movable)}
@@ -54,7 +55,7 @@ def followed(
 ) -> Followed:
     """What a mimic joint follows: the first joint on the way that mimics none, or is among `ends`.
 
-    InputError where it goes round in a ring, or its leader is no movable joint.
+    InputError where the joints form a ring, or its leader is no movable joint.
     """
     ratio, offset, here, passed = 1.0, 0.0, joint, [joint.name]
     while here.mimic is not None and (here is joint or here.name not in ends):
