@@ -11,6 +11,7 @@ from random_chains import random_chain
 
 from psdmc.derivation.derive import derive_model
 from psdmc.model.equations import base_parameters, dh_lengths, standard_name
+from psdmc.robot.mechanism import Mechanism
 
 
 def equations(name: str) -> list[str]:
@@ -99,4 +100,11 @@ def test_lengths_whose_squares_are_no_doubles_have_no_name() -> None:
     short = replace(chain.joints[0].link_frame, translation=np.array([1e-200, 0.0, -0.3]))
     found = replace(chain, joints=(replace(chain.joints[0], link_frame=short), *chain.joints[1:]))
     l = 11 * len(chain)
-    base_parameters(found, np.eye(l), range(l), None)
+
+    def first_equation(robot: Mechanism, length: float) -> str:
+        B = np.eye(l)
+        B[0, 1] = 1.0 / length
+        return base_parameters(robot, B, range(l), None)[0].equation
+
+    assert first_equation(chain, 1.2) == "m1 + mx1/a1"
+    assert first_equation(found, 1e-200) == "m1 + 1e+200 mx1"

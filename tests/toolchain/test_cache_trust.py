@@ -51,10 +51,12 @@ def test_the_folder_is_made_for_this_user_alone(cache: Path) -> None:
 def test_an_entry_is_for_this_user_alone_under_any_umask(cache: Path) -> None:
     before = os.umask(0)
     try:
-        found()
+        assert found() == "ours"
     finally:
         os.umask(before)
-    for path in (cache, *cache.rglob("*")):
+    written = list(cache.rglob("*"))
+    assert "library.so" in [path.name for path in written]
+    for path in (cache, *written):
         assert not path.stat().st_mode & 0o022, path
 
 

@@ -20,8 +20,15 @@ def evidence(arm, log, theta_b=None) -> Evidence:
     return evidence_of(model, arm.regressor, [Motion(log)], Motors.torques(2), FilterOptions(cutoff=8.0))
 
 
+def gains(found: Evidence) -> list[Gain]:
+    """One per joint of the arm."""
+    each = list(joint_gains(found))
+    assert len(each) == 2
+    return each
+
+
 def test_a_file_that_is_right_has_a_gain_of_one(arm, log):
-    for gain in joint_gains(evidence(arm, log)):
+    for gain in gains(evidence(arm, log)):
         assert gain.visible
         assert gain.value == pytest.approx(1.0, abs=max(4 * gain.std, 5e-3))
         assert gain.std < 0.02
@@ -29,7 +36,7 @@ def test_a_file_that_is_right_has_a_gain_of_one(arm, log):
 
 @pytest.mark.parametrize("factor", [-1.0, 1e-3, 1e3, 0.075])
 def test_the_gain_is_what_the_log_was_multiplied_by(arm, log, factor: float):
-    for gain in joint_gains(evidence(arm, scaled(log, factor))):
+    for gain in gains(evidence(arm, scaled(log, factor))):
         assert gain.visible
         assert gain.value == pytest.approx(factor, rel=0.05)
 
@@ -49,7 +56,7 @@ def test_a_joint_whose_torque_the_file_hardly_shows_has_no_gain_that_counts(arm,
 
 
 def test_noise_has_a_gain_of_none(arm, log):
-    for gain in joint_gains(evidence(arm, noise_only(log))):
+    for gain in gains(evidence(arm, noise_only(log))):
         assert abs(gain.value) < 0.2
 
 
@@ -57,7 +64,7 @@ def test_without_parameters_in_the_file_there_is_no_gain(arm, log):
     model = replace(arm.model, theta_b=None)
     found = evidence_of(model, arm.regressor, [Motion(log)], Motors.torques(2), FilterOptions(cutoff=8.0))
 
-    assert all(np.isnan(gain.value) and not gain.visible for gain in joint_gains(found))
+    assert all(np.isnan(gain.value) and not gain.visible for gain in gains(found))
 
 
 def test_friction_takes_the_power_that_the_log_was_given(arm, log):
