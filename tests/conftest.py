@@ -1,6 +1,7 @@
 """Shared set-up: test helpers beside this file can be imported by name; hypothesis draws the same examples every time,
 or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it; Ctrl-C
-is heard by the commands under test also where a shell runs the tests in the background and has it ignored."""
+is heard by the commands under test also where a shell runs the tests in the background and has it ignored; Python keeps
+the bytecode of tests and psdmc, which hundreds of processes load, also where the environment says otherwise."""
 
 from __future__ import annotations
 
@@ -17,6 +18,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("explore", derandomize=False)

@@ -74,15 +74,22 @@ def _headers(names: Iterable[str], folder: Path) -> list[str]:
     return made
 
 
+@pytest.fixture(scope="module")
+def headers(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    """A folder of every issued robot's headers, and their paths in it."""
+    folder = tmp_path_factory.mktemp("headers")
+    names = [*ISSUED.split(), *sorted(RESERVED)[::40]]
+    return folder, _headers(dict.fromkeys(names), folder)
+
+
 @pytest.mark.parametrize("order", ["package first", "system first"])
 @pytest.mark.parametrize(("compiler", "kind"), [("gcc", "h"), ("g++", "hpp"), ("clang++", "hpp")])
 def test_headers_compile_beside_all_system_headers(
-    compiler: str, kind: str, order: str, tmp_path: Path
+    compiler: str, kind: str, order: str, headers: tuple[Path, list[str]], tmp_path: Path
 ) -> None:
     if not _installed(compiler):
         pytest.skip(f"{compiler} is not installed")
-    names = [*ISSUED.split(), *sorted(RESERVED)[::40]]
-    robots = _headers(dict.fromkeys(names), tmp_path)
+    folder, robots = headers
     language = "c" if kind == "h" else "c++"
     own = "".join(f'#include "{robot}.{kind}"\n' for robot in robots)
     system = platform_names.sources()[language] + ("#include <cmath>\n" if kind == "hpp" else "")
@@ -90,7 +97,7 @@ def test_headers_compile_beside_all_system_headers(
     main = tmp_path / ("main.c" if kind == "h" else "main.cpp")
     main.write_text("#define _GNU_SOURCE 1\n" + "".join(parts) if kind == "h" else "".join(parts))
     standard = "-std=gnu11" if kind == "h" else "-std=gnu++17"
-    words = [compiler, standard, "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{tmp_path}", str(main)]
+    words = [compiler, standard, "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{folder}", str(main)]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[:2000]
 

@@ -8,6 +8,7 @@ import math
 import tracemalloc
 import zipfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -212,10 +213,12 @@ def npy(shape: str, dtype: str = "<f8", data: bytes = b"", order: str = "False")
     return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode() + data
 
 
-BOMB = npy("(1000000000,)", data=bytes(300 << 20))
+@cache
+def bomb() -> bytes:
+    return npy("(1000000000,)", data=bytes(300 << 20))
+
 
 ARCHIVES = {
-    "a manifest that unpacks to 300 MB": zip_with({"manifest.npy": BOMB}),
     "a manifest that claims 8 GB": zip_with({"manifest.npy": npy("()", "<U2000000000")}),
     "a manifest that claims 8e18 bytes": zip_with({"manifest.npy": npy("(1000000000, 1000000000)")}),
     "a negative shape": zip_with({"manifest.npy": npy("(-1,)")}),
@@ -228,10 +231,10 @@ ARCHIVES = {
 }
 
 
-@pytest.mark.parametrize("case", ARCHIVES)
+@pytest.mark.parametrize("case", ["a manifest that unpacks to 300 MB", *ARCHIVES])
 def test_an_archive_that_is_none_of_ours(case: str, tmp_path: Path):
     path = tmp_path / "model.npz"
-    path.write_bytes(ARCHIVES[case])
+    path.write_bytes(ARCHIVES[case] if case in ARCHIVES else zip_with({"manifest.npy": bomb()}))
 
     tracemalloc.start()
     with pytest.raises(InputError, match=r"model\.npz: (damaged|not a psdmc) model") as caught:
@@ -247,7 +250,7 @@ def test_a_bomb_beside_a_good_manifest(original: Path, tmp_path: Path):
     with zipfile.ZipFile(original) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     path = tmp_path / "model.npz"
-    path.write_bytes(zip_with(members | {"P_value.npy": BOMB}))
+    path.write_bytes(zip_with(members | {"P_value.npy": bomb()}))
     assert path.stat().st_size < 1 << 20
 
     with pytest.raises(InputError, match="would unpack to"):
