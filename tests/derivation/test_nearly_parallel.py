@@ -24,14 +24,13 @@ TILTS = (0.0, *(10.0**k for k in np.arange(-10.0, -0.9, 0.5)))
 @pytest.mark.parametrize("kinds", ["RR", "RRR", "RRRP", "RPRR"])
 @pytest.mark.parametrize("tilt", TILTS, ids=lambda tilt: f"{tilt:.0e}")
 def test_torques_at_any_tilt(kinds: str, tilt: float) -> None:
-    for seed in range(3):
+    for seed, expand in enumerate((True, True, False)):
         chain = tilted_chain(seed, kinds, tilt)
         q, qd, qdd = states(len(kinds), 100)
         expected = Oracle(chain).rnea(q, qd, qdd)
-        for expand in (False, True):
-            model = derive_model(chain, expand=expand)
-            assert relative_error(model.inverse_dynamics(q, qd, qdd), expected) < ACCURACY
-            assert model.certificate.max() < ACCURACY
+        model = derive_model(chain, expand=expand)
+        assert relative_error(model.inverse_dynamics(q, qd, qdd), expected) < ACCURACY
+        assert model.certificate.max() < ACCURACY
 
 
 def test_coefficients_stay_small_where_axes_are_nearly_parallel() -> None:

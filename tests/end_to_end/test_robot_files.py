@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundled import robot_path
-from command_line import typed
+from command_line import status, typed
 
 BODY = (
     '<inertial><origin xyz="0.1 0 0"/><mass value="9.4"/>'
@@ -48,24 +48,26 @@ def test_white_space_leaves_mass_and_stderr_alone(tmp_path: Path):
         ),
     ],
 )
-def test_refusals_are_two_lines(plain: str, changed: str, said: str, tmp_path: Path):
+def test_refusals_are_two_lines(
+    plain: str, changed: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
     (tmp_path / "arm.urdf").write_text(PLAIN.replace(plain, changed), encoding="utf-8")
 
-    done = typed("derive", tmp_path / "arm.urdf", "-o", tmp_path / "arm.npz")
+    assert status("derive", tmp_path / "arm.urdf", "-o", tmp_path / "arm.npz") == 2
 
-    assert (done.returncode, done.stdout) == (2, "")
-    assert re.fullmatch(r"error: .*\nhint: .+\n", done.stderr)
-    assert said in done.stderr
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert re.fullmatch(r"error: .*\nhint: .+\n", printed.err)
+    assert said in printed.err
     assert not (tmp_path / "arm.npz").exists()
 
 
-def test_base_and_tip_exchanged(tmp_path: Path):
+def test_base_and_tip_exchanged(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     (tmp_path / "arm.urdf").write_text(PLAIN)
 
-    done = typed("derive", tmp_path / "arm.urdf", "--base", "tool0", "--tip", "base_link")
+    assert status("derive", tmp_path / "arm.urdf", "--base", "tool0", "--tip", "base_link") == 2
 
-    assert done.returncode == 2
-    assert done.stderr.splitlines() == [
+    assert capsys.readouterr().err.splitlines() == [
         "error: arm.urdf: tip link 'base_link' is not below base link 'tool0' but above it",
         "hint: a chain runs from its base to its tip: swap them, --base 'base_link' --tip 'tool0'",
     ]
@@ -86,7 +88,7 @@ def test_ten_thousand_fixed_links_end_no_process(tmp_path: Path):
 
 
 def test_check_says_what_it_read(tmp_path: Path):
-    typed("derive", robot_path("rounded_arm"), "--no-expand", "-o", tmp_path / "m.npz")
+    assert status("derive", robot_path("rounded_arm"), "--no-expand", "-o", tmp_path / "m.npz") == 0
 
     done = typed("check", tmp_path / "m.npz")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundled import ROBOTS, bundled_model, bundled_robot
+from unoptimised import without_optimisation
 
 from psdmc.compiler import emit_c
 from psdmc.robot.reference import reference
@@ -22,12 +23,14 @@ import ilqr  # noqa: E402
 
 @pytest.fixture(scope="module")
 def kr6() -> ilqr.Problem:
-    return ilqr.kr6(steps=12, duration=0.6)
+    with without_optimisation():
+        return ilqr.kr6(steps=12, duration=0.6)
 
 
 @pytest.fixture(scope="module")
 def acrobot() -> ilqr.Problem:
-    return ilqr.acrobot()
+    with without_optimisation():
+        return ilqr.acrobot()
 
 
 def test_jacobians_of_the_step_are_its_difference_quotients(kr6: ilqr.Problem) -> None:

@@ -58,7 +58,7 @@ def test_every_function_against_pinocchio(kinds, tidy, baked):
     chain = random_chain(7, kinds, tidy=tidy)
     n, oracle = len(chain), Oracle(chain)
     representative, theta_b = known(chain)
-    search = Search(chain, representative, theta_b if baked else None, budget=90)
+    search = Search(chain, representative, theta_b if baked else None, budget=30)
     q, qd, qdd = states(n, 200)
     given_theta = {} if baked else {"theta_b": theta_b}
     arrangement = search.best(INVERSE, SINGLE)
@@ -159,7 +159,7 @@ def test_lanes_of_states_pay_for_every_angle_and_one_state_does_not():
     arrangement = search.best(INVERSE, SINGLE)
     one = cost(search.rearranged(INVERSE, arrangement, SINGLE))
     lanes = cost(search.rearranged(INVERSE, arrangement, BATCH))
-    assert lanes.sincos <= 4 <= one.sincos or lanes.sincos <= one.sincos
+    assert lanes.sincos <= one.sincos
     assert one.total <= lanes.total
 
 
@@ -208,7 +208,7 @@ def tilted(chain: Mechanism, angle: float) -> Mechanism:
 def test_axes_that_are_nearly_parallel_cost_no_digits(angle: float):
     chain = tilted(random_chain(3, "RRRRRR", tidy=True), angle)
     representative, theta_b = known(chain)
-    search = Search(chain, representative, theta_b, budget=150)
+    search = Search(chain, representative, theta_b, budget=40)
     program = search.rearranged(INVERSE, search.best(INVERSE, SINGLE), SINGLE)
     q, qd, qdd = states(6, 200)
     found = run(program, 6, 6, "tau", q=q, qd=qd, qdd=qdd)

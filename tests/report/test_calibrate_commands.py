@@ -27,8 +27,8 @@ from psdmc.robot.load import load_robot
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 QUICK = CampaignOptions(
-    sweep=SweepOptions(speed=0.25, seconds=20.0, range=0.8),
-    sines=SineOptions(smallest=1e-4, ratio=8.0, frequencies=(2.0,), cycles=1),
+    sweep=SweepOptions(speed=0.25, seconds=20.0, range=0.8, period=4e-3),
+    sines=SineOptions(smallest=1e-4, ratio=8.0, frequencies=(2.0,), cycles=1, period=2e-3),
     excite=ExciteOptions(evaluations=100, random=50, samples=50),
     load=Load(3.5, (0.08, 0.0, 0.06)),
     gravity_runs=1,
