@@ -28,21 +28,21 @@ from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of
 from psdmc.toolchain.kept_kernels import lowered_once
 
-ROBOTS = ("two_link", "scara", "kr6", "UR5", "Panda", "sliding", "first slides")
+ROBOTS = ("two_link", "scara", "kr6", "Panda", "sliding", "first slides")
 SLIDING = {"sliding": (5, "RPRP"), "first slides": (8, "PRPR")}
 """Seed and joints of oblique chains with sliding joints."""
 
 SINGLE = ("scara", "kr6", "sliding")
 """Robots that are compiled in float32 too."""
 
-OPTIMISED = (("kr6", "float64"), ("scara", "float32"))
+OPTIMISED = (("sliding", "float64"), ("scara", "float32"))
 """Libraries that are compiled as psdmc.compile does, the others without optimisation: one of each precision shows what a
 compiler makes of each function's C, all show what the C says."""
 
 COMPILED = {("kr6", "float64"), ("sliding", "float64"), ("sliding", "float32")}
 """Robots and precisions whose long functions are compiled; of other robots their PROGRAMs are interpreted."""
 
-INTERPRETED = ("two_link", "scara", "Panda", "first slides")
+INTERPRETED = ("two_link", "scara", "first slides")
 
 LONG = frozenset(
     {
