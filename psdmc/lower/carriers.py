@@ -131,6 +131,7 @@ class CarrierSpace:
                          basis of their span
     tableau   the same columns in a basis of themselves, followed by the model's l columns, which theta_b weights
     whole     (l,)  lengths of the model's columns
+    lengths   (11 n,)  those of `columns`
     careful   the same in extended precision, where columns are nearly dependent; None where none are
     """
 
@@ -138,7 +139,11 @@ class CarrierSpace:
     tableau: Tableau
     whole: Array
     careful: Careful | None = None
+    lengths: Array = field(init=False, repr=False)
     _transfers: dict[tuple[int, ...], Array] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lengths", np.linalg.norm(self.columns, axis=0))
 
     @property
     def count(self) -> int:
@@ -155,16 +160,10 @@ class CarrierSpace:
     def exchanges(self, carriers: Sequence[int]) -> list[tuple[int, int]]:
         """Pairs (out, in) whose exchange leaves a basis: in the old basis, the parameter that comes in has a fair share
         of the one that goes out."""
-        lengths = self.lengths
-        coefficients = self._coordinates(carriers)
-        pairs = []
-        for j in range(self.count):
-            if j in carriers or not lengths[j]:
-                continue
-            for row, carrier in enumerate(carriers):
-                if abs(coefficients[row, j]) * lengths[carrier] > FAIR_SHARE * lengths[j]:
-                    pairs.append((carrier, j))
-        return pairs
+        others = [j for j in range(self.count) if j not in carriers and self.lengths[j]]
+        share = np.abs(self._coordinates(carriers, others)) * self.lengths[list(carriers), None]
+        fair = np.argwhere((share > FAIR_SHARE * self.lengths[others]).T)
+        return [(carriers[row], others[column]) for column, row in fair.tolist()]
 
     def transfer(self, carriers: Sequence[int]) -> Array:
         """(len(carriers), l): theta_b to the carriers' values, with exact zeros and ones.
@@ -178,21 +177,17 @@ class CarrierSpace:
         return self._transfers[key]
 
     def _transfer(self, carriers: tuple[int, ...]) -> Array:
-        raw = self._coordinates(carriers)[:, self.count :]
+        raw = self._coordinates(carriers, range(self.count, self.tableau.entries.shape[1]))
         contribution = np.abs(raw) * self.lengths[list(carriers), None]
         out = np.where(contribution < EXACT * self.whole, 0.0, raw)
         nearest = np.round(out)
         return np.asarray(np.where((np.abs(out - nearest) < EXACT) & (np.abs(nearest) == 1), nearest, out))
 
-    @property
-    def lengths(self) -> Array:
-        return np.asarray(np.linalg.norm(self.columns, axis=0))
-
-    def _coordinates(self, carriers: Sequence[int]) -> Array:
-        """All columns, the model's included, in the basis of the carriers."""
+    def _coordinates(self, carriers: Sequence[int], wanted: Sequence[int]) -> Array:
+        """Some of the columns and of the model's behind them, in the basis of the carriers."""
         if self.careful is not None:  # exchanges would magnify what rounding left of the smallest columns
-            return Tableau.of(self.careful.rows, carriers).entries.astype(np.float64)
-        return self.tableau.within(carriers).entries.astype(np.float64)
+            return Tableau.of(self.careful.rows, carriers).entries[:, list(wanted)].astype(np.float64)
+        return self.tableau.within(carriers, wanted).astype(np.float64)
 
 
 def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -171,6 +172,7 @@ def _carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tra
     return values
 
 
+@lru_cache(maxsize=64)
 def in_unit(reframed: Reframed, unit: float) -> Reframed:
     """Lengths and accelerations in another unit of length; a length equal to it becomes exactly one."""
     if unit == 1.0:

@@ -19,7 +19,7 @@ from psdmc.lower.accuracy import LIMIT, Accuracy
 from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS
 from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
 from psdmc.lower.geometry import Geometry
-from psdmc.lower.reframe import Foot
+from psdmc.lower.reframe import Foot, Reframed
 from psdmc.program.cost import Cost, cost
 from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
@@ -99,6 +99,7 @@ class Search:
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
         self.budget = budget
+        self._costs: dict[tuple[str, Reframed, float, tuple[int, ...], Choices], Cost] = {}
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         known = theta_b if known is None else known
         self._accuracy = None if known is None else Accuracy(self.robot, known)
@@ -122,7 +123,7 @@ class Search:
     ) -> Arrangement:
         """The end of the descent; from `accurate` on, if given, by candidates as accurate as LIMIT or as this one."""
         descent = _Descent(
-            lambda a: scoring.weight(cost_of_dynamics(recipe, a, self.robot)),
+            lambda a: scoring.weight(self.cost(recipe, a)),
             self.budget,
             self._admits(accurate),
         )
@@ -145,6 +146,13 @@ class Search:
         limit = max(LIMIT, accuracy.error(accurate))
         return lambda arrangement: accuracy.error(arrangement) <= limit
 
+    def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
+        """What a function's PROGRAM costs in an arrangement; traced once."""
+        key = recipe.name, a.reframed, a.unit, a.carriers, a.choices
+        if key not in self._costs:
+            self._costs[key] = cost_of_dynamics(recipe, a, self.robot)
+        return self._costs[key]
+
     def rearranged(self, recipe: Recipe, found: Arrangement, scoring: Scoring) -> Program:
         """The PROGRAM of a function in an arrangement that was found for another function or target. Only the choices
         within the recursion are made again."""
@@ -154,7 +162,7 @@ class Search:
         """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes. All
         others are only counted."""
         tried = [replace(found, choices=choices) for choices in _felt(found, distinct(recipe, ALL_CHOICES))]
-        costs = [cost_of_dynamics(recipe, arrangement, self.robot) for arrangement in tried]
+        costs = [self.cost(recipe, arrangement) for arrangement in tried]
         weights = [[scoring.weight(each) for each in costs] for scoring in (self.single, self.batch)]
         for best in sorted({each.index(min(each)) for each in weights}):
             yield trace_dynamics(recipe, tried[best], self.robot)

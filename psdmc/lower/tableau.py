@@ -34,7 +34,7 @@ class Tableau:
 
         The other columns are needed in the pivots' rows only: what the basis's ask of those is done to them afterwards.
         """
-        others = np.setdiff1d(np.arange(columns.shape[1]), basis)
+        others = [j for j in range(columns.shape[1]) if j not in basis]
         rows, factors = _row_pivots(columns[:, list(basis)])
         rest = columns[rows][:, others]
         for k, factor in enumerate(factors[rows].T):
@@ -46,19 +46,20 @@ class Tableau:
         entries[range(len(basis)), list(basis)] = 1.0
         return Tableau(tuple(basis), entries)
 
-    def within(self, basis: Sequence[int]) -> Tableau:
-        """The same columns in another basis, which must be one."""
+    def within(self, basis: Sequence[int], wanted: Sequence[int]) -> Long:
+        """(r, len(wanted)) some columns' coordinates in another basis, which must be one."""
         entering = [j for j in basis if j not in self.basis]
         leaving = [i for i, j in enumerate(self.basis) if j not in basis]
-        now, entries = list(self.basis), self.entries.copy()
-        while entering:
-            block = np.abs(entries[np.ix_(leaving, entering)])
-            row, column = np.unravel_index(int(np.argmax(block)), block.shape)
-            i, j = leaving.pop(int(row)), entering.pop(int(column))
-            _pivot(entries, i, j)
-            now[i] = j
+        now, entries = list(self.basis), self.entries[:, [*entering, *wanted]]
+        places = list(range(len(entering)))
+        while places:
+            block = np.abs(entries[leaving][:, places])
+            row, column = divmod(int(np.argmax(block)), len(places))
+            i, place = leaving.pop(row), places.pop(column)
+            _pivot(entries, i, place)
+            now[i] = entering[place]
         order = [now.index(j) for j in basis]
-        return Tableau(tuple(basis), entries[order])
+        return np.asarray(entries[order, len(entering) :])
 
 
 def _row_pivots(rest: Long) -> tuple[list[int], Long]:

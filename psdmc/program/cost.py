@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from psdmc.program.program import Op, Program
 
+_ADD, _SUB, _MUL, _DIV, _NEG, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SIN, Op.COS
+
 
 @dataclass(frozen=True, slots=True)
 class Cost:
@@ -38,15 +40,16 @@ def cost(program: Program) -> Cost:
     mul = add = div = neg = fused = 0
     angles: set[int] = set()
     for op, args, _, _ in body:
-        if op is Op.MUL:
+        if op is _MUL:
             mul += 1
-        elif op is Op.ADD or op is Op.SUB:
+        elif op is _ADD or op is _SUB:
             add += 1
-            fused += any(body[a][0] is Op.MUL and uses[a] == 1 for a in args)
-        elif op is Op.DIV:
+            a, b = args
+            fused += (uses[a] == 1 and body[a][0] is _MUL) or (uses[b] == 1 and body[b][0] is _MUL)
+        elif op is _DIV:
             div += 1
-        elif op is Op.NEG:
+        elif op is _NEG:
             neg += 1
-        elif op is Op.SIN or op is Op.COS:
+        elif op is _SIN or op is _COS:
             angles.add(args[0])
     return Cost(mul, add, div, neg, len(angles), fused)

@@ -12,6 +12,8 @@ from psdmc.program.kernel import Kernel
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.signature import Signature
 
+_OPERATIONS = {op.value: op for op in Op}
+
 FORMAT = 1
 """Version of the text's form."""
 
@@ -68,7 +70,7 @@ def _program_from_plain(plain: Any) -> Program:
         return slots.setdefault((vector, index), Slot(vector, index))
 
     def instruction(word: str, *rest: Any) -> Instr:
-        op = Op(word)
+        op = _OPERATIONS[word]
         if op is Op.LOAD:
             return Instr(op, slot=slot_of(*rest))
         return Instr(op, value=float(rest[0])) if op is Op.CONST else Instr(op, rest)

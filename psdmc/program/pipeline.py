@@ -65,11 +65,12 @@ def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> 
 
 def shortened(program: Program) -> Program:
     """A PROGRAM with the same outputs in fewer operations, before its instructions are put in order."""
+    operations = _operations(program)
     for _ in range(LONGEST):
         shorter = _applied(ROUND, program)
-        if _operations(shorter) >= _operations(program):
+        if shorter is program or (left := _operations(shorter)) >= operations:
             break
-        program = shorter
+        program, operations = shorter, left
     return program
 
 

@@ -60,11 +60,17 @@ class Instr(NamedTuple):
         moved = (new_index[args[0]], new_index[args[1]]) if len(args) == 2 else (new_index[args[0]],)
         return self if moved == args else operation(self.op, moved)
 
-    def canonical(self) -> Instr:
-        """The same instruction with commutative arguments in ascending order."""
-        if self.op in COMMUTATIVE and self.args[0] > self.args[1]:
-            return operation(self.op, self.args[::-1])
-        return self
+    def canonical(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
+        """The same on the values that its arguments have become, commutative ones in ascending order; itself where it is
+        that already."""
+        args = self.args
+        if len(args) != 2:
+            return self.renumbered(new_index)
+        first, second = new_index[args[0]], new_index[args[1]]
+        if first > second and self.op in COMMUTATIVE:
+            first, second = second, first
+        moved = (first, second)
+        return self if moved == args else operation(self.op, moved)
 
 
 def operation(op: Op, args: tuple[int, ...]) -> Instr:

@@ -89,27 +89,32 @@ class Tracer:
         steps, uses = self.steps, [0] * len(self.steps)
         for _, index in stored:
             uses[index] += 1
-        count = dict.fromkeys(Op, 0)
+        mul = div = neg = fused = 0
         sums: list[tuple[int, int]] = []
         angles: set[int] = set()
-        for index in range(len(steps) - 1, -1, -1):
-            if not uses[index]:
+        for used, (op, a, b) in zip(
+            reversed(uses), reversed(steps), strict=True
+        ):  # `used` as the uses behind left it
+            if not used or op is _LOAD or op is _CONST:
                 continue
-            op, a, b = steps[index]
-            count[op] += 1
-            if b is not None:
-                uses[a] += 1
-                uses[b] += 1
-                if op is _ADD or op is _SUB:
-                    sums.append((a, b))
-            elif op is not _LOAD and op is not _CONST:
-                uses[a] += 1
-                if op is not _NEG:
+            uses[a] += 1
+            if b is None:
+                if op is _NEG:
+                    neg += 1
+                else:
                     angles.add(a)
-        fused = sum(
-            (uses[a] == 1 and steps[a][0] is _MUL) or (uses[b] == 1 and steps[b][0] is _MUL) for a, b in sums
-        )
-        return Cost(count[_MUL], len(sums), count[_DIV], count[_NEG], len(angles), fused)
+                continue
+            uses[b] += 1
+            if op is _MUL:
+                mul += 1
+            elif op is _DIV:
+                div += 1
+            else:
+                sums.append((a, b))
+        for a, b in sums:
+            if (uses[a] == 1 and steps[a][0] is _MUL) or (uses[b] == 1 and steps[b][0] is _MUL):
+                fused += 1
+        return Cost(mul, len(sums), div, neg, len(angles), fused)
 
     def _stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
         stored: list[tuple[Slot, int]] = []

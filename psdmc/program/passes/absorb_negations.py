@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Instr, Op, Program
 
@@ -19,20 +21,27 @@ def absorb_negations(program: Program) -> Program:
     program = drop_unused(program)
     while any(instr.op is Op.NEG for instr in program.body):
         after = _absorbed_once(program)
-        if after == program:  # each change leaves fewer uses of negations
+        if after is program or after == program:  # each change leaves fewer uses of negations
             break
         program = after
     return program
 
 
 def _absorbed_once(program: Program) -> Program:
-    return drop_unused(_into_producers(drop_unused(_into_uses(program))))
+    for absorb in (_into_uses, _into_producers):
+        after = absorb(program)
+        program = program if after is program else drop_unused(after)
+    return program
 
 
 def _into_uses(program: Program) -> Program:
+    negations = {i for i, instr in enumerate(program.body) if instr.op is Op.NEG}
+    users = [instr for instr in program.body if not negations.isdisjoint(instr.args)]
+    if all(_absorbed(instr, program.body) is instr for instr in users):
+        return program
     body: list[Instr] = []
     new_index: list[int] = []
-    negations: set[int] = set()
+    negations = set()
     for instr in program.body:
         moved = instr.renumbered(new_index)
         taken = moved if negations.isdisjoint(moved.args) else _absorbed(moved, body)
@@ -46,7 +55,7 @@ def _into_uses(program: Program) -> Program:
     return Program(tuple(body), tuple((slot, new_index[i]) for slot, i in program.outputs))
 
 
-def _absorbed(instr: Instr, body: list[Instr]) -> Instr | int:
+def _absorbed(instr: Instr, body: Sequence[Instr]) -> Instr | int:
     """The instruction with the signs of its arguments absorbed, or the index of the value that it equals."""
     plain = [body[a].args[0] if body[a].op is Op.NEG else None for a in instr.args]
     match instr.op, plain:
@@ -66,9 +75,13 @@ def _absorbed(instr: Instr, body: list[Instr]) -> Instr | int:
 def _into_producers(program: Program) -> Program:
     body, uses = list(program.body), program.uses()
     new_index = list(range(len(body)))
+    taken = 0
     for i, instr in enumerate(program.body):
         if instr.op is Op.NEG and _negate(body, uses, instr.args[0]):
             new_index[i] = instr.args[0]
+            taken += 1
+    if not taken:
+        return program
     moved = tuple(instr.renumbered(new_index) for instr in body)
     return Program(moved, tuple((slot, new_index[i]) for slot, i in program.outputs))
 

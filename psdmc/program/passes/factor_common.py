@@ -42,21 +42,32 @@ def factor_common(program: Program) -> Program:
     Keeps:  outputs up to rounding (it reorders floating point); output names and order.
     Gives:  fewer multiplications, as many additions; every instruction is needed.
     """
-    uses = program.uses()
-    inside = _parts_of_larger_sums(program, uses)
+    grouped = _grouped_sums(program)
+    if not grouped:
+        return drop_unused(program)
     builder = _Builder([], [])
     for i, instr in enumerate(program.body):
-        grouped = None
-        if instr.op in _SIGNED_SUM and not inside[i]:
-            signed = _signed_factors(program.body, uses, i)
-            if _shares_a_factor(signed):
-                grouped = _grouped(tuple(_Term(sign, tuple(factors)) for sign, factors in signed))
-                grouped = None if len(grouped) == len(signed) else grouped
         builder.new_index.append(
-            builder.append(instr.renumbered(builder.new_index)) if grouped is None else builder.total(grouped)
+            builder.total(grouped[i]) if i in grouped else builder.append(instr.renumbered(builder.new_index))
         )
     outputs = tuple((slot, builder.new_index[i]) for slot, i in program.outputs)
     return drop_unused(Program(tuple(builder.body), outputs))
+
+
+def _grouped_sums(program: Program) -> dict[int, tuple[_Term, ...]]:
+    """The sums that get shorter, by the index of their value."""
+    uses = program.uses()
+    inside = _parts_of_larger_sums(program, uses)
+    found: dict[int, tuple[_Term, ...]] = {}
+    for i, instr in enumerate(program.body):
+        if inside[i] or instr.op not in _SIGNED_SUM:
+            continue
+        signed = _signed_factors(program.body, uses, i)
+        if _shares_a_factor(signed):
+            grouped = _grouped(tuple(_Term(sign, tuple(factors)) for sign, factors in signed))
+            if len(grouped) < len(signed):
+                found[i] = grouped
+    return found
 
 
 def _parts_of_larger_sums(program: Program, uses: list[int]) -> list[bool]:
@@ -80,7 +91,7 @@ def _signed_factors(body: tuple[Instr, ...], uses: list[int], index: int) -> lis
             stack.append((args[1], own if op is Op.ADD else -own))
             stack.append((args[0], own))
         else:
-            terms.append((own, _factors(body, uses, i)))
+            terms.append((own, [i] if op is not Op.MUL or uses[i] != 1 else _factors(body, uses, i)))
     return terms
 
 
@@ -96,8 +107,7 @@ def _shares_a_factor(terms: list[tuple[int, list[int]]]) -> bool:
 
 
 def _factors(body: tuple[Instr, ...], uses: list[int], index: int) -> list[int]:
-    if body[index].op is not Op.MUL or uses[index] != 1:
-        return [index]
+    """Of a product that nothing else uses, left to right."""
     factors: list[int] = []
     stack = [index]
     while stack:

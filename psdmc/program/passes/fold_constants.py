@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from psdmc.program.program import Instr, Op, Program
 
@@ -26,9 +26,12 @@ def fold_constants(program: Program) -> Program:
     Gives:  no operation has only constants as arguments, but a division by zero; what is no longer needed
             stays.
     """
+    constants = {i for i, instr in enumerate(program.body) if instr.value is not None}
+    if not any(_folds(instr, program.body) for instr in program.body if not constants.isdisjoint(instr.args)):
+        return program
     body: list[Instr] = []
     new_index: list[int] = []
-    constants: set[int] = set()
+    constants = set()
     for instr in program.body:
         moved = instr.renumbered(new_index)
         known = None
@@ -44,14 +47,19 @@ def fold_constants(program: Program) -> Program:
     return Program(tuple(body), tuple((slot, new_index[i]) for slot, i in program.outputs))
 
 
-def _folded(instr: Instr, body: list[Instr]) -> Instr:
+def _folds(instr: Instr, body: Sequence[Instr]) -> bool:
+    """Whether there is something to do for an instruction as it stands: without a first there is no other."""
+    return _folded(instr, body) is not instr or _argument_that_it_equals(instr, body) is not None
+
+
+def _folded(instr: Instr, body: Sequence[Instr]) -> Instr:
     values = [body[a].value for a in instr.args]
     if not values or any(value is None for value in values) or (instr.op is Op.DIV and values[1] == 0.0):
         return instr
     return Instr(Op.CONST, value=_FUNCTIONS[instr.op](*values))
 
 
-def _argument_that_it_equals(instr: Instr, body: list[Instr]) -> int | None:
+def _argument_that_it_equals(instr: Instr, body: Sequence[Instr]) -> int | None:
     """Index of the value that x + 0, x - 0, x * 1, x / 1 or x * 0 is; None for all else."""
     if len(instr.args) != 2:
         return None

@@ -3,6 +3,7 @@ multiply-add."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from psdmc.program.program import Instr, Op, Program
@@ -39,11 +40,18 @@ def fuse_sums(program: Program, latency: Latency = COSTS.latency) -> Program:
 
 
 class _Part(NamedTuple):
-    """A term or partial sum under construction: `factors` of a product that the next addition swallows, else none."""
+    """A term or partial sum under construction.
+
+    is_product  whether it is one that the next addition swallows
+    begins      cycle from which on that addition can go ahead
+    ready       cycle at which its value is there
+    """
 
     negative: bool
-    factors: tuple[int, ...]
+    is_product: bool
     value: int
+    begins: int
+    ready: int
 
 
 class _Fusion:
@@ -96,48 +104,45 @@ class _Fusion:
 
     def _chain(self, terms: list[Term]) -> int:
         """Add the two terms that are ready soonest until one is left; its index."""
-        parts = [_Part(negative, self._operands(index), self.new_index[index]) for negative, index in terms]
-        parts.sort(key=lambda part: part.value)
+        parts = sorted([self._part(*term) for term in terms], key=lambda part: part.value)
         while len(parts) > 2:
-            first = min(range(len(parts)), key=lambda k: (self._done(parts[k]), k))
-            second = min(
-                (k for k in range(len(parts)) if k != first),
-                key=lambda k: (self._sum_done(parts[first], parts[k]), k),
-            )
-            low, high = sorted((first, second))
-            total = self._add(parts[low], parts[high])
-            parts[low] = total
+            begins = [part.begins for part in parts]
+            first = begins.index(min(begins))
+            sums: list[float] = [self._sum_ready(parts[first], part) for part in parts]
+            sums[first] = math.inf
+            low, high = sorted((first, sums.index(min(sums))))
+            parts[low] = self._add(parts[low], parts[high])
             del parts[high]
         return self._add(*parts).value
 
-    def _operands(self, index: int) -> tuple[int, ...]:
-        """The factors of a product that an addition may absorb; empty where it may not."""
-        instr = self.program.body[index]
-        if instr.op is Op.MUL and self.uses[index] == 1:
-            return tuple(self.new_index[a] for a in instr.args)
-        return ()
+    def _part(self, negative: bool, index: int) -> _Part:
+        instr, value = self.program.body[index], self.new_index[index]
+        ready = self.ready[value]
+        if instr.op is not Op.MUL or self.uses[index] != 1:
+            return _Part(negative, False, value, ready, ready)
+        first, second = instr.args
+        begins = max(self.ready[self.new_index[first]], self.ready[self.new_index[second]])
+        return _Part(negative, True, value, begins, ready)
 
-    def _done(self, part: _Part) -> int:
-        return max(self.ready[a] for a in part.factors) if part.factors else self.ready[part.value]
-
-    def _sum_done(self, a: _Part, b: _Part) -> int:
-        if not a.factors and not b.factors:
-            return max(self.ready[a.value], self.ready[b.value]) + self.cycles[Op.ADD]
-        if a.factors and b.factors:
-            return min(max(self.ready[x.value], self._done(y)) + self.fused for x, y in ((a, b), (b, a)))
-        return max(self._done(a), self._done(b)) + self.fused
+    def _sum_ready(self, a: _Part, b: _Part) -> int:
+        """The cycle at which the sum of two parts is there."""
+        if not a.is_product and not b.is_product:
+            return max(a.ready, b.ready) + self.cycles[Op.ADD]
+        if a.is_product and b.is_product:
+            return min(max(a.ready, b.begins), max(b.ready, a.begins)) + self.fused
+        return max(a.begins, b.begins) + self.fused
 
     def _add(self, a: _Part, b: _Part) -> _Part:
         """The sum of two parts; their difference where one is negative. Negative where both are."""
-        when = self._sum_done(a, b)
+        ready = self._sum_ready(a, b)
         if a.negative == b.negative:
-            instr = Instr(Op.ADD, (a.value, b.value)).canonical()
+            instr = Instr(Op.ADD, (min(a.value, b.value), max(a.value, b.value)))
         else:
             plus, minus = (b, a) if a.negative else (a, b)
             instr = Instr(Op.SUB, (plus.value, minus.value))
         self.body.append(instr)
-        self.ready.append(when)
-        return _Part(a.negative and b.negative, (), len(self.body) - 1)
+        self.ready.append(ready)
+        return _Part(a.negative and b.negative, False, len(self.body) - 1, ready, ready)
 
     def _append(self, instr: Instr) -> int:
         start = max((self.ready[a] for a in instr.args), default=0)

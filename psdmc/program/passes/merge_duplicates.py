@@ -14,8 +14,12 @@ def merge_duplicates(program: Program) -> Program:
     """
     first_seen: dict[Instr, int] = {}
     new_index: list[int] = []
+    is_same = True
     for instr in program.body:
-        key = instr.renumbered(new_index).canonical()
+        key = instr.canonical(new_index)
+        is_same = is_same and key is instr
         new_index.append(first_seen.setdefault(key, len(first_seen)))
+    if is_same and len(first_seen) == len(program.body):
+        return program
     outputs = tuple((slot, new_index[i]) for slot, i in program.outputs)
     return Program(tuple(first_seen), outputs)

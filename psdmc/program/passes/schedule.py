@@ -27,7 +27,7 @@ def live_values(program: Program) -> int:
     for i, (_, args, _, _) in enumerate(program.body):
         for a in args:
             last[a] = i
-    return sum(last[i] - i for i, (_, args, _, _) in enumerate(program.body) if args)
+    return sum([last[i] - i for i, (_, args, _, _) in enumerate(program.body) if args])
 
 
 def beyond_registers(program: Program, registers: int) -> int:
@@ -61,24 +61,26 @@ def _need(program: Program) -> list[int]:
 
 
 def _depth_first(program: Program) -> list[int]:
+    """Values in the order in which they are computed. On the stack ~index stands for a value whose arguments are placed."""
     need = _need(program)
     placed = [False] * len(program.body)
     order: list[int] = []
-    for _, root in program.outputs:
-        stack = [(root, False)]
-        while stack:
-            index, ready = stack.pop()
-            if placed[index]:
-                continue
-            if ready:
-                placed[index] = True
-                order.append(index)
-                continue
-            stack.append((index, True))
-            args = program.body[index].args
-            if len(args) == 2 and (need[args[0]], -args[0]) > (need[args[1]], -args[1]):
-                args = args[::-1]
-            stack.extend([(a, False) for a in args if not placed[a]])
+    stack = [root for _, root in reversed(program.outputs)]
+    while stack:
+        index = stack.pop()
+        is_ready = index < 0
+        index = ~index if is_ready else index
+        if placed[index]:
+            continue
+        args = program.body[index].args
+        if is_ready or not args:
+            placed[index] = True
+            order.append(index)
+            continue
+        stack.append(~index)
+        if len(args) == 2 and (need[args[0]], -args[0]) > (need[args[1]], -args[1]):
+            args = args[::-1]
+        stack.extend([a for a in args if not placed[a]])
     return order
 
 
