@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
+VERSION = "0.1.0"
+"""The one place where it stands: pyproject.toml reads it here. Asking the installed package's metadata for it would take
+longer than reading a model."""
 
 
 def psdmc_version() -> str:
-    """The installed version; 'unknown' where psdmc runs from a bare checkout."""
-    try:
-        return version("psdmc")
-    except PackageNotFoundError:
-        return "unknown"
+    """The version."""
+    return VERSION

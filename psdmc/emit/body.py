@@ -12,6 +12,8 @@ from psdmc.emit.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
 from psdmc.emit.store_groups import GROUP, StoreGroups
 from psdmc.program.program import Op, Program, Slot
 
+_ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG})
+
 
 def spread(text: str, uniform: bool) -> str:
     """The text as a `V`."""
@@ -174,15 +176,15 @@ class _Writer:
             if not self.done[i] and self._has_own_line(i):
                 lines.append(Step(f"t{i}", self._operation(i).text, self.names.uniform[i]))
             self.done[i] = True
-            if with_stores:
+            if with_stores and i in self.stores:
                 lines += self._stores_of(i)
         return tuple(lines)
 
     def _has_own_line(self, i: int) -> bool:
-        return self.names.named[i] and self.program.body[i].op in (Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG)
+        return self.names.named[i] and self.program.body[i].op in _ARITHMETIC
 
     def _stores_of(self, i: int) -> list[Line]:
-        return [line for slot in self.stores.get(i, []) for line in self._store(slot, i)]
+        return [line for slot in self.stores[i] for line in self._store(slot, i)]
 
     def _late_stores(self) -> list[Line]:
         if self.stores_early:
@@ -248,8 +250,8 @@ def _angle_groups(program: Program) -> list[list[int]]:
     level: list[int] = []
     groups: dict[int, dict[int, None]] = {}
     for instr in program:
-        below = max((level[a] for a in instr.args), default=0)
-        is_trig = instr.op in (Op.SIN, Op.COS)
+        below = max([level[a] for a in instr.args]) if instr.args else 0
+        is_trig = instr.op is Op.SIN or instr.op is Op.COS
         if is_trig:
             groups.setdefault(below, {})[instr.args[0]] = None
         level.append(below + 1 if is_trig else below)

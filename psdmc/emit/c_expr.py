@@ -7,6 +7,7 @@ The texts are the same for one state and for one state per lane: a value is `V` 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from psdmc.emit.reals import rounded_out
 from psdmc.program.program import Instr, Op, Program
@@ -20,8 +21,7 @@ _LOOSE, _TIGHT, _UNARY, _ATOM = range(4)
 _SYMBOL = {Op.ADD: ("+", _LOOSE), Op.SUB: ("-", _LOOSE), Op.MUL: ("*", _TIGHT), Op.DIV: ("/", _TIGHT)}
 
 
-@dataclass(frozen=True, slots=True)
-class Expr:
+class Expr(NamedTuple):
     """C text of a value, the binding strength of its outermost operator, and its depth of nesting."""
 
     text: str
@@ -59,24 +59,24 @@ class Names:
 
 
 def _is_uniform(instr: Instr, known: list[bool]) -> bool:
-    if instr.slot is not None:
-        return instr.slot.vector in UNIFORM_VECTORS
-    if instr.op in (Op.SIN, Op.COS):
+    op, args, slot, _ = instr
+    if slot is not None:
+        return slot.vector in UNIFORM_VECTORS
+    if op is Op.SIN or op is Op.COS:
         return False
-    return all(known[a] for a in instr.args)
+    return all(known[a] for a in args)
 
 
 def _cut_deep_trees(program: Program, named: list[bool]) -> None:
     """Also name the values at which an expression would nest deeper than DEEPEST."""
     depth = [0] * len(program)
-    for i, instr in enumerate(program):
-        if not instr.args or instr.op in (Op.SIN, Op.COS):
+    for i, (op, args, _, _) in enumerate(program):
+        if not args or op is Op.SIN or op is Op.COS:
             continue
-        below = [0 if named[a] else depth[a] for a in instr.args]
-        for a, levels in zip(instr.args, below, strict=True):
-            if levels == DEEPEST:
+        for a in args:
+            if depth[a] == DEEPEST:
                 named[a] = True
-        depth[i] = 1 + max(0 if named[a] else depth[a] for a in instr.args)
+        depth[i] = 1 + max([0 if named[a] else depth[a] for a in args])
 
 
 def literal(value: float, suffix: str) -> Expr:

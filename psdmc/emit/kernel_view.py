@@ -200,7 +200,8 @@ def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) 
         for q in function.outputs
     )
     single_body = _body(kernel, kernel.single, outputs, options)
-    lanes_body = _body(kernel, kernel.batch, outputs, options) if has_batches else single_body
+    has_own = has_batches and kernel.batch is not kernel.single
+    lanes_body = _body(kernel, kernel.batch, outputs, options) if has_own else single_body
     shared = single_body == lanes_body
     positive = _vector(function.positive.quantity, sizes) if function.positive else None
     return KernelView(

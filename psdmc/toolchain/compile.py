@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from psdmc.emit.package import PackageView, library_files
@@ -42,6 +41,8 @@ def _build(package: PackageView, files: dict[str, str], compiler: Compiler, fold
 
 def _run_all(commands: list[list[str]], robot: str, folder: Path) -> None:
     """Run the commands, several at a time; after an error or Ctrl-C no further one is started."""
+    from concurrent.futures import ThreadPoolExecutor  # here: who compiles nothing does not wait for it
+
     pool = ThreadPoolExecutor(os.cpu_count())
     try:
         list(pool.map(lambda words: run(words, robot, str(folder)), commands))

@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib import resources
-from importlib.metadata import version
 from pathlib import Path
 
 from psdmc.emit.package import PackageView
@@ -51,6 +50,8 @@ def compiled_once(
 @cache
 def _emission() -> tuple[str, ...]:
     """psdmc's version and the digests of the sources that turn kernels into C and C into a library."""
+    from importlib.metadata import version  # here: emission, which compiles nothing, does not wait for it
+
     texts = sorted(
         (file.name, file.read_bytes())
         for file in resources.files("psdmc.templates").iterdir()
