@@ -72,6 +72,13 @@ def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
     return solution
 
 
+def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
+    total: Scalar = 0.0
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
+
+
 def inverse(factors: Factors) -> list[list[Scalar]]:
     """M^-1 from M = L^T D L, both triangles: L^-1 D^-1 L^-T, of which one triangle is computed."""
     n = len(factors.pivots)

@@ -5,11 +5,13 @@ Sines and cosines are taken in groups, as early as their angles are known, so th
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from psdmc.emit.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
+from psdmc.emit.products import Entry, Multiplication, multiplication
 from psdmc.emit.store_groups import GROUP, StoreGroups
+from psdmc.program.products import Product
 from psdmc.program.program import Op, Program, Slot
 
 _ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG})
@@ -72,7 +74,7 @@ class GroupStore:
         return f"STORE_GROUP({self.vector}, {self.index}, {', '.join(self.texts)})"
 
 
-Line = Step | Store | GroupStore
+Line = Step | Store | GroupStore | Entry | Multiplication
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +104,13 @@ class Section:
 class Body:
     """A PROGRAM ready to print.
 
-    unused  vectors of the signature that the PROGRAM never reads
+    unused    vectors of the signature that the PROGRAM never reads
+    products  done behind everything else
     """
 
     sections: tuple[Section, ...]
     unused: tuple[str, ...]
+    products: tuple[Multiplication, ...] = ()
 
 
 def make_body(
@@ -116,8 +120,9 @@ def make_body(
     suffix: str,
     stores_early: bool,
     in_groups: Collection[str] = (),
+    products: Sequence[Product] = (),
 ) -> Body:
-    """Lay out a PROGRAM.
+    """Lay out a PROGRAM, and products of what it puts out.
 
     inputs        vectors of the signature that may be read
     sizes         output vectors and their lengths; entries that the PROGRAM does not store become zero
@@ -126,22 +131,34 @@ def make_body(
     in_groups     vectors that are also stored in groups of four, as soon as the last of them is known; where there are
                   others beside them, STORE_BLOCK stores those
     """
+    multiplied = tuple(multiplication(program, product, sizes) for product in products)
+    sizes = {name: size for name, size in sizes.items() if name not in {each.output for each in multiplied}}
     groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
     beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
-    writer = _Writer(program, suffix, stores_early, groups, frozenset(beside.difference(in_groups)))
+    writer = _Writer(
+        program, suffix, stores_early, groups, frozenset(beside.difference(in_groups)), multiplied
+    )
     sections = writer.sections(sizes)
     read = {slot.vector for slot in program.inputs()}
-    return Body(sections, tuple(name for name in inputs if name not in read))
+    return Body(sections, tuple(name for name in inputs if name not in read), multiplied)
 
 
 class _Writer:
     """Texts of a PROGRAM's values, made in the order in which they are printed."""
 
     def __init__(
-        self, program: Program, suffix: str, stores_early: bool, groups: StoreGroups, beside: frozenset[str]
+        self,
+        program: Program,
+        suffix: str,
+        stores_early: bool,
+        groups: StoreGroups,
+        beside: frozenset[str],
+        products: Sequence[Multiplication],
     ) -> None:
         self.program, self.suffix, self.stores_early = program, suffix, stores_early
         self.groups, self.beside = groups, beside
+        self.left = {product.left: product.shape for product in products}
+        self.right = {product.right: product.shape for product in products}
         self.stored: dict[Slot, Store] = {}
         self.names = Names.of(program)
         self.stores: dict[int, list[Slot]] = {}
@@ -192,7 +209,16 @@ class _Writer:
         return [line for slot, i in self.program.outputs for line in self._store(slot, i)]
 
     def _store(self, slot: Slot, i: int) -> list[Line]:
-        return self._stored(self._store_of(slot, self._value(i).text, self.names.uniform[i]))
+        text, uniform = self._value(i).text, self.names.uniform[i]
+        if slot.vector in self.right:
+            column, row = divmod(slot.index, self.right[slot.vector].n)
+            kept = column >= self.right[slot.vector].zero
+            return [Entry("KEEP", slot.vector, row, column, spread(text, uniform))] if kept else []
+        stored = self._stored(self._store_of(slot, text, uniform))
+        if slot.vector in self.left:
+            row, column = divmod(slot.index, self.left[slot.vector].n)
+            stored.append(Entry("NAME", slot.vector, row, column, spread(text, uniform)))
+        return stored
 
     def _store_of(self, slot: Slot, text: str, uniform: bool) -> Store:
         macro = "STORE_BLOCK" if slot.vector in self.beside else "STORE"

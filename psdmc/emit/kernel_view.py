@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from psdmc.emit.body import Body, make_body
 from psdmc.emit.options import EmitOptions
+from psdmc.emit.products import Multiplication
 from psdmc.emit.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
 from psdmc.emit.store_groups import GROUP
 from psdmc.errors import InternalError
@@ -60,6 +61,11 @@ class KernelView:
     pivot_order: tuple[int, ...]
     cost: Cost
     lowering: str
+
+    @property
+    def called(self) -> str:
+        """Name of the kernel that its stages call, '' where it has a body."""
+        return f"{self.function.calls}{'_theta' if self.theta else ''}" if self.function.calls else ""
 
     @property
     def direct(self) -> bool:
@@ -129,6 +135,20 @@ class KernelView:
             f"{output.name}_{'row' if output.direct else 'block'} + lane" for output in self.outputs
         )
 
+    @property
+    def row_arguments(self) -> str:
+        """What the function for one state is called with for a row."""
+        inputs, outputs = (
+            [f"{vector.name} + row * {vector.size}" for vector in vectors]
+            for vectors in (self.inputs, self.outputs)
+        )
+        return ", ".join([*inputs, *(["theta_b"] if self.theta else []), *outputs])
+
+    @property
+    def one_arguments(self) -> str:
+        """The same for one state that was taken out of its block of lanes."""
+        return ", ".join(f"{vector.name}_one" for vector in (*self.inputs, *self.outputs))
+
     def _arguments(self, outputs: Iterable[str]) -> str:
         names = [f"{vector.name}_block + lane" for vector in self.inputs]
         names += ["theta_b"] if self.theta else []
@@ -166,6 +186,11 @@ class FunctionView:
         return any(kernel.pivot_order for kernel in self.kernels)
 
     @property
+    def products(self) -> tuple[Multiplication, ...]:
+        """Those of all kernels."""
+        return tuple(p for kernel in self.kernels for p in kernel.single_body.products)
+
+    @property
     def needs_parameters(self) -> bool:
         return self.signature.theta
 
@@ -194,14 +219,15 @@ def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) 
             q.name,
             sizes.size(q),
             sizes.shape(q.axes),
-            has_batches and _is_direct(q, sizes),
+            has_batches and not function.calls and _is_direct(q, sizes),
             _zero(q, kernel.single, sizes),
         )
         for q in function.outputs
     )
-    single_body = _body(kernel, kernel.single, outputs, options)
-    has_own = has_batches and kernel.batch is not kernel.single
-    lanes_body = _body(kernel, kernel.batch, outputs, options) if has_own else single_body
+    if function.calls:
+        single_body = lanes_body = Body((), ())
+    else:
+        single_body, lanes_body = _bodies(kernel, outputs, options)
     shared = single_body == lanes_body
     positive = _vector(function.positive.quantity, sizes) if function.positive else None
     return KernelView(
@@ -224,6 +250,15 @@ def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) 
     )
 
 
+def _bodies(kernel: Kernel, outputs: tuple[OutputView, ...], options: EmitOptions) -> tuple[Body, Body]:
+    """For one state and for lanes."""
+    one, lanes = kernel.before or kernel.single, kernel.before or kernel.batch
+    single = _body(kernel, one, outputs, options)
+    if not options.target.has_batches or lanes is one:
+        return single, single
+    return single, _body(kernel, lanes, outputs, options)
+
+
 TAKEN = {
     *(
         "V",
@@ -231,6 +266,8 @@ TAKEN = {
         "STORE",
         "STORE_GROUP",
         "STORE_BLOCK",
+        "KEEP",
+        "NAME",
         "SPLAT",
         "SINCOS",
         "LANES",
@@ -246,9 +283,10 @@ TAKEN = {
 
 def _checked(function: Signature) -> Signature:
     """The function's signature; InternalError where a quantity's name means something else in the emitted C."""
-    for quantity in (*function.inputs, *function.stored):
-        if quantity.name in TAKEN:
-            raise InternalError(f"{function.name}: C takes {quantity.name!r} for something else")
+    names = [quantity.name for quantity in (*function.inputs, *function.stored)]
+    for name in (*names, *(product.right for product in function.products)):
+        if name in TAKEN:
+            raise InternalError(f"{function.name}: C takes {name!r} for something else")
     return function
 
 
@@ -274,7 +312,8 @@ def _body(kernel: Kernel, program: Program, outputs: tuple[OutputView, ...], opt
     suffix = "" if options.real == "float64" else "f"
     has_matrix = any(len(output.shape) > 1 for output in outputs)
     direct = tuple(output.name for output in outputs if output.direct)
-    return make_body(program, kernel.inputs, sizes, suffix, has_matrix, direct)
+    products = kernel.function.products if kernel.before else ()
+    return make_body(program, kernel.inputs, sizes, suffix, has_matrix, direct, products)
 
 
 def _zero(output: Quantity, program: Program, sizes: Sizes) -> tuple[int, ...]:

@@ -15,6 +15,7 @@ from psdmc.emit.lanes import VectorWidth, vector_widths
 from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
+from psdmc.emit.products import Shape
 from psdmc.emit.prototypes import Prototype, payload_prototypes
 from psdmc.emit.reals import check_range
 from psdmc.emit.reference_states import ReferenceStates
@@ -204,6 +205,11 @@ class PackageView:
         return any(kernel.positive and not kernel.fails_alone for kernel in self.kernels)
 
     @property
+    def products(self) -> tuple[Shape, ...]:
+        """Of those that some kernel does behind its PROGRAM, each once."""
+        return tuple(sorted({p.shape for function in self.functions for p in function.products}))
+
+    @property
     def has_several_outputs(self) -> bool:
         return any(len(kernel.outputs) > 1 for kernel in self.kernels)
 
@@ -302,16 +308,24 @@ def library_files(package: PackageView) -> dict[str, str]:
         **(_FOR_BATCHES if package.target.has_batches else {}),
         "src/pivots.h": "pivots.h.jinja",
     }
+    if package.products:
+        named["src/products.h"] = "products.h.jinja"
     files = {path: render(template, package=package) for path, template in named.items()}
     for function in package.functions:
-        files[f"src/{function.name}.c"] = render("function.c.jinja", package=package, function=function)
+        files[f"src/{function.name}.c"] = render(_template(function), package=package, function=function)
         for kernel in function.kernels:
+            if kernel.called:
+                continue
             bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
             for file, body in bodies.items():
                 files[f"src/{file}"] = render("body.inc.jinja", body=body)
     if package.info.payload:
         files["src/payload.c"] = render("payload.c.jinja", package=package)
     return files
+
+
+def _template(function: FunctionView) -> str:
+    return "stages.c.jinja" if function.signature.calls else "function.c.jinja"
 
 
 def _build_files(package: PackageView) -> tuple[tuple[str, str], ...]:

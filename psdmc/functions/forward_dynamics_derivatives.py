@@ -9,7 +9,8 @@ import numpy as np
 
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.solve import factorize, inverse, solve
+from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
+from psdmc.program.products import Product
 from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.accelerations import PIVOTS
 from psdmc.recipes.on_arrays import RobotOnArrays
@@ -23,23 +24,35 @@ if TYPE_CHECKING:
 def trace(g: Ingredients) -> Outputs:
     """d qdd = M^-1 (d tau - d tau_id); tau_id are the torques of inverse dynamics at the same acceleration.
 
-    M and d tau_id / d qd need no acceleration; h = (d tau_id / d qd) qd / 2 + g, as h - g is quadratic in qd.
+    M and d tau_id / d qd need no acceleration; h = (d tau_id / d qd) qd / 2 + g, as h - g is quadratic in qd. Both blocks
+    are multiplied by M^-1 behind the trace; that by qd comes first, so that its entries need not wait.
     """
     at_rest = _torque_derivatives(g, g.still)
     factors = factorize(at_rest.by_qdd)
     rates, gravity = g.inputs["qd"], at_rest.gravity
-    bias = [0.5 * _product(row, rates) + own for row, own in zip(at_rest.by_qd, gravity, strict=True)]
+    bias = [0.5 * inner_product(row, rates) + own for row, own in zip(at_rest.by_qd, gravity, strict=True)]
     load = [tau - h for tau, h in zip(g.inputs["tau"], bias, strict=True)]
     accelerations = solve(factors, load)
     moving = _torque_derivatives(g, accelerations)
     by_tau = inverse(factors)
     return {
+        "dtau_dqd": list(zip(*at_rest.by_qd, strict=True)),
         "qdd": accelerations,
-        "dqdd_dq": _minus_product(by_tau, moving.by_q),
-        "dqdd_dqd": _minus_product(by_tau, moving.by_qd),
+        "dtau_dq": list(zip(*moving.by_q, strict=True)),
         "dqdd_dtau": by_tau,
         "pivot": factors.pivots,
     }
+
+
+def multiplied(g: Ingredients) -> Outputs:
+    """What the function puts out, for functions that go on with it."""
+    found = trace(g)
+    by_tau = found["dqdd_dtau"]
+    blocks = {
+        f"dqdd_d{by}": [[-inner_product(row, column) for column in found[f"dtau_d{by}"]] for row in by_tau]
+        for by in ("q", "qd")
+    }
+    return {"qdd": found["qdd"], **blocks, "dqdd_dtau": by_tau, "pivot": found["pivot"]}
 
 
 def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
@@ -47,19 +60,6 @@ def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
     return inverse_dynamics_derivatives(
         g.frames, g.bodies, g.drives, q, qd, qdd, g.base_acceleration, g.choices
     )
-
-
-def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    total: Scalar = 0.0
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
-
-
-def _minus_product(a: Sequence[Sequence[Scalar]], b: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    """- a b"""
-    columns = list(zip(*b, strict=True))
-    return [[-_product(row, column) for column in columns] for row in a]
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -82,6 +82,7 @@ RECIPE = Recipe(
         (QDD, *(Quantity(name, ("nv", "nv")) for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))),
         theta=True,
         positive=PIVOTS,
+        products=(Product("dqdd_dq", "dqdd_dtau", "dtau_dq"), Product("dqdd_dqd", "dqdd_dtau", "dtau_dqd")),
     ),
     "derivatives of forward dynamics",
     trace,

@@ -29,7 +29,7 @@ ACCELERATIONS = forward_dynamics_derivatives.RECIPE
 
 def trace(g: Ingredients) -> Outputs:
     (dt,) = g.inputs[DT.name]
-    found = ACCELERATIONS.trace(g)
+    found = forward_dynamics_derivatives.multiplied(g)
     rates = stepped(g.inputs["qd"], found["qdd"], dt)
     by_state, by_torque = semi_implicit(found["dqdd_dq"], found["dqdd_dqd"], found["dqdd_dtau"], dt)
     return {

@@ -146,7 +146,7 @@ def _inputs(recipe: Recipe, robot: RobotConstants, tracer: Tracer) -> dict[str, 
 def _stored(signature: Signature, outputs: Outputs) -> Recorded:
     """Every entry of a trace's outputs with its slot, in order of storing; InternalError where they do not fit the
     signature."""
-    if tuple(outputs) != tuple(quantity.name for quantity in signature.stored):
+    if outputs.keys() != signature.traced:
         raise InternalError(f"{signature.name}: its trace gives {', '.join(outputs)}")
     return [
         (Slot(name, i), value) for name, values in outputs.items() for i, value in enumerate(_flat(values))

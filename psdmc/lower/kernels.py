@@ -9,12 +9,14 @@ from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, RECIPES
 from psdmc.lower.expanded.lowering import lower_expanded
-from psdmc.lower.factored import Arrangement, trace_geometry
+from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
+from psdmc.lower.loops import in_loops
 from psdmc.lower.search import Scoring, Search, for_lanes, for_one_state
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
+from psdmc.program.products import written_out
 from psdmc.program.program import Program
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.derivable import require_derivable
@@ -60,7 +62,7 @@ def lower(
 
 def wanted(functions: Sequence[str] | None) -> tuple[str, ...]:
     """The names in the order of psdmc.functions; None and the word 'default': the default ones, 'all': all of them.
-    InputError for one that is unknown."""
+    What a function calls comes along. InputError for one that is unknown."""
     if functions is None:
         return DEFAULT
     groups = {"default": DEFAULT, "all": tuple(RECIPES)}
@@ -70,7 +72,8 @@ def wanted(functions: Sequence[str] | None) -> tuple[str, ...]:
         raise InputError(
             f"function {unknown[0]!r} is not known", f"psdmc generates {', '.join((*RECIPES, *groups))}"
         )
-    return tuple(name for name in RECIPES if name in names)
+    called = {RECIPES[name].signature.calls for name in names}
+    return tuple(name for name in RECIPES if name in names or name in called)
 
 
 def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> InputError:
@@ -82,9 +85,14 @@ def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> I
 
 
 def _kernel(
-    recipe: Recipe, theta: bool, single: Program, batch: Program, lowering: str, costs: Costs
+    recipe: Recipe, theta: bool, single: Program, batch: Program, lowering: str, costs: Costs, n: int
 ) -> Kernel:
     function, score = recipe.signature, for_lanes(costs).score
+    if in_loops(single, function.products, n, costs):
+        before = ordered(shortened(single), costs)[0]
+        whole = written_out(before, function.products)
+        return Kernel(function, theta, whole, whole, lowering, before)
+    single, batch = (written_out(each, function.products) for each in (single, batch))
     one, shared = ordered(shortened(single), costs)
     if batch == single:
         return Kernel(function, theta, one, shared, lowering)
@@ -111,14 +119,19 @@ class _Lowered:
         self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
+        if recipe.signature.calls:
+            arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
+            program = trace_dynamics(recipe, arranged, self._search(theta).robot)
+            return Kernel(recipe.signature, theta, program, program, "factored")
         candidates: list[Kernel] = []
+        n = self.model.n
         if self._may_expand(recipe):
             program = lower_expanded(self.model, recipe, theta, self.costs)
-            candidates.append(_kernel(recipe, theta, program, program, "expanded", self.costs))
+            candidates.append(_kernel(recipe, theta, program, program, "expanded", self.costs, n))
         if self.lowering != "expanded" or not candidates:
             single = self._factored(recipe, theta, self.single)
             batch = self._factored(recipe, theta, self.batch)
-            candidates.append(_kernel(recipe, theta, single, batch, "factored", self.costs))
+            candidates.append(_kernel(recipe, theta, single, batch, "factored", self.costs, n))
         return min(candidates, key=lambda kernel: self.single.score(kernel.single))
 
     def _may_expand(self, recipe: Recipe) -> bool:

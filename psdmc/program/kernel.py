@@ -17,6 +17,8 @@ class Kernel:
     single    arithmetic in an order for one state
     batch     arithmetic in an order for one state per SIMD lane; may be the same object
     lowering  how it was made: 'expanded' or 'factored'
+    before    where the function's products are multiplied in loops: the arithmetic in front of them, for one state and for
+              lanes; single and batch have them written out
     """
 
     function: Signature
@@ -24,15 +26,21 @@ class Kernel:
     single: Program
     batch: Program
     lowering: str
+    before: Program | None = None
 
     def __post_init__(self) -> None:
         inputs = set(self.inputs)
         outputs = {quantity.name for quantity in self.function.stored}
         for program in (self.single, self.batch):
-            foreign = [str(slot) for slot in program.inputs() if slot.vector not in inputs]
-            foreign += [str(slot) for slot, _ in program.outputs if slot.vector not in outputs]
-            if foreign:
-                raise ValueError(f"{self.name}: {foreign[0]} in its PROGRAM is no vector of the function")
+            self._check(program, inputs, outputs)
+        if self.before is not None:
+            self._check(self.before, inputs, set(self.function.traced))
+
+    def _check(self, program: Program, inputs: set[str], outputs: set[str]) -> None:
+        foreign = [str(slot) for slot in program.inputs() if slot.vector not in inputs]
+        foreign += [str(slot) for slot, _ in program.outputs if slot.vector not in outputs]
+        if foreign:
+            raise ValueError(f"{self.name}: {foreign[0]} in its PROGRAM is no vector of the function")
 
     @property
     def name(self) -> str:

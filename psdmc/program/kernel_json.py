@@ -14,7 +14,7 @@ from psdmc.program.signature import Signature
 
 _OPERATIONS = {op.value: op for op in Op}
 
-FORMAT = 1
+FORMAT = 2
 """Version of the text's form."""
 
 
@@ -27,6 +27,7 @@ def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
             "lowering": kernel.lowering,
             "single": _program_to_plain(kernel.single),
             "batch": None if kernel.batch is kernel.single else _program_to_plain(kernel.batch),
+            "before": None if kernel.before is None else _program_to_plain(kernel.before),
         }
         for kernel in kernels.values()
     ]
@@ -51,7 +52,8 @@ def kernels_from_json(text: str, functions: Mapping[str, Signature]) -> dict[str
 def _kernel_from_plain(entry: Mapping[str, Any], functions: Mapping[str, Signature]) -> Kernel:
     single = _program_from_plain(entry["single"])
     batch = single if entry["batch"] is None else _program_from_plain(entry["batch"])
-    return Kernel(functions[entry["function"]], entry["theta"], single, batch, entry["lowering"])
+    before = None if entry["before"] is None else _program_from_plain(entry["before"])
+    return Kernel(functions[entry["function"]], entry["theta"], single, batch, entry["lowering"], before)
 
 
 def _program_to_plain(program: Program) -> list[Any]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from psdmc.errors import InternalError
+from psdmc.program.products import Product
 
 WORDS = ("n", "nq", "nv", "nx", "l", "frames")
 """Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames."""
@@ -88,6 +89,8 @@ class Signature:
     theta     whether a variant exists that takes theta_b (length l) at run time
     positive  computed beside the outputs and not put out: where an entry is not above zero the function fails, its outputs
               are NaN and it returns which; None: it cannot fail
+    products  how outputs that a trace does not give follow from what it gives
+    calls     name of a function of states that its C calls stage by stage, instead of a body of its own
     """
 
     name: str
@@ -97,9 +100,11 @@ class Signature:
     outputs: tuple[Quantity, ...]
     theta: bool
     positive: Positive | None = None
+    products: tuple[Product, ...] = ()
+    calls: str | None = None
 
     def __post_init__(self) -> None:
-        names = [quantity.name for quantity in (*self.inputs, *self.stored)]
+        names = [q.name for q in (*self.inputs, *self.stored)] + [product.right for product in self.products]
         if len(set(names)) != len(names):
             raise ValueError(f"{self.name}: a name stands for two of {', '.join(names)}")
         if not self.inputs or not self.outputs:
@@ -109,6 +114,12 @@ class Signature:
     def stored(self) -> tuple[Quantity, ...]:
         """All quantities that its PROGRAMs put out: outputs, then those that must be positive."""
         return (*self.outputs, *((self.positive.quantity,) if self.positive else ()))
+
+    @property
+    def traced(self) -> frozenset[str]:
+        """Names of everything that its traces give: right factors in the place of products."""
+        right = {product.output: product.right for product in self.products}
+        return frozenset(right.get(quantity.name, quantity.name) for quantity in self.stored)
 
     def label(self, output: Quantity, theta: bool = False) -> str:
         """The name for one output's values: the function's, followed by the output's where there are several."""

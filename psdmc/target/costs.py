@@ -36,6 +36,7 @@ class Costs:
     spills_wait         whether a spilled value delays the code (one instruction after the other); other machines hide it
     crowded             lanes take the order for one state unless it keeps this many times more values alive
     worth_two_bodies    lanes get a body of their own where it saves this factor
+    loops_from          rows from which products of square matrices behind a PROGRAM are loops in code for one state
     longest_of_two      additions; with parameters at run time a longer body is not written twice: it is tens of kilobytes
     """
 
@@ -51,6 +52,7 @@ class Costs:
     crowded: float
     worth_two_bodies: float
     longest_of_two: float
+    loops_from: int
 
     @property
     def has_vectors(self) -> bool:

@@ -19,6 +19,7 @@ COSTS = Costs(
     crowded=1.08,
     worth_two_bodies=1.03,
     longest_of_two=1500.0,
+    loops_from=6,
 )
 """For a current x86 or Arm core with 64-byte vectors. Never detected, so that lowering gives the same result on every
 machine. With this `crowded`, forward dynamics alone has an order for lanes (KR6: the other order keeps 21 % more

@@ -32,6 +32,11 @@ def kernels() -> dict[str, Kernel]:
     return {kernel.name: kernel for kernel in made}
 
 
+def test_what_stands_before_products_comes_back():
+    made = Kernel(SIGNATURES["gravity"], False, GRAVITY, GRAVITY, "factored", GRAVITY)
+    assert kernels_from_json(kernels_to_json({"gravity": made}), SIGNATURES) == {"gravity": made}
+
+
 def test_kernels_come_back_equal_and_in_order():
     found = kernels_from_json(kernels_to_json(kernels()), SIGNATURES)
 
@@ -56,7 +61,7 @@ def test_constants_come_back_bit_for_bit(value: float):
     "change",
     [
         lambda text: text[: len(text) // 2],
-        lambda text: text.replace('"format":1', '"format":2'),
+        lambda text: text.replace('"format":2', '"format":3'),
         lambda text: text.replace('"mul"', '"pow"'),
         lambda text: text.replace('"gravity"', '"weight"'),
         lambda text: text.replace('["mul",2,1]', '["mul",2,9]'),

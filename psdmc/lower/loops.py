@@ -1,0 +1,24 @@
+"""Whether products of matrices behind a PROGRAM become loops."""
+
+from __future__ import annotations
+
+from psdmc.program.cost import cost
+from psdmc.program.products import Product, written_out, zero_columns
+from psdmc.program.program import Program
+from psdmc.target.costs import Costs
+
+DENSE = 1.1
+"""Loops compute all entries: they may have this much more multiplications than products that are written out."""
+
+SPAN = 4
+"""Columns that a loop takes at once."""
+
+
+def in_loops(program: Program, products: tuple[Product, ...], n: int, costs: Costs) -> bool:
+    """Whether loops over n x n matrices pay: these are large enough, and hardly an entry is always zero."""
+    if not products or n < costs.loops_from:
+        return False
+    widths = [n - zero_columns(program, product) for product in products]
+    dense = sum(n * n * width for width in widths)
+    written = cost(written_out(program, products)).mul - cost(program).mul
+    return min(widths) >= SPAN and dense <= DENSE * written

@@ -1,0 +1,64 @@
+"""Products of square matrices behind a PROGRAM: left out of its straight line, multiplied in loops or line by line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isqrt
+
+from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.program import Program, Slot
+from psdmc.program.replay import Value, replayed
+from psdmc.program.trace import Tracer
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """output = - left right, n x n each.
+
+    output  an output of the function that its trace does not give
+    left    an output of the function that it gives, row by row
+    right   what the trace gives in the output's place, column by column: a column of derivatives is by one joint
+    """
+
+    output: str
+    left: str
+    right: str
+
+
+def written_out(program: Program, products: tuple[Product, ...]) -> Program:
+    """The PROGRAM with the products' outputs in the place of their right factors, entry by entry; itself where there are
+    none."""
+    if not products:
+        return program
+    tracer = Tracer()
+    values = dict(zip((slot for slot, _ in program.outputs), replayed(program, tracer, {}), strict=True))
+    by_right = {product.right: product for product in products}
+    outputs: list[tuple[Slot, Value]] = []
+    for slot, value in values.items():
+        product = by_right.get(slot.vector)
+        if product is None:
+            outputs.append((slot, value))
+        elif slot.index == 0:
+            outputs += _multiplied(product, values)
+    return drop_unused(tracer.finish(outputs))
+
+
+def _multiplied(product: Product, values: dict[Slot, Value]) -> list[tuple[Slot, Value]]:
+    n = isqrt(sum(slot.vector == product.right for slot in values))
+    found: list[tuple[Slot, Value]] = []
+    for i in range(n):
+        for j in range(n):
+            total: Value = 0.0
+            for k in range(n):
+                total = total + values[Slot(product.left, i * n + k)] * values[Slot(product.right, j * n + k)]
+            found.append((Slot(product.output, i * n + j), -total))
+    return found
+
+
+def zero_columns(program: Program, product: Product) -> int:
+    """How many of the right factor's first columns are zero at every state."""
+    stored = {
+        slot.index: program.body[i].value for slot, i in program.outputs if slot.vector == product.right
+    }
+    n = isqrt(len(stored))
+    return next((j for j in range(n) if any(stored[j * n + k] != 0.0 for k in range(n))), n)
