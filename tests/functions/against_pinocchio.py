@@ -55,6 +55,7 @@ LONG = frozenset(
         "mass_matrix_inverse",
         "gravity_derivatives",
         "rk4_step",
+        "rk4_step_derivatives",
         "semi_implicit_euler",
         "semi_implicit_euler_derivatives",
     }
