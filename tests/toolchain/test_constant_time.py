@@ -1,4 +1,5 @@
-"""A call executes the same instructions whatever the state: what a real-time loop wants to hear, counted by valgrind."""
+"""A call executes the same instructions whatever the state: what a real-time loop wants to hear, counted by valgrind for
+every function that there is. None asks for memory."""
 
 from __future__ import annotations
 
@@ -8,57 +9,101 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from bundled import bundled_model
 from direct import write_sources
-from traced import arm_package
 
-PROGRAM = r"""
-#include <stdlib.h>
-#include <test_arm/test_arm.h>
+from psdmc.emit.info import package_info
+from psdmc.emit.options import EmitOptions
+from psdmc.emit.package import PackageView, package_view
+from psdmc.functions import RECIPES
+from psdmc.lower.kernels import lower
+from psdmc.recipes.steps import DT
 
-int main(int count, char **words)
-{
-    const double scale = atof(words[count - 1]);
-    double state[3][test_arm_DOF], out[test_arm_DOF];
-    srand((unsigned)scale);
-    for (int call = 0; call < 50; call++) {
-        for (int k = 0; k < 3 * test_arm_DOF; k++) {
-            state[k / test_arm_DOF][k % test_arm_DOF] = scale * (rand() / (double)RAND_MAX - 0.5);
-        }
-        test_arm_inverse_dynamics(state[0], state[1], state[2], out);
-        (void)test_arm_forward_dynamics(state[0], state[1], state[2], out);
-    }
-    return 0;
-}
-"""
+CALLS = 20
 SCALES = ("0", "1e-300", "1", "6", "1e5")
 """Standing still, denormal squares, ordinary motion, several turns, the sincos's whole range."""
 
+SHORT_STEP = 1e-9
+"""s: a long step from the largest states would leave the sincos's range."""
+
+PACKAGES = {
+    "two_link": tuple(RECIPES),
+    "kr6": ("inverse_dynamics", "forward_dynamics", "forward_dynamics_derivatives"),
+}
+"""Robot and functions; of the larger one those that are written otherwise for many joints."""
+
+
+def program_text(package: PackageView) -> str:
+    """C: calls every function CALLS times at random states of a size that the command line gives."""
+    sizes = {q.name: q.size for kernel in package.kernels for q in (*kernel.inputs, *kernel.outputs)}
+    lines = ["#include <stdlib.h>", f"#include <{package.robot}/{package.robot}.h>", ""]
+    lines += [f"static double {name}[{size}];" for name, size in sizes.items()]
+    lines += [
+        "",
+        "int main(int count, char **words)",
+        "{",
+        "    const double scale = atof(words[count - 1]);",
+    ]
+    lines += ["    srand((unsigned)scale);", f"    for (int call = 0; call < {CALLS}; call++) {{"]
+    for name in sorted({vector.name for kernel in package.kernels for vector in kernel.inputs}):
+        lines += [f"        for (int k = 0; k < {sizes[name]}; k++) {{"]
+        times = f"{SHORT_STEP} * " if name == DT.name else "scale * "
+        lines += [f"            {name}[k] = {times}(rand() / (double)RAND_MAX - 0.5);", "        }"]
+    for kernel in package.kernels:
+        names = ", ".join(vector.name for vector in (*kernel.inputs, *kernel.outputs))
+        lines += [f"        (void){package.robot}_{kernel.name}({names});"]
+    return "\n".join([*lines, "    }", "    return 0;", "}", ""])
+
+
+@pytest.fixture(scope="module", params=PACKAGES)
+def package(request: pytest.FixtureRequest) -> PackageView:
+    model = bundled_model(request.param)
+    kernels = lower(model, functions=PACKAGES[request.param], theta_variants=False)
+    return package_view(package_info(model), kernels, EmitOptions())
+
 
 @pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(package: PackageView, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for needed in ("gcc", "valgrind"):
         if shutil.which(needed) is None:
             pytest.skip(f"{needed} is not installed")
-    folder = tmp_path_factory.mktemp("constant")
-    package = arm_package(names=["inverse_dynamics", "forward_dynamics"])
-    write_sources(package, folder)
-    (folder / "main.c").write_text(PROGRAM)
-    sources = [str(folder / source) for source in ("main.c", *package.sources)]
-    words = ["gcc", "-std=c99", "-O2", f"-I{folder}/include", *sources, "-lm", "-o", str(folder / "main")]
-    subprocess.run(words, check=True)
-    return folder / "main"
+    made = tmp_path_factory.mktemp("constant")
+    write_sources(package, made)
+    (made / "main.c").write_text(program_text(package))
+    words = ["gcc", "-std=c99", "-O1", f"-I{made}/include", "-c"]
+    for source in ("main.c", *package.sources):
+        subprocess.run([*words, str(made / source), "-o", str(made / f"{Path(source).stem}.o")], check=True)
+    objects = map(str, sorted(made.glob("*.o")))
+    subprocess.run(["gcc", *objects, "-lm", "-o", str(made / "main")], check=True)
+    return made
 
 
-@pytest.mark.parametrize("function", ["inverse_dynamics", "forward_dynamics"])
-def test_the_number_of_instructions_does_not_depend_on_the_state(function: str, program: Path) -> None:
-    counts = {scale: _instructions(program, f"test_arm_{function}", scale) for scale in SCALES}
-    assert min(counts.values()) > 50 * 100
-    assert len(set(counts.values())) == 1, counts
+def test_the_number_of_instructions_does_not_depend_on_the_state(package: PackageView, folder: Path) -> None:
+    counts = {scale: _instructions(folder, scale, package.robot) for scale in SCALES}
+    (first, *others) = counts.values()
+    assert set(first) == {f"{package.robot}_{kernel.name}" for kernel in package.kernels}
+    assert min(first.values()) > CALLS * 20
+    for name in first:
+        assert {other[name] for other in others} == {first[name]}, name
 
 
-def _instructions(program: Path, symbol: str, scale: str) -> int:
-    words = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", f"--toggle-collect={symbol}"]
-    done = subprocess.run([*words, str(program), scale], capture_output=True, text=True, check=True)
-    found = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
-    assert found, done.stderr
-    return int(found[1])
+def test_no_function_asks_for_memory(package: PackageView, folder: Path) -> None:
+    """What the objects take from elsewhere: other objects of the package, and nothing that allocates."""
+    objects = [str(folder / f"{Path(source).stem}.o") for source in package.sources]
+    listed = subprocess.run(["nm", "-u", *objects], capture_output=True, text=True, check=True).stdout
+    wanted = set(re.findall(r"^\s+U (\w+)", listed, re.MULTILINE))
+    foreign = {name for name in wanted if not name.startswith(f"{package.robot}_")}
+    known = {"sin", "cos", "sincos", "memcpy", "memset", "__stack_chk_fail", "_GLOBAL_OFFSET_TABLE_"}
+    assert foreign <= known
+
+
+def _instructions(folder: Path, scale: str, robot: str) -> dict[str, int]:
+    """Of all calls of each function from main, what they call included."""
+    words = ["valgrind", "--tool=callgrind", "--callgrind-out-file=counts", "--compress-strings=no"]
+    subprocess.run([*words, "./main", scale], capture_output=True, check=True, cwd=folder)
+    (text,) = re.findall(
+        r"^fn=main\n(.*?)^(?:fn|ob|totals)[=:]", (folder / "counts").read_text(), re.MULTILINE | re.DOTALL
+    )
+    found = re.findall(rf"^cfn=({robot}_\w+)\ncalls=(\d+) .*\n\S+ (\d+)$", text, re.MULTILINE)
+    assert all(int(calls) == CALLS for _, calls, _ in found)
+    return {name: int(cost) for name, _, cost in found}
