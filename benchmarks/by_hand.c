@@ -77,5 +77,18 @@ int main(void)
          kr6_inverse_dynamics_derivatives_batch_soa(SOME, q + i * N, qd + i * N, x + i * N, by_q, by_qd, by_x)));
     TIME("forward derivatives lanes", SOME, (to = out,
          kr6_forward_dynamics_derivatives_batch_soa(SOME, q + i * N, qd + i * N, x + i * N, found, by_q, by_qd, by_x)));
+    /* The cotangent is whatever numbers are at hand: x. */
+    TIME("inverse vjp", 1, (to = by_q + i % RING * N,
+         kr6_inverse_dynamics_vjp(q + i * N, qd + i * N, x + i * N, x + i * N, to, by_qd + (to - by_q), by_x + (to - by_q), found)));
+    TIME("forward vjp", 1, (to = by_q + i % RING * N,
+         kr6_forward_dynamics_vjp(q + i * N, qd + i * N, x + i * N, x + i * N, to, by_qd + (to - by_q), by_x + (to - by_q), found)));
+    TIME("inverse vjp rows", SOME, (to = out,
+         kr6_inverse_dynamics_vjp_batch(SOME, q + i * N, qd + i * N, x + i * N, x + i * N, found, by_q, by_qd, by_x)));
+    TIME("forward vjp rows", SOME, (to = out,
+         kr6_forward_dynamics_vjp_batch(SOME, q + i * N, qd + i * N, x + i * N, x + i * N, found, by_q, by_qd, by_x)));
+    TIME("inverse vjp lanes", SOME, (to = out,
+         kr6_inverse_dynamics_vjp_batch_soa(SOME, q + i * N, qd + i * N, x + i * N, x + i * N, found, by_q, by_qd, by_x)));
+    TIME("forward vjp lanes", SOME, (to = out,
+         kr6_forward_dynamics_vjp_batch_soa(SOME, q + i * N, qd + i * N, x + i * N, x + i * N, found, by_q, by_qd, by_x)));
     return check + by_q[7] + by_qd[7] + by_x[7] + found[1] == 0.0;
 }

@@ -5,7 +5,8 @@ set -eu
 made=generated/by_hand
 mkdir -p "$made"
 psdmc derive examples/robots/kr6.toml -o "$made/kr6.npz" > "$made/log" 2>&1
-psdmc emit-c "$made/kr6.npz" -o "$made/kr6" --functions default,inverse_dynamics_derivatives,forward_dynamics_derivatives >> "$made/log" 2>&1
+psdmc emit-c "$made/kr6.npz" -o "$made/kr6" \
+    --functions default,inverse_dynamics_derivatives,forward_dynamics_derivatives,inverse_dynamics_vjp,forward_dynamics_vjp >> "$made/log" 2>&1
 gcc -std=c11 -O3 -march=native -ffp-contract=fast -fno-math-errno -fno-trapping-math \
     -fno-tree-slp-vectorize -I"$made/kr6/include" \
     benchmarks/by_hand.c "$made"/kr6/src/[a-z]*.c -lm -o "$made/psdmc"

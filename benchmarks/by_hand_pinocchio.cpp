@@ -68,5 +68,21 @@ int main() {
     computeABADerivatives(model, data, q[i], qd[i], x[i]);
     check += data.ddq_dq(0, 1);
   });
+  // No reverse mode: whole matrices, then the cotangent times them.
+  Eigen::VectorXd by_q(joints), by_qd(joints), by_x(joints);
+  const auto multiplied = [&](const Eigen::MatrixXd &in_q, const Eigen::MatrixXd &in_qd, const Eigen::MatrixXd &in_x, int i) {
+    by_q.noalias() = in_q.transpose() * x[i];
+    by_qd.noalias() = in_qd.transpose() * x[i];
+    by_x.noalias() = in_x.selfadjointView<Eigen::Upper>() * x[i];
+    check += by_q[1] + by_qd[1] + by_x[1];
+  };
+  report("inverse vjp", [&](int i) {
+    computeRNEADerivatives(model, data, q[i], qd[i], x[i]);
+    multiplied(data.dtau_dq, data.dtau_dv, data.M, i);
+  });
+  report("forward vjp", [&](int i) {
+    computeABADerivatives(model, data, q[i], qd[i], x[i]);
+    multiplied(data.ddq_dq, data.ddq_dv, data.Minv, i);
+  });
   return check == 0;
 }

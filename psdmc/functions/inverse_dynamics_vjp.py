@@ -59,4 +59,5 @@ RECIPE = Recipe(
     "rnea, computeRNEADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    benched=True,
 )

@@ -12,7 +12,7 @@ from psdmc.dynamics.scalar import Scalar
 from psdmc.functions import forward_dynamics_derivatives, rk4_step
 from psdmc.program.signature import Signature
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, A, B, step_on_arrays
 from psdmc.robot.mechanism import Array
 
@@ -151,5 +151,4 @@ RECIPE = Recipe(
     "aba, computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    needs=Needs.POSITIVE_MASS,
 )

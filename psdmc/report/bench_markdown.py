@@ -27,7 +27,12 @@ DERIVATIVES = tuple(
     for layout, how in (("state", ""), ("rows", ", batch rows"), ("lanes", ", lane by lane"))
     for name in ("inverse", "forward")
 )
-"""Function, layout and title of the two tables' columns."""
+GRADIENTS = tuple(
+    (f"{name}_dynamics_vjp", layout, f"gradient of {name} dynamics{how}")
+    for layout, how in (("state", ""), ("rows", ", batch rows"), ("lanes", ", lane by lane"))
+    for name in ("inverse", "forward")
+)
+"""Function, layout and title of the three tables' columns."""
 
 
 def markdown(result: BenchResult, command: str = "make bench") -> str:
@@ -36,7 +41,7 @@ def markdown(result: BenchResult, command: str = "make bench") -> str:
 
 
 def _lines(result: BenchResult, command: str) -> Iterator[str]:
-    for columns in (DYNAMICS, DERIVATIVES):
+    for columns in (DYNAMICS, DERIVATIVES, GRADIENTS):
         yield "| robot | " + " | ".join(title for _, _, title in columns) + " |"
         yield "|" + "---|" * (len(columns) + 1)
         for case in result.cases:

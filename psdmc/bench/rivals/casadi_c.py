@@ -36,9 +36,13 @@ WAYS = {
         f"{name}_derivatives": (f"{name}_derivatives_jacobian", f"{name}_derivatives_recursion")
         for name in ("inverse_dynamics", "forward_dynamics")
     },
+    "forward_dynamics_vjp": ("forward_dynamics_vjp_aba", "forward_dynamics_vjp_ldl"),
 }
 """Its functions; forward dynamics by articulated bodies, or from M and h by L D L^T; derivatives by CasADi's own
-differentiation of rnea and of the latter, or by Pinocchio's recursions."""
+differentiation of rnea and of the latter, or by Pinocchio's recursions; gradients by its reverse mode."""
+
+FOURTH = frozenset(WAYS["inverse_dynamics_vjp"] + WAYS["forward_dynamics_vjp"])
+"""Ways that read a fourth input, the cotangent."""
 
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
@@ -126,8 +130,8 @@ def _scalar(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
     lines += [f"int {way}(const double **, double **, int *, double *, int);" for way in _all_ways()]
     lines += ["}"]
     lines += [
-        f"PSDMC_CONTESTANT({way}, [](const double *q, const double *qd, const double *x, double *out) {{ "
-        f"const double *in[] = {{q, qd, x}}; {way}(in, &out, nullptr, nullptr, 0); }})"
+        f"PSDMC_CONTESTANT({way}, []({_given(way)}) {{ "
+        f"const double *in[] = {{{', '.join(_names(way))}}}; {way}(in, &out, nullptr, nullptr, 0); }})"
         for way in _all_ways()
     ]
     sources = {
@@ -160,10 +164,10 @@ def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
     ]
     lines += ["PSDMC_EXPORT int lanes() { return PSDMC_LANES; }"]
     lines += [
-        f"PSDMC_BATCH_CONTESTANT({way}, [](std::size_t count, const double *q, const double *qd, const double *x, "
-        f"double *out) {{ for (std::size_t i = 0; i < count; i += PSDMC_LANES) {{ "
-        f"const Lanes *in[] = {{(const Lanes *)(q + i * {case.n}), (const Lanes *)(qd + i * {case.n}), "
-        f"(const Lanes *)(x + i * {case.n})}}; Lanes *to = (Lanes *)(out + i * {size[way]}); "
+        f"PSDMC_BATCH_CONTESTANT({way}, [](std::size_t count, {_given(way)}) {{ "
+        f"for (std::size_t i = 0; i < count; i += PSDMC_LANES) {{ const Lanes *in[] = {{"
+        f"{', '.join(f'(const Lanes *)({name} + i * {case.n})' for name in _names(way))}}}; "
+        f"Lanes *to = (Lanes *)(out + i * {size[way]}); "
         f"casadi_c::{way}(in, &to, nullptr, nullptr, 0); }} }})"
         for way in _all_ways()
     ]
@@ -184,6 +188,15 @@ def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
         "-lm",
     ]
     return built("casadi_lanes.so", command, sources)
+
+
+def _names(way: str) -> tuple[str, ...]:
+    """Of a way's inputs."""
+    return ("q", "qd", "x", "y") if way in FOURTH else ("q", "qd", "x")
+
+
+def _given(way: str) -> str:
+    return ", ".join([*(f"const double *{name}" for name in _names(way)), "double *out"])
 
 
 def _all_ways() -> list[str]:

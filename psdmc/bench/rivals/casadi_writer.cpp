@@ -94,13 +94,14 @@ struct Generated {
 
 struct Writer {
   Model model;
-  SX q, qd, x;
+  SX q, qd, x, cotangent;
   Vector q_, qd_, x_;
 
   explicit Writer(std::istream &robot) {
     read_model(robot, model);
     const auto n = model.nv;
     q = SX::sym("q", n), qd = SX::sym("qd", n), x = SX::sym("x", n);
+    cotangent = SX::sym("cotangent", n);
     q_.resize(n), qd_.resize(n), x_.resize(n);
     for (int i = 0; i < n; ++i) q_(i) = q(i), qd_(i) = qd(i), x_(i) = x(i);
   }
@@ -109,6 +110,14 @@ struct Writer {
 
   casadi::Function function(const std::string &name, const SX &output) const {
     return casadi::Function(name, {q, qd, x}, {cse(output)});
+  }
+
+  /// Reverse mode: `output`, and the gradients of cotangent . output by q, qd and x.
+  casadi::Function vjp(const std::string &name, const Vector &output) const {
+    const SX value = column(output);
+    std::vector<SX> all{value};
+    for (const SX &input : {q, qd, x}) all.push_back(SX::jtimes(value, input, cotangent, true));
+    return casadi::Function(name, {q, qd, x, cotangent}, {cse(SX::vertcat(all))});
   }
 
   /// The derivatives of `output` by each of `inputs`, behind each other.
@@ -168,6 +177,9 @@ struct Writer {
     code.add(function("inverse_dynamics_derivatives_recursion", inverse_dynamics_recursion()));
     code.add(function("forward_dynamics_derivatives_jacobian", forward_dynamics_jacobian()));
     code.add(function("forward_dynamics_derivatives_recursion", forward_dynamics_recursion()));
+    code.add(vjp("inverse_dynamics_vjp", pinocchio::rnea(model, data, q_, qd_, x_)));
+    code.add(vjp("forward_dynamics_vjp_aba", pinocchio::aba(model, data, q_, qd_, x_)));
+    code.add(vjp("forward_dynamics_vjp_ldl", solved(mass_matrix(), x_ - nonlinear_effects())));
     code.generate();
     function("forward_dynamics", Matrix(pinocchio::aba(model, data, q_, qd_, x_))).save(name + ".casadi");
   }

@@ -85,6 +85,28 @@ void aba_derivatives(const double *q, const double *qd, const double *tau, doubl
   if (copies_matrices) give_matrices(data->ddq_dq, data->ddq_dv, data->Minv, out + model->nv);
 }
 
+/// Pinocchio has no reverse mode: whole matrices, and the cotangent times them.
+template <class ByQ, class ByQd, class Last>
+void give_products(const ByQ &by_q, const ByQd &by_qd, const Last &last, const double *cotangent, double *to) {
+  const auto n = model->nv;
+  const Vector weights = vector(cotangent);
+  Eigen::Map<Eigen::VectorXd>(to, n).noalias() = by_q.transpose() * weights;
+  Eigen::Map<Eigen::VectorXd>(to + n, n).noalias() = by_qd.transpose() * weights;
+  Eigen::Map<Eigen::VectorXd>(to + 2 * n, n).noalias() = last.template selfadjointView<Eigen::Upper>() * weights;
+}
+
+void rnea_vjp(const double *q, const double *qd, const double *qdd, const double *cotangent, double *out) {
+  pinocchio::computeRNEADerivatives(*model, *data, vector(q), vector(qd), vector(qdd));
+  give(data->tau, out);
+  give_products(data->dtau_dq, data->dtau_dv, data->M, cotangent, out + model->nv);
+}
+
+void aba_vjp(const double *q, const double *qd, const double *tau, const double *cotangent, double *out) {
+  pinocchio::computeABADerivatives(*model, *data, vector(q), vector(qd), vector(tau));
+  give(data->ddq, out);
+  give_products(data->ddq_dq, data->ddq_dv, data->Minv, cotangent, out + model->nv);
+}
+
 }  // namespace
 
 PSDMC_EXPORT int setup(const char *robot) {
@@ -107,3 +129,5 @@ PSDMC_CONTESTANT(gravity, gravity)
 PSDMC_CONTESTANT(regressor, regressor)
 PSDMC_CONTESTANT(inverse_dynamics_derivatives, rnea_derivatives)
 PSDMC_CONTESTANT(forward_dynamics_derivatives, aba_derivatives)
+PSDMC_CONTESTANT(inverse_dynamics_vjp, rnea_vjp)
+PSDMC_CONTESTANT(forward_dynamics_vjp, aba_vjp)

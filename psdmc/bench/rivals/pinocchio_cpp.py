@@ -31,6 +31,8 @@ SYMBOLS = {
     "regressor": ("regressor",),
     "inverse_dynamics_derivatives": ("inverse_dynamics_derivatives",),
     "forward_dynamics_derivatives": ("forward_dynamics_derivatives",),
+    "inverse_dynamics_vjp": ("inverse_dynamics_vjp",),
+    "forward_dynamics_vjp": ("forward_dynamics_vjp",),
 }
 
 DEFINES = (
