@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-demo test-accuracy test-lowest audit fuzz test-sanitize
+.PHONY: help venv demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-lowest audit fuzz test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -57,6 +57,9 @@ test-demo: $(READY) ## the virtual Denso's whole campaign by the bounds of its t
 
 test-accuracy: $(READY) ## the table of accuracies with every robot's C optimised; make test takes one robot of each kind
 	PSDMC_ACCURACY=whole $(RUN)/python -m pytest -n $(JOBS) -rP tests/end_to_end/test_accuracy_table.py
+
+test-trees: $(READY) ## 20 whole robots, compiled, and 300 random trees against Pinocchio and MuJoCo, with figures; make test takes a few
+	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py
 
 LOWEST := .venv-lowest
 LOWEST_TESTS = $(FAST) tests/test_atomic.py tests/emit/test_package.py tests/emit/test_write.py tests/toolchain/test_call.py \

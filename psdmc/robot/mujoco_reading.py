@@ -3,7 +3,7 @@ Pinocchio's."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
@@ -97,10 +97,12 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     root = parse_xml(loaded.source_text, loaded.source_name, "robot")
     if any(element.get("quat_xyzw") is not None for element in root.iter("origin")):
         raise NotCompared("MuJoCo reads no quat_xyzw")
+    moving = [*loaded.mechanism.joint_names, *_held(loaded)]
+    _drop_still_bodies(root, moving)
     dropped = _massless(root)
     if dropped:
         raise NotCompared(f"MuJoCo drops inertia without mass, as link {shown(dropped)} has it")
-    text = dynamics_of(root, [*loaded.mechanism.joint_names, *_held(loaded)], {})
+    text = dynamics_of(root, moving, {})
     SubElement(SubElement(text, "mujoco"), "compiler", COMPILER)
     try:
         model = mujoco.MjModel.from_xml_string(tostring(text, encoding="unicode"))
@@ -111,6 +113,21 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     disabled = mujoco.mjtDisableBit
     model.opt.disableflags |= disabled.mjDSBL_CONSTRAINT
     return model
+
+
+def _drop_still_bodies(root: Element, moving: Collection[str]) -> None:
+    """Take the bodies of links that no joint moves out: they have no part in any torque, and MuJoCo looks at them."""
+    above = {}
+    for joint in root.findall("joint"):
+        parent, child = joint.find("parent"), joint.find("child")
+        if parent is not None and child is not None:
+            above[child.get("link")] = joint.get("name", ""), parent.get("link")
+    for link in root.findall("link"):
+        name, inertial = link.get("name"), link.find("inertial")
+        while name in above and above[name][0] not in moving:
+            name = above[name][1]
+        if name not in above and inertial is not None:
+            link.remove(inertial)
 
 
 def _massless(root: Element) -> str | None:

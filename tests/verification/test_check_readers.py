@@ -254,7 +254,7 @@ def test_mujoco_reads_the_file_too() -> None:
         ),
         (
             lambda: load_robot_text(oblique_urdf(BODY.replace('value="1.5"', 'value="0 "')), "urdf"),
-            "not compared: MuJoCo drops inertia without mass, as link 'root' has it",
+            "not compared: MuJoCo drops inertia without mass, as link 'a' has it",
         ),
         (
             lambda: load_robot_text(oblique_urdf(), "urdf", assume_zero=("c:mx",)),
