@@ -10,10 +10,19 @@ from random_chains import _body, _rotation, _tidy
 from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.dynamics.frames import BASE, Frame, frame_at
 from psdmc.dynamics.parameters import moved
-from psdmc.robot.joints import PRISMATIC, REVOLUTE
+from psdmc.dynamics.slices import first_rates
+from psdmc.robot.joints import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TRANSLATION
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism, Placement
 
-TYPES = {"R": REVOLUTE, "P": PRISMATIC, "H": HELICAL}
+TYPES = {
+    "R": REVOLUTE,
+    "P": PRISMATIC,
+    "H": HELICAL,
+    "F": FREE,
+    "S": SPHERICAL,
+    "L": PLANAR,
+    "T": TRANSLATION,
+}
 
 TREES = {
     "a fork": (BASE, 0, 0),
@@ -41,7 +50,10 @@ class RandomTree:
         self.types = [TYPES[kind] for kind in kinds[: self.n]]
         self.places = [self._place(rng, parallel) for _ in parents]
         self.parameters = np.array([_body(rng) for _ in parents])
-        self.drives = rng.uniform(0.0, 0.3, self.n).tolist()
+        drives = rng.uniform(0.0, 0.3, self.n).tolist()
+        self.drives = [
+            drive if joint.about_z else 0.0 for drive, joint in zip(drives, self.types, strict=True)
+        ]
         self.gravity = rng.normal(size=3) * 5.0
         self.model, self.joints = self._pinocchio()
         self.data = self.model.createData()
@@ -98,7 +110,8 @@ class RandomTree:
         model.gravity.linear = self.gravity.copy()
         armature = np.zeros(model.nv)
         for joint, drive in zip(joints, self.drives, strict=True):
-            armature[model.joints[joint].idx_v] = drive
+            own = model.joints[joint]
+            armature[own.idx_v : own.idx_v + own.nv] = drive
         model.armature = armature
         return model, joints
 
@@ -109,20 +122,49 @@ class RandomTree:
 
     @property
     def order(self) -> list[int]:
-        """Where our joints are in Pinocchio's vectors."""
-        return [self.model.joints[joint].idx_v for joint in self.joints]
+        """Where our joints' rates are in Pinocchio's vectors."""
+        own = [self.model.joints[joint] for joint in self.joints]
+        return [joint.idx_v + k for joint in own for k in range(joint.nv)]
+
+    @property
+    def order_q(self) -> list[int]:
+        """Where our joints' coordinates are in Pinocchio's."""
+        own = [self.model.joints[joint] for joint in self.joints]
+        return [joint.idx_q + k for joint in own for k in range(joint.nq)]
+
+    @property
+    def nv(self) -> int:
+        return first_rates(self.frames)[-1]
 
     def theirs(self, values: np.ndarray) -> np.ndarray:
-        """A vector of ours in Pinocchio's order."""
+        """Rates of ours in Pinocchio's order; positions too, where each joint has one coordinate."""
         out = np.zeros(self.model.nv)
         out[self.order] = values
         return out
+
+    def theirs_at(self, q: np.ndarray) -> np.ndarray:
+        """Positions of ours in Pinocchio's order."""
+        out = np.zeros(self.model.nq)
+        out[self.order_q] = q
+        return out
+
+    def motion(self, count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(count, nq) positions, quaternions of length one, and (count, nv) rates and accelerations."""
+        rng = np.random.default_rng(seed)
+        q = np.concatenate(
+            [joint.normalized(rng.uniform(-2.0, 2.0, (joint.nq, count))) for joint in self.types]
+        )
+        qd, qdd = rng.uniform(-2.0, 2.0, (2, count, self.nv))
+        return q.T, qd, qdd
 
     def states(self, count: int, vectors: int, seed: int = 0) -> np.ndarray:
         return np.random.default_rng(seed).uniform(-2.0, 2.0, (vectors, count, self.n))
 
     def each(self, function, *states: np.ndarray) -> np.ndarray:
-        """A Pinocchio function of the states, its vector (or its matrix's last axis) in our order."""
+        """A Pinocchio function of positions and rates, its vector (or its matrix's last axis) in our order."""
         rows = zip(*states, strict=True)
-        found = [np.array(function(self.model, self.data, *map(self.theirs, row))) for row in rows]
+        found = [
+            np.array(function(self.model, self.data, self.theirs_at(q), *map(self.theirs, row)))
+            for q, *row in rows
+        ]
         return np.array(found)[..., self.order]

@@ -14,7 +14,7 @@ from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor
 from psdmc.errors import DerivationError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.random_states import random_states
+from psdmc.model.random_states import states_of
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
@@ -77,8 +77,8 @@ def certificate(model: DynamicsModel) -> Array:
 def measured(model: DynamicsModel) -> Measured:
     rng = np.random.default_rng(SEED)
     x, theta = _parameters(model, rng)
-    q, qd, qdd = random_states(rng, SAMPLES, model.n)
-    chain, none = model.mechanism, np.zeros(model.n)
+    chain, none = model.mechanism, np.zeros(model.nv)
+    q, qd, qdd = states_of(chain, rng, SAMPLES)
     states = (list(q.T), list(qd.T), list(qdd.T))
     with np.errstate(over="ignore", invalid="ignore"):
         torques = model.torques_for(theta, q, qd, qdd)
@@ -119,7 +119,7 @@ def _newton_euler(chain: Mechanism, x: Array, states: States) -> Array:
 def _too_fine(found: Measured, known: Array) -> DerivationError:
     """The error that names the joint whose torque is not known, or not found, to PROMISED, with the remedy."""
     chain, worst = found.model.mechanism, int(np.argmax(known))
-    joint, expected = chain.joints[worst], f"expected {PROMISED:g} at most"
+    joint, expected = chain.joints[chain.rate_joints[worst]], f"expected {PROMISED:g} at most"
     unit = "N" if joint.type.length_order else "N m"
     largest = np.abs(found.reference[:, worst]).max()
     whose = (
@@ -149,7 +149,8 @@ def _failure(found: Measured, errors: Array) -> DerivationError | InternalError:
     chain, largest = found.model.mechanism, np.abs(found.reference).max(axis=0)
     cancelled = _contributions(chain, found.x, found.states) / np.where(largest > 0, largest, 1.0)
     worst = int(np.argmax(np.where(np.isfinite(errors), errors, np.inf)))
-    name = f"'{chain.name}': joint '{chain.joint_names[worst]}'"
+    joint = chain.joint_names[chain.rate_joints[worst]]
+    name = f"'{chain.name}': joint '{joint}'"
     if not np.isfinite(cancelled).all():
         return DerivationError(f"{name}: its torque overflows double precision", SCALES)
     if np.all(errors <= np.maximum(WORST_ALLOWED, ROUNDING * cancelled)):
@@ -161,8 +162,7 @@ def _failure(found: Measured, errors: Array) -> DerivationError | InternalError:
     if np.any(found.last_digit > PROMISED):
         return _too_fine(found, np.maximum(errors, found.last_digit))
     return InternalError(
-        f"joint '{chain.joint_names[worst]}': the derived model is off Newton-Euler by "
-        f"{errors[worst]:.2g} of its largest torque"
+        f"joint '{joint}': the derived model is off Newton-Euler by {errors[worst]:.2g} of its largest torque"
     )
 
 

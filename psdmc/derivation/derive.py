@@ -20,7 +20,7 @@ from psdmc.derivation.expand import (
     precision_for,
 )
 from psdmc.derivation.link_by_link import EFFECT
-from psdmc.derivation.memory import refuse_long, refuse_uncountable, types_along_ways
+from psdmc.derivation.memory import WITHOUT, refuse_long, refuse_uncountable, types_along_ways
 from psdmc.derivation.reduce import PIVOT_TOLERANCE, Reduction
 from psdmc.derivation.rounding import merged
 from psdmc.derivation.sampled import reduction_of
@@ -61,7 +61,8 @@ def derive_model(
 ) -> DynamicsModel:
     """The chain's dynamics as E, P and theta_b, certified.
 
-    expand      False leaves E and P out: base parameters alone, for robots of any size; None: for trees
+    expand      False leaves E and P out: base parameters alone, for robots of any size; None: for trees, and for joints of
+                several coordinates
     progress    called with the name of each step as it begins
     provenance  plain JSON values to keep with the model; the tolerances used are added
     memory      bytes that the expansion may take; default: most of what the machine has free
@@ -73,8 +74,9 @@ def derive_model(
     require_derivable(chain)
     _refuse_absurd(chain)
     if expand is None:
-        expand = chain.is_serial
+        expand = chain.is_serial and all(kind.about_z for kind in chain.types)
     if expand:
+        _refuse_wide(chain)
         refuse_long(0, types_along_ways(chain.types, chain.parents), len(chain))
         refuse_uncountable(chain.types)
     robot = scaled(chain)
@@ -95,7 +97,7 @@ def derive_model(
             theta_b=theta_b,
             B=B,
             mechanism=chain,
-            certificate=np.zeros(len(chain)),
+            certificate=np.zeros(chain.nv),
             provenance=_plain(dict(provenance or {}) | used),
         )
 
@@ -109,6 +111,15 @@ def derive_model(
 
 
 _expanded = expand
+
+
+def _refuse_wide(chain: Mechanism) -> None:
+    wide = next((joint for joint in chain.joints if not joint.type.about_z), None)
+    if wide is not None:
+        raise DerivationError(
+            f"'{chain.name}': joint '{wide.name}' {wide.type.verb}: E and P are of joints of one coordinate",
+            f"derive with --no-expand: {WITHOUT}",
+        )
 
 
 def _refuse_absurd(chain: Mechanism) -> None:

@@ -27,10 +27,12 @@ SAMPLED_JOINTS = 10
 
 
 def reduction_of(scaled: Scaled) -> Reduction:
-    """The base parameters. They are found from sampled rows of doubles where those are few and of one scale, angles and
+    """The base parameters. They are found from sampled rows of doubles where joints have one coordinate each, rows are few
+    and of one scale, angles and
     lengths are not so small that their squares are rounding, and no column is nearly dependent; else link by link in
     extended precision."""
     is_plain = not is_of_many_scales(scaled) and not has_small_entries(scaled)
+    is_plain = is_plain and all(joint.about_z for joint in scaled.types)
     if is_plain and len(scaled.types) <= SAMPLED_JOINTS:
         reduction = sampled_reduction(scaled)
         if reduction.is_clear:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from psdmc.dynamics.frames import Frame, Turn, to_previous
-from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, rotated_tensor
+from psdmc.dynamics.frames import Frame, Rotation, Turn, to_previous
+from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, multiply, rotated_tensor, transform, transpose
 
 
 class Body(NamedTuple):
@@ -32,14 +32,16 @@ def body_from_parameters(x: Sequence[Scalar]) -> Body:
     return Body(m, (hx, hy, hz), (half_trace - ixx, half_trace - iyy, half_trace - izz, -ixy, -ixz, -iyz))
 
 
-def turned(body: Body, turn: Turn | None, double: Turn | None = None) -> Body:
-    """A body about a frame, turned into the frame before that frame's rotation about z: R h, R S R^T.
+def turned(body: Body, turn: Turn | Rotation | None, double: Turn | None = None) -> Body:
+    """A body about a frame, turned into the frame before that frame's rotation (about z, or any): R h, R S R^T.
 
     The second moment xx loses s^2 (xx - yy) + 2 s c xy, and yy gains it. With `double`, half the difference of xx and
     yy and the product xy are turned by twice the angle instead.
     """
     if turn is None:
         return body
+    if isinstance(turn, Rotation):
+        return _rotated(body, turn.rows)
     xx, yy, zz, xy, xz, yz = body.second
     difference = xx - yy
     if double is None:
@@ -80,8 +82,16 @@ def in_previous(frame: Frame, body: Body) -> Body:
         yz = sine * cosine * difference + (1.0 - 2.0 * sine * sine) * yz
         xy, xz, _ = Turn(sine, cosine).inward((xy, xz, 0.0))
         return Body(body.mass, moment, (xx, yy - moved, zz + moved, xy, xz, yz))
+    s = rotated_tensor(frame.inward_rows, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+    return Body(body.mass, moment, (s[0][0], s[1][1], s[2][2], s[0][1], s[0][2], s[1][2]))
+
+
+def _rotated(body: Body, rows: Matrix) -> Body:
+    """A body about one frame along the axes of another, of which the rows give its own."""
+    xx, yy, zz, xy, xz, yz = body.second
     second: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    s = rotated_tensor(frame.inward_rows, second)
+    s = multiply(multiply(rows, second), transpose(rows))
+    moment = transform(rows, body.moment)
     return Body(body.mass, moment, (s[0][0], s[1][1], s[2][2], s[0][1], s[0][2], s[1][2]))
 
 

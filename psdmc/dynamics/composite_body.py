@@ -6,10 +6,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
-from psdmc.dynamics.frames import BASE, Frame, inward, joint_angle, joint_offset, to_previous
+from psdmc.dynamics.frames import (
+    BASE,
+    Frame,
+    Rotation,
+    Turn,
+    inward,
+    joint_angle,
+    joint_offset,
+    joint_turn,
+    to_previous,
+)
 from psdmc.dynamics.motion import PLAIN, Choices
-from psdmc.dynamics.scalar import Scalar, add, cross
-from psdmc.dynamics.twist import axis_twist, effort, momentum
+from psdmc.dynamics.scalar import Scalar, Vector, add, cross
+from psdmc.dynamics.slices import first_rates, positions
+from psdmc.dynamics.twist import efforts, momentum
 
 
 def mass_matrix(
@@ -19,31 +30,58 @@ def mass_matrix(
     q: Sequence[Scalar],
     choices: Choices = PLAIN,
 ) -> tuple[tuple[Scalar, ...], ...]:
-    """M(q), n x n and symmetric (kg m^2, kg m, kg by joint types); exact zeros where neither joint carries the other."""
-    n = len(frames)
-    rows: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
-    angles = [joint_angle(frame, value) for frame, value in zip(frames, q, strict=True)]
-    turns = [angle.turn() for angle in angles]
-    offsets = [joint_offset(frame, value) for frame, value in zip(frames, q, strict=True)]
+    """M(q), nv x nv and symmetric (kg m^2, kg m, kg by joint types); exact zeros where neither joint carries the other.
+
+    drive_inertia   n, one per joint; of joints of several rates it is not looked at
+    """
+    n, first = len(frames), first_rates(frames)
+    rows: list[list[Scalar]] = [[0.0] * first[-1] for _ in range(first[-1])]
+    own = positions(frames, q)
+    turns = [joint_turn(frame, value) for frame, value in zip(frames, own, strict=True)]
+    offsets = [joint_offset(frame, value) for frame, value in zip(frames, own, strict=True)]
     composites = list(bodies)
     for i in reversed(range(n)):
-        rows[i][i] = drive_inertia[i]
-        force, moment = momentum(composites[i], axis_twist(frames[i].joint))
-        j = i
-        while True:
-            rows[i][j] = rows[i][j] + effort(frames[j].joint, force, moment)
-            rows[j][i] = rows[i][j]
-            if frames[j].parent == BASE:
-                break
-            force = to_previous(frames[j], inward(turns[j], force))
-            moment = to_previous(frames[j], inward(turns[j], moment))
-            moment = add(moment, cross(offsets[j], force))
-            j = frames[j].parent
+        for k, twist in enumerate(frames[i].joint.twists):
+            _fill_row(rows, first, first[i] + k, i, momentum(composites[i], twist), frames, turns, offsets)
+        if frames[i].joint.about_z:
+            rows[first[i]][first[i]] = rows[first[i]][first[i]] + drive_inertia[i]
         parent = frames[i].parent
         if parent != BASE:
-            double = (angles[i] + angles[i]).turn() if choices.fold_double_angle else None
+            double = _double(frames[i], own[i]) if choices.fold_double_angle else None
             before = turned(composites[i], turns[i], double)
             composites[parent] = joined(
                 composites[parent], shifted(in_previous(frames[i], before), offsets[i])
             )
     return tuple(tuple(row) for row in rows)
+
+
+def _fill_row(
+    rows: list[list[Scalar]],
+    first: Sequence[int],
+    row: int,
+    i: int,
+    wrench: tuple[Vector, Vector],
+    frames: Sequence[Frame],
+    turns: Sequence[Turn | Rotation | None],
+    offsets: Sequence[Vector],
+) -> None:
+    """One rate of joint i: what its composite's momentum does along the rates up to it, of joints from i to the base."""
+    (force, moment), j = wrench, i
+    while True:
+        for column, value in enumerate(efforts(frames[j].joint, force, moment), start=first[j]):
+            if column <= row:
+                rows[row][column] = rows[column][row] = value
+        if frames[j].parent == BASE:
+            return
+        force = to_previous(frames[j], inward(turns[j], force))
+        moment = to_previous(frames[j], inward(turns[j], moment))
+        moment = add(moment, cross(offsets[j], force))
+        j = frames[j].parent
+
+
+def _double(frame: Frame, q: Scalar) -> Turn | None:
+    """The turn by twice the joint's angle about z; None where it has none."""
+    if not frame.joint.about_z:
+        return None
+    angle = joint_angle(frame, q)
+    return (angle + angle).turn()

@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, spun, turned
-from psdmc.dynamics.frames import BASE, Frame, Turn, joint_angle, leaves
+from psdmc.dynamics.frames import BASE, Frame, Turn, about_z, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.joint_wrenches import torque_row, wrenches_of_motion
 from psdmc.dynamics.motion import PLAIN, Choices, Forward, sweep_outward
@@ -64,7 +64,7 @@ def inverse_dynamics_derivatives(
     base_acceleration: Vector,
     choices: Choices = PLAIN,
 ) -> Derivatives:
-    """Derivatives of the joint torques by q, qd and qdd; arguments as those of `inverse_dynamics`.
+    """Derivatives of the joint torques by q, qd and qdd; arguments as those of `inverse_dynamics`, joints of one coordinate.
 
     Exact zeros where neither joint carries the other.
     """
@@ -73,7 +73,7 @@ def inverse_dynamics_derivatives(
     axes: list[Axis] = []
     steps: list[Step] = []
     for i in range(n):
-        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, choices, axes)
+        axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
         axes.append(axis)
         steps.append(step)
     by_q, by_qd, by_qdd = ([[0.0] * n for _ in range(n)] for _ in range(3))
@@ -108,11 +108,11 @@ def _composites(
         frame, step = frames[i], steps[i]
         whole = at_rest(bodies[i])
         if is_leaf[i]:
-            whole = at_rest(_leaf(frame, bodies[i], q[i], forward.states[i].turn, step, choices))
+            whole = at_rest(_leaf(frame, bodies[i], q[i], about_z(forward.states[i].turn), step, choices))
         else:
             for child in hung[i]:
                 whole = both(whole, child)
-            whole = before_turn(whole, forward.compound_turns[i])
+            whole = before_turn(whole, about_z(forward.compound_turns[i]))
             for child in joined_to[i]:
                 whole = both(whole, child)
         whole = driven(frame.joint, whole, qd[i], qdd[i])

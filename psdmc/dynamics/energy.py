@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.frames import BASE, Frame, inward, joint_angle, joint_offset, to_previous
+from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.momentum import momentum_of, twists
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, dot
+from psdmc.dynamics.slices import neutral, positions, rates
 
 
 def kinetic_energy(
@@ -23,32 +24,34 @@ def kinetic_energy(
     for twist, body in zip(twists(frames, q, qd), bodies, strict=True):
         linear, angular = momentum_of(body, twist)
         twice = twice + (dot(twist[0], linear) + dot(twist[1], angular))
-    for drive, rate in zip(drive_inertia, qd, strict=True):
-        twice = twice + drive * rate * rate
+    for frame, drive, rate in zip(frames, drive_inertia, rates(frames, qd), strict=True):
+        if frame.joint.about_z:
+            twice = twice + drive * rate * rate
     return 0.5 * twice
 
 
 def potential_energy(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base_acceleration: Vector
 ) -> Scalar:
-    """Potential energy in J, zero at q = 0. `base_acceleration` is minus gravity, m/s^2 in the base frame.
+    """Potential energy in J, zero where no joint has moved (q = 0). `base_acceleration` is minus gravity, m/s^2 in the base
+    frame.
 
-    Torques do not depend on the energy at q = 0: bodies that have the torques of the real ones give the same
-    differences.
+    Torques do not depend on the energy there: bodies that have the torques of the real ones give the same differences.
     """
-    rest = [0.0] * len(frames)
+    rest = neutral(frames)
     moved, resting = first_moment(frames, bodies, q), first_moment(frames, bodies, rest)
     return dot(base_acceleration, moved) - dot(base_acceleration, resting)
 
 
 def first_moment(frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]) -> Vector:
     """Total mass times its centre, kg m, along and about the frame that the first joint frame turns from."""
+    own = positions(frames, q)
     masses, moments = [body.mass for body in bodies], [body.moment for body in bodies]
     total = ZERO
     for i in reversed(range(len(frames))):
         frame, mass = frames[i], masses[i]
-        turned = to_previous(frame, inward(joint_angle(frame, q[i]).turn(), moments[i]))
-        x, y, z = joint_offset(frame, q[i])
+        turned = to_previous(frame, inward(joint_turn(frame, own[i]), moments[i]))
+        x, y, z = joint_offset(frame, own[i])
         moment = add(turned, (mass * x, mass * y, mass * z))
         if frame.parent == BASE:
             total = add(total, moment)

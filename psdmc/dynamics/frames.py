@@ -1,7 +1,8 @@
 """Joint frames in a tree, and the turn that each joint makes: the input of every algorithm here.
 
 Frame i sits in its parent's frame at   rotation @ Rz(turn + offset), translation + rotation @ z slide
-where turn and slide follow from q by its joint's type. It carries one rigid body, whose parameters are about frame i
+where turn and slide follow from q by its joint's type; a joint of several coordinates puts it at
+rotation @ rotation(q), translation + rotation @ way(q). It carries one rigid body, whose parameters are about frame i
 itself. Parents come before their children. Whole quarter turns of the offset are kept apart, so that they exchange sine
 and cosine exactly and cost nothing.
 """
@@ -12,7 +13,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from psdmc.dynamics.scalar import Fixed, Matrix, Scalar, Vector, fixed, rotated, sincos, transpose
+from psdmc.dynamics.scalar import (
+    Fixed,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    fixed,
+    rotated,
+    sincos,
+    transform,
+    transpose,
+)
 from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import BASE as BASE
 from psdmc.robot.mechanism import Mechanism, Placement
@@ -96,6 +108,20 @@ class Turn(NamedTuple):
         return (c * v[0] - s * v[1], s * v[0] + c * v[1], v[2])
 
 
+class Rotation(NamedTuple):
+    """A rotation about any axis; its columns are the turned axes."""
+
+    rows: Matrix
+
+    def outward(self, v: Vector) -> Vector:
+        """From the frame before the turn into the frame after it."""
+        return transform(transpose(self.rows), v)
+
+    def inward(self, v: Vector) -> Vector:
+        """From the frame after the turn into the frame before it."""
+        return transform(self.rows, v)
+
+
 def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
     """Plain-float copy of a 3 x 3 array."""
     rows = tuple(tuple(float(x) for x in row) for row in values)
@@ -132,11 +158,11 @@ def base_acceleration(chain: Mechanism) -> Vector:
     return (-gx, -gy, -gz)
 
 
-def outward(turn: Turn | None, v: Vector) -> Vector:
+def outward(turn: Turn | Rotation | None, v: Vector) -> Vector:
     return v if turn is None else turn.outward(v)
 
 
-def inward(turn: Turn | None, v: Vector) -> Vector:
+def inward(turn: Turn | Rotation | None, v: Vector) -> Vector:
     return v if turn is None else turn.inward(v)
 
 
@@ -145,8 +171,23 @@ def joined(first: Turn | None, second: Turn | None) -> Turn | None:
     return second if first is None else first if second is None else first.then(second)
 
 
+def joint_turn(frame: Frame, q: Scalar) -> Turn | Rotation | None:
+    """How the frame is turned at q: one value, or the tuple of the joint's."""
+    if frame.joint.about_z:
+        return joint_angle(frame, q).turn()
+    rows = frame.joint.rotation(q)
+    return None if rows is None else Rotation(rows)
+
+
+def about_z(turn: Turn | Rotation | None) -> Turn | None:
+    """The same turn; ValueError where it is about another axis."""
+    if isinstance(turn, Rotation):
+        raise ValueError("a joint of several coordinates, where one that turns about z was expected")
+    return turn
+
+
 def joint_angle(frame: Frame, q: Scalar) -> Angle:
-    """The frame's turn about z at q."""
+    """The turn about z at q of a frame whose joint moves about it."""
     value = frame.offset if frame.offset else None
     turned = frame.joint.turn(q)
     if turned is not None:
@@ -156,6 +197,9 @@ def joint_angle(frame: Frame, q: Scalar) -> Angle:
 
 def joint_offset(frame: Frame, q: Scalar) -> Vector:
     """Origin of the frame in its parent's, m."""
+    if not frame.joint.about_z:
+        moved = frame.joint.way(q)
+        return frame.translation if moved is None else add(frame.translation, to_previous(frame, moved))
     way = frame.joint.slide(q)
     if way is None:
         return frame.translation

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from psdmc.dynamics.frames import BASE, Frame, Turn, from_previous, inward, outward, to_previous
-from psdmc.dynamics.motion import Choices, Forward, Rates, Spin, spin_of
+from psdmc.dynamics.frames import BASE, Frame, Turn, about_z, from_previous, inward, outward, to_previous
+from psdmc.dynamics.motion import Forward, Rates, Spin, spin_of
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform, transpose
 
 Wrench = tuple[Vector, Vector]
@@ -101,7 +101,6 @@ def axis_and_step(
     qdd: Sequence[Scalar],
     base_acceleration: Vector,
     forward: Forward,
-    choices: Choices,
     axes: Sequence[Axis],
 ) -> tuple[Axis, Step]:
     """A joint's axis, and its step to its parent."""
@@ -110,9 +109,9 @@ def axis_and_step(
         up = from_previous(frame, base_acceleration)
         axis = _axis(ZERO, ZERO, up, up)
         return axis, Step(frame, False, offset, ZERO, None)
-    turn, (acceleration, spin) = forward.compound_turns[parent], forward.motions[parent]
+    turn, (acceleration, spin) = about_z(forward.compound_turns[parent]), forward.motions[parent]
     before = add(acceleration, transform(spin.field, offset))
-    joins = choices.compound and frame.is_parallel
+    joins = forward.joins[i]
     if joins:
         w, dw = _after(
             axes[parent], frames[parent].joint.turn(qd[parent]), frames[parent].joint.turn(qdd[parent])

@@ -4,9 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.frames import BASE, IDENTITY, Frame, as_matrix, as_vector, joint_angle, joint_offset
+from psdmc.dynamics.frames import (
+    BASE,
+    IDENTITY,
+    Frame,
+    Rotation,
+    Turn,
+    as_matrix,
+    as_vector,
+    joint_offset,
+    joint_turn,
+)
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transform
-from psdmc.dynamics.twist import axis_twist, turned
+from psdmc.dynamics.slices import first_rates, positions
+from psdmc.dynamics.twist import turned
+from psdmc.robot.joints import Twist
 from psdmc.robot.mechanism import Placement
 
 AT_BASE: tuple[Matrix, Vector] = (IDENTITY, ZERO)
@@ -16,19 +28,21 @@ AT_BASE: tuple[Matrix, Vector] = (IDENTITY, ZERO)
 def forward_kinematics(frames: Sequence[Frame], q: Sequence[Scalar]) -> tuple[tuple[Matrix, Vector], ...]:
     """Rotation and origin (m) of every joint frame in the base frame."""
     placed: list[tuple[Matrix, Vector]] = []
-    for frame, value in zip(frames, q, strict=True):
+    for frame, value in zip(frames, positions(frames, q), strict=True):
         rotation, origin = AT_BASE if frame.parent == BASE else placed[frame.parent]
         origin = add(origin, transform(rotation, joint_offset(frame, value)))
         rotation = rotation if frame.is_parallel else multiply(rotation, frame.rotation)
-        turn = joint_angle(frame, value).turn()
-        if turn is not None:
-            rotation = _turned(rotation, turn.sine, turn.cosine)
-        placed.append((rotation, origin))
+        placed.append((_turned(rotation, joint_turn(frame, value)), origin))
     return tuple(placed)
 
 
-def _turned(rotation: Matrix, s: Scalar, c: Scalar) -> Matrix:
-    """rotation @ Rz"""
+def _turned(rotation: Matrix, turn: Turn | Rotation | None) -> Matrix:
+    """The axes of a frame after its turn."""
+    if turn is None:
+        return rotation
+    if isinstance(turn, Rotation):
+        return multiply(rotation, turn.rows)
+    s, c = turn
     rows = tuple((x * c + y * s, y * c - x * s, z) for x, y, z in rotation)
     return rows  # type: ignore[return-value]
 
@@ -36,7 +50,7 @@ def _turned(rotation: Matrix, s: Scalar, c: Scalar) -> Matrix:
 def jacobian(
     frames: Sequence[Frame], body: int, place: Placement, q: Sequence[Scalar]
 ) -> tuple[tuple[Scalar, ...], ...]:
-    """6 x n: velocity (linear, then angular) of a frame's origin per unit joint rate, in the base frame.
+    """6 x nv: velocity (linear, then angular) of a frame's origin per unit joint rate, in the base frame.
 
     body, place   the frame: the body that it is fixed to, and where it sits in that body's joint frame
     Columns of joints that do not carry the body are zero.
@@ -44,16 +58,27 @@ def jacobian(
     placed = forward_kinematics(frames, q)
     rotation, origin = placed[body]
     point = add(origin, transform(rotation, as_vector(place.translation.tolist())))
-    columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * len(frames)
-    for i in path_to(frames, body):
-        columns[i] = column(frames[i], placed[i], point)
+    columns = columns_at(frames, body, placed, point)
     return tuple(tuple(column[row] for column in columns) for row in range(6))
 
 
-def column(frame: Frame, placed: tuple[Matrix, Vector], point: Vector) -> tuple[Scalar, ...]:
-    """Velocity of a point, then angular velocity, that the joint's unit rate gives to what it carries."""
+def columns_at(
+    frames: Sequence[Frame], body: int, placed: Sequence[tuple[Matrix, Vector]], point: Vector
+) -> list[tuple[Scalar, ...]]:
+    """nv velocities of a body's point and angular velocities of the body, per unit joint rate; zero of rates that do not
+    carry it."""
+    first = first_rates(frames)
+    columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
+    for i in path_to(frames, body):
+        for k, twist in enumerate(frames[i].joint.twists, start=first[i]):
+            columns[k] = column(twist, placed[i], point)
+    return columns
+
+
+def column(twist: Twist, placed: tuple[Matrix, Vector], point: Vector) -> tuple[Scalar, ...]:
+    """Velocity of a point and angular velocity that a constant twist of a frame gives what moves with it."""
     rotation, origin = placed
-    along, about = axis_twist(frame.joint)
+    along, about = twist
     linear, angular = turned(rotation, along), turned(rotation, about)
     if any(about):
         arm = (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])

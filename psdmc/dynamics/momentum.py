@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.frames import BASE, Frame, inward, joint_angle, joint_offset, to_previous
+from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.motion import JointState
-from psdmc.dynamics.regressor import Twist, carried, own_twist
+from psdmc.dynamics.regressor import Twist, carried
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale
+from psdmc.dynamics.slices import positions, rates
+from psdmc.dynamics.twist import combined, own_rates
 
 
 def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Twist]:
     """For every joint frame, velocity of its origin and angular velocity, along its axes."""
     found: list[Twist] = []
-    for frame, state, rate in zip(frames, _states(frames, q), qd, strict=True):
+    for frame, state, rate in zip(frames, _states(frames, q), rates(frames, qd), strict=True):
         before = (ZERO, ZERO) if frame.parent == BASE else found[frame.parent]
         linear, angular = carried(frame, state, before)
-        own_linear, own_angular = own_twist(frame)
-        found.append((add(linear, scale(own_linear, rate)), add(angular, scale(own_angular, rate))))
+        own_linear, own_angular = combined(frame.joint, own_rates(frame.joint, rate))
+        found.append((add(linear, own_linear), add(angular, own_angular)))
     return found
 
 
@@ -56,6 +58,6 @@ def total_momentum(
 
 def _states(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[JointState]:
     return [
-        JointState(joint_angle(frame, value).turn(), joint_offset(frame, value))
-        for frame, value in zip(frames, q, strict=True)
+        JointState(joint_turn(frame, value), joint_offset(frame, value))
+        for frame, value in zip(frames, positions(frames, q), strict=True)
     ]

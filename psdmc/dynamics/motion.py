@@ -26,27 +26,44 @@ from psdmc.dynamics.frames import (
     NO_TURN,
     Angle,
     Frame,
+    Rotation,
     Turn,
     from_previous,
     joined,
     joint_angle,
     joint_offset,
+    joint_turn,
     leaves,
     outward,
 )
-from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, rotated_tensor, transform, transpose
+from psdmc.dynamics.scalar import (
+    ZERO,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    rotated_tensor,
+    transform,
+    transpose,
+)
+from psdmc.dynamics.slices import positions
+from psdmc.dynamics.slices import rates as rates_of
+from psdmc.dynamics.twist import combined
 
 
 @dataclass(frozen=True, slots=True)
 class Choices:
     """How the recursion is arranged; see the module's docstring. `fold_double_angle` turns a folded body's second
     moments by sincos(2 q) of its own instead of products of sincos(q); `add_sines` makes the compound turns' sincos from
-    those of their parts instead of a sincos of the sum."""
+    those of their parts instead of a sincos of the sum. `articulated` gives accelerations by articulated bodies instead of a
+    factorized mass matrix."""
 
     compound: bool = False
     fold: bool = False
     fold_double_angle: bool = False
     add_sines: bool = False
+    articulated: bool = False
 
 
 PLAIN = Choices()
@@ -102,19 +119,21 @@ class JointRates(NamedTuple):
 class JointState(NamedTuple):
     """A joint's position: its turn relative to its parent's frame, and the offset of its origin there."""
 
-    turn: Turn | None
+    turn: Turn | Rotation | None
     offset: Vector
 
 
 class Forward(NamedTuple):
     """Result of the outward sweep, body by body. Bodies are in the frames of `motions` and `rates`: after the joint's
-    turn; for folded ones, motions are before it and rates are their parent's."""
+    turn; for folded ones, motions are before it and rates are their parent's. `joins`: the body turns as one with its
+    parent (compound turns)."""
 
     states: tuple[JointState, ...]
-    compound_turns: tuple[Turn | None, ...]
+    compound_turns: tuple[Turn | Rotation | None, ...]
     motions: tuple[LinkMotion, ...]
     rates: tuple[Rates, ...]
     folded: tuple[bool, ...]
+    joins: tuple[bool, ...]
 
 
 def spin_of(rates: Rates) -> Spin:
@@ -186,12 +205,22 @@ class _Group(NamedTuple):
 
 
 class _Moved(NamedTuple):
-    """One body after the sweep has computed its motion."""
+    """One body after the sweep has computed its motion.
+
+    group   None: its joint does not turn about z alone, and no other turns as one with it
+    joins   whether it turns as one with its parent
+    """
 
     state: JointState
     motion: LinkMotion
     rates: Rates
-    group: _Group
+    group: _Group | None
+    joins: bool
+
+    @property
+    def compound_turn(self) -> Turn | Rotation | None:
+        """The turn of its group up to it."""
+        return self.state.turn if self.group is None else self.group.turn
 
 
 def sweep_outward(
@@ -209,20 +238,26 @@ def sweep_outward(
     """
     at_base = _resting(base_acceleration, qd_r is not None)
     folded = tuple(
-        choices.fold and is_leaf and frame.parent != BASE
+        choices.fold and is_leaf and frame.parent != BASE and frame.joint.about_z
         for is_leaf, frame in zip(leaves(frames), frames, strict=True)
     )
+    own, rates, changes = positions(frames, q), rates_of(frames, qd), rates_of(frames, qdd_r)
+    references = None if qd_r is None else rates_of(frames, qd_r)
     moved: list[_Moved] = []
     for i, frame in enumerate(frames):
         parent = at_base if frame.parent == BASE else moved[frame.parent]
-        given = (qd[i], qdd_r[i], None if qd_r is None else qd_r[i])
-        moved.append(_swept(frame, parent, q[i], given, choices, folded[i]))
+        given = (rates[i], changes[i], None if references is None else references[i])
+        if frame.joint.about_z:
+            moved.append(_swept(frame, parent, own[i], given, choices, folded[i]))
+        else:
+            moved.append(_swept_freely(frame, parent, own[i], given))
     return Forward(
         tuple(body.state for body in moved),
-        tuple(body.group.turn for body in moved),
+        tuple(body.compound_turn for body in moved),
         tuple(body.motion for body in moved),
         tuple(body.rates for body in moved),
         folded,
+        tuple(body.joins for body in moved),
     )
 
 
@@ -230,7 +265,7 @@ def _resting(base_acceleration: Vector, two_velocities: bool) -> _Moved:
     """The motion of the base: it accelerates and does not turn."""
     rates = Rates(ZERO, ZERO, ZERO if two_velocities else None)
     group = _Group(rates, _no_turning(rates), NO_TURN, None)
-    return _Moved(JointState(None, ZERO), LinkMotion(base_acceleration, spin_of(rates)), rates, group)
+    return _Moved(JointState(None, ZERO), LinkMotion(base_acceleration, spin_of(rates)), rates, group, False)
 
 
 def _no_turning(rates: Rates) -> JointRates:
@@ -250,8 +285,8 @@ def _swept(
     own_angle, offset = joint_angle(frame, q), joint_offset(frame, q)
     turning, sliding = (_along(part, given) for part in (frame.joint.turn, frame.joint.slide))
     group = parent.group
-    joins = choices.compound and frame.parent != BASE and frame.is_parallel
-    if not joins:
+    joins = choices.compound and frame.parent != BASE and frame.is_parallel and group is not None
+    if group is None or not joins:
         before = _rates_before_turn(frame, parent.rates)
         group = _Group(before, _no_turning(before), NO_TURN, None)
     angle = group.angle + own_angle
@@ -269,7 +304,31 @@ def _swept(
         spin = spin_of(rates)
         acceleration = _slid(outward(own_turn, shifted), rates, sliding)
     group = _Group(group.before, summed, angle, turn)
-    return _Moved(JointState(own_turn, offset), LinkMotion(acceleration, spin), rates, group)
+    return _Moved(JointState(own_turn, offset), LinkMotion(acceleration, spin), rates, group, joins)
+
+
+def _swept_freely(
+    frame: Frame, parent: _Moved, q: Scalar, given: tuple[Scalar, Scalar, Scalar | None]
+) -> _Moved:
+    """One body whose joint has several coordinates; `given` are tuples of its rates, along the moved frame's axes.
+
+    With u and s the joint's linear and angular rates, w and w_r from the parent: w becomes w + s, dw_r gets w_r x s and the
+    origin's acceleration w_r x u + (w + s) x u_r, beside what the accelerations give.
+    """
+    turn, offset = joint_turn(frame, q), joint_offset(frame, q)
+    field = transform(parent.motion.spin.field, offset)
+    acceleration = outward(turn, from_previous(frame, add(parent.motion.acceleration, field)))
+    before = _rates_before_turn(frame, parent.rates)
+    w, w_r, dw_r = (outward(turn, v) for v in (before.w, before.reference, before.dw_r))
+    qd, qdd_r, qd_r = given
+    (u, s), (u_change, s_change) = combined(frame.joint, qd), combined(frame.joint, qdd_r)
+    u_r, s_r = (u, s) if qd_r is None else combined(frame.joint, qd_r)
+    whole = add(w, s)
+    dw_r = add(add(dw_r, cross(w_r, s)), s_change)
+    acceleration = add(add(acceleration, add(cross(w_r, u), cross(whole, u_r))), u_change)
+    rates = Rates(whole, dw_r, None if before.w_r is None else add(w_r, s_r))
+    motion = LinkMotion(acceleration, spin_of(rates))
+    return _Moved(JointState(turn, offset), motion, rates, None, False)
 
 
 def _along(

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector
-from psdmc.dynamics.kinematics import AT_BASE, column, forward_kinematics, path_to
+from psdmc.dynamics.kinematics import AT_BASE, columns_at, forward_kinematics, path_to
 from psdmc.dynamics.motion import sweep_outward
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, scale, transform
+from psdmc.dynamics.slices import first_rates
 from psdmc.robot.mechanism import NamedFrame
 
 Root = tuple[Matrix, Vector]
@@ -27,14 +28,12 @@ def placed_frames(
 def frame_jacobians(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[list[Scalar]]]:
-    """6 x n per named frame: linear velocity of its origin, then angular, per unit joint rate, along the base's axes."""
+    """6 x nv per named frame: linear velocity of its origin, then angular, per unit joint rate, along the base's axes."""
     joints = _in_base(frames, q, root)
     found = []
     for each in named:
         point = _point(joints[each.joint], each)
-        columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * len(frames)
-        for j in path_to(frames, each.joint):
-            columns[j] = column(frames[j], joints[j], point)
+        columns = columns_at(frames, each.joint, joints, point)
         found.append([[each_column[row] for each_column in columns] for row in range(6)])
     return found
 
@@ -48,7 +47,7 @@ def frame_drifts(
 ) -> list[tuple[Scalar, ...]]:
     """Six per named frame: acceleration of its origin, then angular, at constant joint rates, along the base's axes."""
     joints = _in_base(frames, q, root)
-    forward = sweep_outward(frames, q, qd, None, [0.0] * len(frames), ZERO)
+    forward = sweep_outward(frames, q, qd, None, [0.0] * first_rates(frames)[-1], ZERO)
     found = []
     for each in named:
         rotation, motion = joints[each.joint][0], forward.motions[each.joint]
@@ -66,7 +65,8 @@ def frame_velocity_slopes(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[list[list[Scalar]]]:
-    """6 x n per named frame: derivatives of its velocity J qd (linear, then angular) by q, along the base's axes.
+    """6 x n per named frame: derivatives of its velocity J qd (linear, then angular) by q, along the base's axes, of robots
+    whose joints have one coordinate each.
 
     Joint j moves what it carries along the twist (v, z) of its column. With w the angular velocity of the link before
     it, and (u, s) the part of the frame's velocity that joints from j on contribute, the frame's velocity changes by (w

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from psdmc.dynamics.body import Body, turned
-from psdmc.dynamics.frames import BASE, Frame, Turn, inward, joint_angle, to_previous
+from psdmc.dynamics.frames import BASE, Frame, Rotation, Turn, inward, joint_angle, to_previous
 from psdmc.dynamics.motion import PLAIN, Choices, Forward, LinkMotion, sweep_outward
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, transform
-from psdmc.dynamics.twist import effort
+from psdmc.dynamics.slices import flat, positions, rates
+from psdmc.dynamics.twist import efforts
 
 Wrench = tuple[Vector, Vector]
 """Force (N) and moment about a frame's origin (N m), along its axes."""
@@ -45,28 +46,35 @@ def inverse_dynamics(
     qd_r: Sequence[Scalar] | None = None,
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> tuple[Scalar, ...]:
-    """Joint torques (N m; N for sliding joints), n of them: M(q) qdd + C(q, qd) qd_r + g(q), qd_r = qd if not given.
+    """Joint torques (N m; N for sliding joints), one per rate: M(q) qdd + C(q, qd) qd_r + g(q), qd_r = qd if not given.
 
     external   force and moment that the world exerts on link i, about its joint frame's origin along that frame's axes
 
     Luh, Walker, Paul 1980, with the body's wrench written on its pseudo-inertia.
     """
     forward = sweep_outward(frames, q, qd, qd_r, qdd, base_acceleration, choices)
-    seen = [
-        _folded_body(frame, body, value, state.turn, choices) if is_folded else body
-        for frame, body, value, state, is_folded in zip(
-            frames, bodies, q, forward.states, forward.folded, strict=True
-        )
-    ]
+    seen = seen_bodies(frames, bodies, q, forward, choices)
     return sweep_inward(frames, seen, drive_inertia, qdd, forward, choices, external)
 
 
-def _folded_body(frame: Frame, body: Body, q: Scalar, turn: Turn | None, choices: Choices) -> Body:
+def seen_bodies(
+    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], forward: Forward, choices: Choices
+) -> list[Body]:
+    """Bodies in the frames that their motions are in."""
+    return [
+        _folded_body(frame, body, value, state.turn, choices) if is_folded else body
+        for frame, body, value, state, is_folded in zip(
+            frames, bodies, positions(frames, q), forward.states, forward.folded, strict=True
+        )
+    ]
+
+
+def _folded_body(frame: Frame, body: Body, q: Scalar, turn: Turn | Rotation | None, choices: Choices) -> Body:
     angle = joint_angle(frame, q)
     return turned(body, turn, (angle + angle).turn() if choices.fold_double_angle else None)
 
 
-def _relieved(force: Vector, moment: Vector, external: Wrench, turn: Turn | None) -> Wrench:
+def _relieved(force: Vector, moment: Vector, external: Wrench, turn: Turn | Rotation | None) -> Wrench:
     """A body's wrench less the external one; `turn` where the body's frame is that before its joint's turn."""
     (fx, fy, fz), (mx, my, mz) = (inward(turn, part) for part in external)
     return (
@@ -83,12 +91,18 @@ def sweep_inward(
     forward: Forward,
     choices: Choices = PLAIN,
     external: Mapping[int, Wrench] = NO_WRENCHES,
+    yielded: Callable[[int, Sequence[Scalar]], Wrench] | None = None,
 ) -> tuple[Scalar, ...]:
     """Joint torques: wrenches summed inward to the base, children before parents; each axis takes its component. With
     compound turns, the x and y moments of a group of parallel axes are summed in the frame before its first turn,
-    their z and the forces joint by joint."""
+    their z and the forces joint by joint.
+
+    yielded   gives a further wrench that joint i passes on, from its number and the torques that it takes; about its
+              body's frame, along its axes
+    """
     n = len(frames)
-    torques: list[Scalar] = [0.0] * n
+    torques: list[tuple[Scalar, ...]] = [()] * n
+    changes = rates(frames, qdd)
     forces, moments, gathered = [ZERO] * n, [ZERO] * n, [ZERO] * n
     for i in reversed(range(n)):
         frame, state, parent = frames[i], forward.states[i], frames[i].parent
@@ -97,12 +111,15 @@ def sweep_inward(
             turn = state.turn if forward.folded[i] else None
             own_force, own_moment = _relieved(own_force, own_moment, external[i], turn)
         force, moment = add(forces[i], own_force), add(moments[i], own_moment)
-        torques[i] = effort(frame.joint, force, moment) + drive_inertia[i] * qdd[i]
+        torques[i] = _driven(efforts(frame.joint, force, moment), frame, drive_inertia[i], changes[i])
+        if yielded is not None:
+            further_force, further_moment = yielded(i, torques[i])
+            force, moment = add(force, further_force), add(moment, further_moment)
         if parent == BASE:
             continue
         own_turn = None if forward.folded[i] else state.turn
         force = to_previous(frame, inward(own_turn, force))
-        if choices.compound and frame.is_parallel:
+        if forward.joins[i]:
             group_turn = forward.compound_turns[parent if forward.folded[i] else i]
             x, y, _ = inward(group_turn, moment)
             gathered[parent] = add(gathered[parent], (gathered[i][0] + x, gathered[i][1] + y, 0.0))
@@ -112,4 +129,11 @@ def sweep_inward(
             carried = to_previous(frame, add(inward(turn, moment), gathered[i]))
         carried = add(carried, cross(state.offset, force))
         forces[parent], moments[parent] = add(forces[parent], force), add(moments[parent], carried)
-    return tuple(torques)
+    return tuple(flat(torques))
+
+
+def _driven(
+    efforts: tuple[Scalar, ...], frame: Frame, drive_inertia: Scalar, qdd: Scalar
+) -> tuple[Scalar, ...]:
+    """With what the joint's own drive asks for; joints of several rates have none."""
+    return (efforts[0] + drive_inertia * qdd,) if frame.joint.about_z else efforts

@@ -23,6 +23,7 @@ from psdmc.dynamics.scalar import (
     transform,
     transpose,
 )
+from psdmc.dynamics.slices import first_rates, rates
 from psdmc.dynamics.twist import axis_twist
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
 
@@ -56,14 +57,14 @@ def regressor(
     wanted       indices into x (11 per link, link by link) whose columns are computed
     qd_r         reference rates, for the Slotine-Li regressor of M qdd_r + C qd_r + g; left out: qd
     """
-    n = len(frames)
+    first, changes = first_rates(frames), rates(frames, qdd_r)
     forward = sweep_outward(frames, q, qd, qd_r, qdd_r, base_acceleration, PLAIN)
-    rows: tuple[dict[int, Scalar], ...] = tuple({} for _ in range(n))
+    rows: tuple[dict[int, Scalar], ...] = tuple({} for _ in range(first[-1]))
     twists: list[dict[int, Twist]] = []
     for k, frame in enumerate(frames):
         before = {} if frame.parent == BASE else twists[frame.parent]
         own = {i: carried(frame, forward.states[k], twist) for i, twist in before.items()}
-        twists.append(own | {k: own_twist(frame)})
+        twists.append(own | dict(enumerate(frame.joint.twists, start=first[k])))
         motion = seen_from(link_frames[k], forward.motions[k], forward.rates[k])
         seen = {i: twist_in(link_frames[k], twist) for i, twist in twists[k].items()}
         for name in range(DRIVE):
@@ -73,8 +74,16 @@ def regressor(
                 for i, (linear, angular) in seen.items():
                     _put(rows[i], column, linear, force, angular, moment)
         if PARAMETERS_PER_LINK * k + DRIVE in wanted:
-            rows[k][PARAMETERS_PER_LINK * k + DRIVE] = qdd_r[k]
+            _put_drive(rows, first[k], frame, PARAMETERS_PER_LINK * k + DRIVE, changes[k])
     return rows
+
+
+def _put_drive(
+    rows: Sequence[dict[int, Scalar]], row: int, frame: Frame, column: int, change: Scalar
+) -> None:
+    """Joints of several rates have no drive."""
+    if frame.joint.about_z:
+        rows[row][column] = change
 
 
 def _put(
@@ -90,7 +99,7 @@ def _put(
 
 
 def own_twist(frame: Frame) -> Twist:
-    """The twist that the joint's unit rate gives its own frame."""
+    """The twist that the unit rate of a joint of one rate gives its own frame."""
     return axis_twist(frame.joint)
 
 

@@ -26,6 +26,25 @@ def axis_twist(joint: JointType) -> Twist:
     return twist
 
 
+def efforts(joint: JointType, force: Vector, moment: Vector) -> tuple[Scalar, ...]:
+    """What a force and a moment about the joint frame's origin do along each of the joint's rates."""
+    values = (*force, *moment)
+    return tuple(weighted((*linear, *angular), values) for linear, angular in joint.twists)
+
+
+def combined(joint: JointType, rates: Sequence[Scalar]) -> tuple[Vector, Vector]:
+    """Linear and angular part of the sum of the joint's twists times its rates."""
+    parts = [
+        weighted([(*linear, *angular)[part] for linear, angular in joint.twists], rates) for part in range(6)
+    ]
+    return (parts[0], parts[1], parts[2]), (parts[3], parts[4], parts[5])
+
+
+def own_rates(joint: JointType, rates: Scalar) -> tuple[Scalar, ...]:
+    """A joint's rates as a tuple, of one rate too."""
+    return rates if isinstance(rates, tuple) else (rates,)
+
+
 def effort(joint: JointType, force: Vector, moment: Vector) -> Scalar:
     """The component of a force and a moment about the joint frame's origin along the joint: N m, or N where it slides."""
     linear, angular = axis_twist(joint)

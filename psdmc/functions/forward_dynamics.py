@@ -1,4 +1,4 @@
-"""Forward dynamics: accelerations from torques, by a factorized mass matrix."""
+"""Forward dynamics: accelerations from torques, by a factorized mass matrix or by articulated bodies."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations
+from psdmc.recipes.accelerations import PIVOTS, accelerations_and_pivots
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Polynomials, Recipe
 from psdmc.robot.mechanism import Array
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    qdd, factors = accelerations(g, g.inputs["tau"])
-    return {"qdd": qdd, "pivot": factors.pivots}
+    qdd, pivots = accelerations_and_pivots(g, g.inputs["tau"])
+    return {"qdd": list(qdd), "pivot": list(pivots)}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -47,6 +47,7 @@ RECIPE = Recipe(
     pinocchio,
     starts="inverse_dynamics",
     polynomials=Polynomials.SOLVED,
+    accelerates=True,
     default=True,
     benched=True,
 )

@@ -20,6 +20,8 @@ from psdmc.dynamics.body import Body
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.slices import first_rates, normalized
+from psdmc.dynamics.torque_rows import torque_rows
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.tableau import Long, Tableau
 from psdmc.robot.graded import graded_pivots, halving_shares, lengths
@@ -74,6 +76,9 @@ unit."""
 RANK = 1e-12
 """Smallest part that makes a column independent, as a share of the longest one, all columns brought to the same length.
 See MISS."""
+
+SAMPLED_JOINTS = 10
+"""Robots with more joints are not sampled as a whole."""
 
 STATES = 48
 SEED = 20211
@@ -193,7 +198,7 @@ class CarrierSpace:
 def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     """The carriers' space of a model. `representative` takes theta_b to standard parameters about the link frames."""
     n = len(reframed.frames)
-    samples = _sampled_columns(reframed)
+    samples = _sampled_columns(reframed) if n <= SAMPLED_JOINTS else _torque_rows(reframed)
     lift = np.zeros((PARAMETERS_PER_LINK * n, representative.shape[1]), np.longdouble)
     for k, place in enumerate(reframed.link_frames):
         rows = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
@@ -314,21 +319,31 @@ def _lightest(columns: Array, weights: Sequence[float]) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
+def _torque_rows(reframed: Reframed) -> Long:
+    """(r, 11 n) rows that the torques depend on, in pseudo-inertia form, in extended precision: nothing but rank, where
+    samples of all joints have thousands of rows."""
+    here = [Placement.identity()] * len(reframed.frames)
+    rows = torque_rows(reframed.frames, here, reframed.base_acceleration)
+    back = np.round(np.linalg.inv(pseudo_map()))  # zeros and ones
+    return np.asarray(times(rows.reshape(-1, PARAMETERS_PER_LINK), back).reshape(rows.shape))
+
+
 def _sampled_columns(reframed: Reframed) -> Long:
-    """(STATES n, 11 n) regressor in pseudo-inertia form at fixed random states, in extended precision."""
-    n = len(reframed.frames)
-    drawn = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(3, n, STATES))
-    q, qd, qdd = drawn.astype(np.longdouble)
+    """(STATES nv, 11 n) regressor in pseudo-inertia form at fixed random states, in extended precision."""
+    n, nv = len(reframed.frames), first_rates(reframed.frames)[-1]
+    nq = sum(frame.joint.nq for frame in reframed.frames)
+    drawn = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(nq + 2 * nv, STATES)).astype(np.longdouble)
+    q, qd, qdd = normalized(reframed.frames, drawn[:nq]), drawn[nq : nq + nv], drawn[nq + nv :]
     here = [Placement.identity()] * n
     rows = regressor(
         reframed.frames, here, range(11 * n), list(q), list(qd), list(qdd), reframed.base_acceleration
     )
-    standard = np.zeros((n, STATES, 11 * n), np.longdouble)
+    standard = np.zeros((nv, STATES, 11 * n), np.longdouble)
     for i, row in enumerate(rows):
         for column, value in row.items():
             standard[i, :, column] = value
     back = np.round(np.linalg.inv(pseudo_map()))  # zeros and ones
-    return _combined(standard.reshape(-1, PARAMETERS_PER_LINK), back).reshape(n * STATES, -1)
+    return _combined(standard.reshape(-1, PARAMETERS_PER_LINK), back).reshape(nv * STATES, -1)
 
 
 def bodies_from_carriers(

@@ -9,6 +9,9 @@ from psdmc.lower.carriers import CarrierSpace, carrier_space
 from psdmc.lower.reframe import Foot, Reframed, reframe
 from psdmc.robot.mechanism import Array, Mechanism
 
+LARGE = 10
+"""Joints. What the search tries of a larger robot does not grow with it, as each trial does."""
+
 
 class Geometry:
     """The geometry of one model, which does not depend on the function that is lowered, nor on whether theta_b is
@@ -44,7 +47,8 @@ class Geometry:
 
 def all_feet(chain: Mechanism) -> Iterator[tuple[Foot, ...]]:
     """Where frames may sit: all on the normal to the axis before, then each single one on the next, then all on the
-    next. A leaf has no next axis."""
+    next. A leaf has no next axis. Of large robots only all of them together."""
     n, leaves = len(chain), chain.leaves
-    for moved in [(), *((i,) for i in range(n) if i not in leaves), tuple(range(n))]:
+    singly = [(i,) for i in range(n) if i not in leaves] if n <= LARGE else []
+    for moved in [(), *singly, tuple(range(n))]:
         yield tuple("next" if i in moved else "previous" for i in range(n))

@@ -6,7 +6,8 @@ zero. A frame's x points along the common normal from its axis to its child's, s
 two frames is about x alone and a right angle costs nothing. A body with several children does so towards the first; the
 frames of the others are turned about both z and x. Where on its axis a frame's origin sits is free (`feet`): on the
 normal to its parent's axis ("previous") or to its first child's ("next"). The axis of a sliding joint has only a
-direction and is put through a neighbour's origin.
+direction and is put through a neighbour's origin. A joint of several coordinates keeps its frame, along whose axes its rates
+are.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
     frames, link_frames = [], []
     for i, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True)):
         outer, foot = (before[0], origins[0]) if parent == BASE else (after[parent], origins[parent])
-        rotation = np.eye(3) if i == 0 else _between(times(outer.T, before[i]))
+        rotation = np.eye(3) if i == 0 else _constant(chain, i, times(outer.T, before[i]))
         offset = np.zeros(3) if i == 0 else times(outer.T, origins[i] - foot)
         angle = _angle_about_z(times(before[i].T, after[i]))
         quarters = round(angle / (np.pi / 2))
@@ -130,9 +131,7 @@ def _moved(
 
 def _rounded(place: Placement, reach: float) -> Placement:
     """A placement with the rounding of exact zeros and ones removed."""
-    near = np.round(place.rotation)
-    rotation = np.where(np.abs(place.rotation - near) < EXACT, near, place.rotation) + 0.0
-    return Placement(rotation, _clean_lengths(place.translation, reach) + 0.0)
+    return Placement(_exact(place.rotation), _clean_lengths(place.translation, reach) + 0.0)
 
 
 def _placed_at_zero(chain: Mechanism) -> list[Placement]:
@@ -155,7 +154,13 @@ def _first_children(chain: Mechanism) -> list[int | None]:
 
 def _has_direction_only(chain: Mechanism, i: int) -> bool:
     """Whether an axis may be shifted sideways: that of a joint that slides and does not turn."""
-    return not any(any(angular) for _, angular in chain.joints[i].type.twists)
+    kind = chain.joints[i].type
+    return kind.about_z and not any(any(angular) for _, angular in kind.twists)
+
+
+def _is_wide(chain: Mechanism, body: int) -> bool:
+    """Whether a body's joint has several coordinates: its rates are along the frame's own axes, which stay as they are."""
+    return body != BASE and not chain.joints[body].type.about_z
 
 
 def _reach(chain: Mechanism) -> float:
@@ -194,15 +199,18 @@ def _origins(
     origins: list[Array] = []
     for i in range(n):
         parent, child = chain.parents[i], children[i]
+        if _is_wide(chain, i):
+            origins.append(points[i])
+            continue
         if feet[i] == "previous" and parent != BASE and _has_direction_only(chain, i):
             points[i] = origins[parent]
         foot = None
         if feet[i] == "next" and child is not None:
             foot = _foot(points[i], axes[i], points[child], axes[child])
-        if foot is None and parent != BASE:
+        if foot is None and parent != BASE and not _is_wide(chain, parent):
             foot = _foot(points[i], axes[i], origins[parent], axes[parent])
         if foot is None:
-            is_level = parent != BASE and _parallel(axes[i], axes[parent])
+            is_level = parent != BASE and (_is_wide(chain, parent) or _parallel(axes[i], axes[parent]))
             reference = origins[parent] if is_level else points[i]
             foot = points[i] + axes[i] * times(axes[i], reference - points[i])
         origins.append(foot)
@@ -227,8 +235,14 @@ def _orientations(
     before: list[Array] = []
     after: list[Array] = []
     for i, (parent, child) in enumerate(zip(chain.parents, children, strict=True)):
+        if _is_wide(chain, i):
+            before.append(_exact(placed[i].rotation))
+            after.append(before[i])
+            continue
         x_before = first
-        if parent != BASE:
+        if _is_wide(chain, parent):
+            x_before = min(after[parent].T, key=lambda x: abs(float(times(x, axes[i]))))
+        elif parent != BASE:
             x_before = after[parent][:, 0]
             if children[parent] != i:
                 x_before = _own_normal(axes[parent], axes[i], origins[i] - origins[parent], x_before)
@@ -292,6 +306,19 @@ def _first_x(chain: Mechanism, first: Placement, axis: Array) -> Array:
     if np.count_nonzero(np.abs(local) > EXACT * np.linalg.norm(across)) == 1:
         return np.asarray(first.rotation[:, 0])
     return _clean(across / length(across))
+
+
+def _constant(chain: Mechanism, i: int, rotation: Array) -> Array:
+    """The rotation between body i's frame and its parent's."""
+    if _is_wide(chain, i) or _is_wide(chain, chain.parents[i]):
+        return _exact(rotation)
+    return _between(rotation)
+
+
+def _exact(rotation: Array) -> Array:
+    """A rotation with the rounding of exact zeros and ones removed."""
+    near = np.round(rotation)
+    return np.asarray(np.where(np.abs(rotation - near) < EXACT, near, rotation) + 0.0)
 
 
 def _between(rotation: Array) -> Array:

@@ -16,9 +16,9 @@ import numpy as np
 
 from psdmc.dynamics.motion import Choices
 from psdmc.lower.accuracy import LIMIT, Accuracy
-from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS
+from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace
 from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
-from psdmc.lower.geometry import Geometry
+from psdmc.lower.geometry import LARGE, Geometry
 from psdmc.lower.reframe import Foot, Reframed
 from psdmc.program.cost import Cost, cost
 from psdmc.program.program import Program
@@ -95,10 +95,13 @@ class Search:
         costs: Costs = COSTS,
         known: Array | None = None,
     ) -> None:
-        sizes = Sizes.of_chain(len(chain), representative.shape[1], len(chain.frames))
+        l, frames = representative.shape[1], len(chain.frames)
+        sizes = Sizes(len(chain), chain.nq, chain.nv, l, frames)
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
-        self.budget = budget
+        self.is_large = len(chain) > LARGE
+        self._is_arm = chain.is_serial and not self.is_large and all(kind.about_z for kind in chain.types)
+        self.budget = budget * LARGE // max(LARGE, len(chain))
         self._costs: dict[tuple[str, Reframed, float, tuple[int, ...], Choices], Cost] = {}
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         known = theta_b if known is None else known
@@ -130,7 +133,10 @@ class Search:
         if accurate is not None:
             descent.consider(iter([accurate]))
         if start is not None:
-            descent.consider(replace(start, choices=choices) for choices in distinct(recipe, CHOICES))
+            start = self._by_the_cheaper_way(recipe, start, scoring)
+            descent.consider(_rearranged(start, distinct(recipe, CHOICES)))
+            if self.is_large:
+                descent.consider(self._anew(descent.arrangement.choices))
         else:
             for feet in self.geometry.feet:
                 descent.consider(self.starts(feet))
@@ -153,6 +159,22 @@ class Search:
             self._costs[key] = cost_of_dynamics(recipe, a, self.robot)
         return self._costs[key]
 
+    def _anew(self, choices: Choices) -> Iterator[Arrangement]:
+        """What the search began with, so arranged: of what was chosen for another function, a large robot's budget takes
+        little back."""
+        for feet in self.geometry.feet:
+            first = next(self.starts(feet))
+            yield replace(first, choices=choices)
+
+    def _by_the_cheaper_way(self, recipe: Recipe, start: Arrangement, scoring: Scoring) -> Arrangement:
+        """By articulated bodies where these cost less from the start. Serial arms keep the factorized mass matrix: what the
+        two differ by there is less than what the search goes on to find."""
+        if not recipe.accelerates or self._is_arm:
+            return start
+        other = replace(start, choices=replace(start.choices, articulated=True))
+        costs = [scoring.weight(self.cost(recipe, each)) for each in (start, other)]
+        return other if costs[1] < costs[0] else start
+
     def rearranged(self, recipe: Recipe, found: Arrangement, scoring: Scoring) -> Program:
         """The PROGRAM of a function in an arrangement that was found for another function or target. Only the choices
         within the recursion are made again."""
@@ -161,7 +183,7 @@ class Search:
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
         """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes. All
         others are only counted."""
-        tried = [replace(found, choices=choices) for choices in _felt(found, distinct(recipe, ALL_CHOICES))]
+        tried = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs = [self.cost(recipe, arrangement) for arrangement in tried]
         weights = [[scoring.weight(each) for each in costs] for scoring in (self.single, self.batch)]
         for best in sorted({each.index(min(each)) for each in weights}):
@@ -170,8 +192,7 @@ class Search:
     def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
         reframed = self.geometry.reframed(feet)
         space = self.geometry.space(reframed)
-        weights = [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
-        carriers = space.lightest(weights)
+        carriers = space.lightest(_weights(space))
         transfer = space.transfer(carriers)
         plain = Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0])
         for choices in _felt(plain, CHOICES):
@@ -193,6 +214,16 @@ class Search:
             transfer = space.transfer(carriers)
             if np.max(np.abs(transfer)) < LARGEST_TRANSFER:
                 yield replace(found, carriers=carriers, transfer=transfer)
+
+
+def _weights(space: CarrierSpace) -> list[float]:
+    return [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
+
+
+def _rearranged(found: Arrangement, choices: Iterable[Choices]) -> Iterator[Arrangement]:
+    """With other choices, but the same way to accelerations."""
+    way = found.choices.articulated
+    return (replace(found, choices=replace(each, articulated=way)) for each in choices)
 
 
 def _felt(arrangement: Arrangement, choices: Iterable[Choices]) -> Iterator[Choices]:

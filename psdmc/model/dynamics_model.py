@@ -32,8 +32,8 @@ class DynamicsModel:
     theta_b      (l,) float      base parameters, SI, units per entry; None while unknown
     B            (l, 11n) float  theta_b = B @ x for standard parameters x within the chain's parameter_span
     mechanism    the robot: joints, link frames, gravity, limits, standard parameters
-    certificate  (n,)            largest torque error against Newton-Euler on fresh samples, per joint,
-                                 relative to that joint's largest torque there
+    certificate  (nv,)           largest torque error against Newton-Euler on fresh samples, per rate of the joints,
+                                 relative to that rate's largest torque there
     provenance   plain JSON values: source text, its hash and format, options, snapping and its effect, tolerances
     """
 
@@ -47,7 +47,7 @@ class DynamicsModel:
     def __post_init__(self) -> None:
         n, l = len(self.mechanism), np.asarray(self.B).shape[0]
         object.__setattr__(self, "B", frozen_array(self.B, (l, PARAMETERS_PER_LINK * n), "B"))
-        object.__setattr__(self, "certificate", frozen_array(self.certificate, (n,), "certificate"))
+        object.__setattr__(self, "certificate", frozen_array(self.certificate, (self.nv,), "certificate"))
         if self.theta_b is not None:
             object.__setattr__(self, "theta_b", frozen_array(self.theta_b, (l,), "theta_b"))
         if self.expansion is not None and (self.expansion.n, self.expansion.l) != (n, l):
@@ -69,6 +69,16 @@ class DynamicsModel:
     def n(self) -> int:
         """Number of joints."""
         return len(self.mechanism)
+
+    @property
+    def nq(self) -> int:
+        """Length of q."""
+        return self.mechanism.nq
+
+    @property
+    def nv(self) -> int:
+        """Length of qd, qdd and tau."""
+        return self.mechanism.nv
 
     @property
     def l(self) -> int:  # noqa: E743  the paper's letter
@@ -142,7 +152,7 @@ class DynamicsModel:
         return found
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """tau (..., n), N m or N, directly from E, P and theta_b: slow, and the reference for faster code. Without E
+        """tau (..., nv), N m or N, directly from E, P and theta_b: slow, and the reference for faster code. Without E
         and P, by Newton-Euler on the same base parameters."""
         return self.torques_for(self.known_theta_b(), q, qd, qdd)
 
@@ -153,34 +163,34 @@ class DynamicsModel:
             found = recursive.torques(self.mechanism, self.representative @ theta_b, arrays)
         else:
             found = evaluate.torques(self.expansion, self.mechanism, theta_b, arrays)
-        return found.reshape(*shape, self.n)
+        return found.reshape(*shape, self.nv)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """Y (..., n, l) with tau = Y theta_b."""
+        """Y (..., nv, l) with tau = Y theta_b."""
         shape, arrays = evaluate.states(self.mechanism, q=q, qd=qd, qdd=qdd)
         if self.expansion is None:
             found = recursive.regressor(self.mechanism, self.representative, arrays)
         else:
             found = evaluate.regressor(self.expansion, self.mechanism, arrays)
-        return found.reshape(*shape, self.n, self.l)
+        return found.reshape(*shape, self.nv, self.l)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
-        """M(q), (..., n, n)."""
+        """M(q), (..., nv, nv)."""
         theta = self.known_theta_b()
         shape, (angles,) = evaluate.states(self.mechanism, q=q)
         if self.expansion is None:
             found = recursive.mass_matrix(self.mechanism, self.standard_parameters(), angles)
         else:
             found = evaluate.mass_matrix(self.expansion, self.mechanism, theta, angles)
-        return found.reshape(*shape, self.n, self.n)
+        return found.reshape(*shape, self.nv, self.nv)
 
     def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
-        """h(q, qd) = C(q, qd) qd + g(q), (..., n)."""
-        return self.inverse_dynamics(q, qd, np.zeros(self.n))
+        """h(q, qd) = C(q, qd) qd + g(q), (..., nv)."""
+        return self.inverse_dynamics(q, qd, np.zeros(self.nv))
 
     def gravity(self, q: ArrayLike) -> Array:
-        """g(q), (..., n)."""
-        return self.inverse_dynamics(q, np.zeros(self.n), np.zeros(self.n))
+        """g(q), (..., nv)."""
+        return self.inverse_dynamics(q, np.zeros(self.nv), np.zeros(self.nv))
 
     @property
     def base_parameters(self) -> tuple[equations.BaseParameter, ...]:

@@ -24,21 +24,25 @@ BLOCK_BYTES = 2**18
 
 
 def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
-    """The broadcast leading shape, and each vector as (states, n) float64; InputError where a shape does not fit."""
-    n = len(chain)
+    """The broadcast leading shape, and each vector as (states, nv) float64, q as (states, nq); InputError where a shape
+    does not fit."""
     arrays = {name: np.asarray(value, dtype=np.float64) for name, value in vectors.items()}
+    lengths = {name: chain.nq if name == "q" else chain.nv for name in vectors}
     for name, array in arrays.items():
+        n = lengths[name]
         if array.ndim == 0 or array.shape[-1] != n:
             raise InputError(
-                f"{name} has shape {array.shape}, expected (..., {n}) for {n} joints",
+                f"{name} has shape {array.shape}, expected (..., {n}) for {len(chain)} joints",
                 "the last axis runs over " + ", ".join(chain.joint_names),
             )
     try:
-        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
     except ValueError as error:
         found = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise InputError(f"shapes do not broadcast: {found}", "make leading axes equal or one") from error
-    return shape[:-1], [np.broadcast_to(a, shape).reshape(-1, n) for a in arrays.values()]
+    return shape, [
+        np.broadcast_to(a, (*shape, lengths[name])).reshape(-1, lengths[name]) for name, a in arrays.items()
+    ]
 
 
 class _Monomials:

@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.dynamics.frames import frames_of
+from psdmc.dynamics.slices import normalized
+from psdmc.robot.mechanism import Mechanism
+
 Array = NDArray[np.float64]
 
 RANGES = (np.pi, 3.0, 5.0)
@@ -15,3 +19,12 @@ def random_states(rng: np.random.Generator, *shape: int) -> tuple[Array, Array, 
     """q, qd and qdd, arrays of this shape each."""
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, shape) for limit in RANGES)
     return q, qd, qdd
+
+
+def states_of(robot: Mechanism, rng: np.random.Generator, count: int) -> tuple[Array, Array, Array]:
+    """q (count, nq), qd and qdd (count, nv) of a robot, quaternions of length one."""
+    sizes = (robot.nq, robot.nv, robot.nv)
+    q, qd, qdd = (
+        limit * rng.uniform(-1.0, 1.0, (count, size)) for limit, size in zip(RANGES, sizes, strict=True)
+    )
+    return normalized(frames_of(robot), q.T).T, qd, qdd

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, solve
 from psdmc.program.signature import Positive, Quantity
@@ -29,3 +30,14 @@ def accelerations(g: Ingredients, tau: Sequence[Scalar]) -> tuple[list[Scalar], 
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, g.inputs["q"], g.choices))
     bias = torques(g, g.inputs["qd"], g.still, g.base_acceleration)
     return solve(factors, [given - h for given, h in zip(tau, bias, strict=True)]), factors
+
+
+def accelerations_and_pivots(
+    g: Ingredients, tau: Sequence[Scalar]
+) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
+    """nv accelerations M^-1 (tau - h) and the nv pivots of M, by the way that the choices say."""
+    if not g.choices.articulated:
+        found, factors = accelerations(g, tau)
+        return found, factors.pivots
+    q, qd = g.inputs["q"], g.inputs["qd"]
+    return forward_dynamics(g.frames, g.bodies, g.drives, q, qd, tau, g.base_acceleration, g.choices)

@@ -11,6 +11,7 @@ from psdmc.dynamics.body import Body
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
+from psdmc.dynamics.slices import first_rates
 from psdmc.program.signature import Signature
 from psdmc.robot.mechanism import Array, NamedFrame, Placement
 
@@ -81,8 +82,8 @@ class Ingredients:
 
     @property
     def still(self) -> list[Scalar]:
-        """n zero rates."""
-        return [0.0] * len(self.frames)
+        """nv zero rates."""
+        return [0.0] * first_rates(self.frames)[-1]
 
 
 class Polynomials(StrEnum):
@@ -123,6 +124,7 @@ class Recipe:
                  number, times theta_b, which `pinocchio` gives
     beside       name of the function whose values this one's are differences of: errors are measured relative to those
     needs        what the model must have; left out: a positive definite mass matrix where the signature has `positive`
+    accelerates  whether its accelerations come by the cheaper of two ways (Choices.articulated)
     default      whether it is generated where no functions are named
     benched      whether `make bench` measures it
     """
@@ -141,6 +143,7 @@ class Recipe:
     gradient: str | None = None
     beside: str | None = None
     needs: Needs | None = None
+    accelerates: bool = False
     default: bool = False
     benched: bool = False
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from psdmc.robot.coordinates import Coordinate, checked_coordinates
+from psdmc.robot.coordinates import Coordinate, checked_coordinates, leaders
 from psdmc.robot.joints import JointType
 from psdmc.robot.placement import Array as Array
 from psdmc.robot.placement import Placement as Placement
@@ -139,6 +139,22 @@ class Mechanism:
     @property
     def types(self) -> tuple[JointType, ...]:
         return tuple(joint.type for joint in self.joints)
+
+    @property
+    def nq(self) -> int:
+        """Length of q: coordinates of all joints that follow no other."""
+        return sum(self.joints[i].type.nq for i in leaders(self.coordinates))
+
+    @property
+    def nv(self) -> int:
+        """Length of qd, qdd and tau: their rates."""
+        return sum(self.joints[i].type.nv for i in leaders(self.coordinates))
+
+    @property
+    def rate_joints(self) -> tuple[int, ...]:
+        """nv, the joint that each rate belongs to."""
+        own = leaders(self.coordinates)
+        return tuple(i for i in own for _ in range(self.joints[i].type.nv))
 
     @property
     def leaves(self) -> tuple[int, ...]:

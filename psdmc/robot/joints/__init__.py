@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+from psdmc.robot.joints.free import FREE
 from psdmc.robot.joints.joint_type import JointType, Twist
+from psdmc.robot.joints.planar import PLANAR
 from psdmc.robot.joints.prismatic import PRISMATIC
 from psdmc.robot.joints.revolute import REVOLUTE
+from psdmc.robot.joints.spherical import SPHERICAL
+from psdmc.robot.joints.translation import TRANSLATION
 
-__all__ = ["JOINT_TYPES", "PRISMATIC", "REVOLUTE", "URDF_TYPES", "JointType", "Twist", "joint_type"]
+__all__ = [
+    "FREE",
+    "JOINT_TYPES",
+    "PLANAR",
+    "PRISMATIC",
+    "REVOLUTE",
+    "SPHERICAL",
+    "TRANSLATION",
+    "URDF_TYPES",
+    "WIDE_TYPES",
+    "JointType",
+    "Twist",
+    "joint_type",
+]
 
 JOINT_TYPES: dict[str, JointType] = {kind.word: kind for kind in (REVOLUTE, PRISMATIC)}
-"""By the word of robot files and model files."""
+"""Of one coordinate, by the word of robot files and model files."""
+
+WIDE_TYPES: dict[str, JointType] = {kind.word: kind for kind in (FREE, SPHERICAL, PLANAR, TRANSLATION)}
+"""Of several coordinates, by their word: no robot file or model file holds them yet."""
 
 URDF_TYPES: dict[str, JointType] = {word: kind for kind in JOINT_TYPES.values() for word in kind.urdf_words}
 """By the type of a URDF's <joint>."""

@@ -54,3 +54,6 @@ POLYNOMIAL = Basis(
     nodes=(-1.0, 0.0, 1.0),
 )
 """1, q, q^2."""
+
+NO_BASIS = Basis(exponents=((0, 0, 0),), linear=1, derivatives=((),), nodes=(0.0,))
+"""Of a joint with several coordinates, whose torques are not expanded."""

@@ -7,13 +7,13 @@ distinguishes types; it uses the properties below.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
 from psdmc.robot.joints.basis import Basis
-from psdmc.robot.placement import Placement
+from psdmc.robot.placement import Array, Placement
 
 Scalar = Any
 """A float, an array of states, or a symbol."""
@@ -21,13 +21,20 @@ Scalar = Any
 Twist = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Linear velocity of a frame's origin and angular velocity, along the frame's own axes."""
 
+Vector = tuple[Scalar, Scalar, Scalar]
+Rows = tuple[Vector, Vector, Vector]
 
-class JointType(ABC):
-    """One way to move: a turn about z, a slide along z, or both in a fixed ratio.
+
+class JointType:
+    """One way to move: a turn about z, a slide along z, or both in a fixed ratio; or, where not `about_z`, by several
+    coordinates, from which `rotation` and `way` give the frame's place. Rates are along the moved frame's own axes.
+
 
     word           in robot files, model files and tables
     urdf_words     types of a URDF's <joint> that move so
     nq, nv         numbers of coordinates and of rates
+    neutral        nq coordinates at which the frame has not moved
+    about_z        whether it is moved about and along z by one coordinate
     twists         nv of them, the motion subspace: the joint frame's velocity per unit rate, along its own axes
     basis          the factors in q that its transform is made of
     length_order   exponent of the metre in the coordinate: 0 for an angle
@@ -46,6 +53,8 @@ class JointType(ABC):
     urdf_words: ClassVar[tuple[str, ...]]
     nq: ClassVar[int] = 1
     nv: ClassVar[int] = 1
+    neutral: ClassVar[tuple[float, ...]] = (0.0,)
+    about_z: ClassVar[bool] = True
     twists: ClassVar[tuple[Twist, ...]]
     basis: ClassVar[Basis]
     length_order: ClassVar[int]
@@ -57,21 +66,58 @@ class JointType(ABC):
     pinocchio: ClassVar[str]
     mujoco: ClassVar[str]
 
-    @abstractmethod
     def turn(self, x: Scalar) -> Scalar | None:
         """Angle about z at coordinate x, or its rate or acceleration at that of x (all are linear); None: it never
         turns."""
+        return None
 
-    @abstractmethod
     def slide(self, x: Scalar) -> Scalar | None:
         """Displacement along z in m at coordinate x, or its rate or acceleration; None: it never slides."""
+        return None
 
-    def transform(self, q: float) -> Placement:
-        """The moved joint frame in the one at q = 0."""
-        angle, way = self.turn(q), self.slide(q)
+    def rotation(self, q: Sequence[Scalar]) -> Rows | None:
+        """The moved frame's axes as columns in the one that has not moved, from nq coordinates; None: it never turns, or by
+        `turn`."""
+        return None
+
+    def way(self, q: Sequence[Scalar]) -> Vector | None:
+        """The moved frame's origin in the one that has not moved, m; None: it stays, or goes along z by `slide`."""
+        return None
+
+    def transform(self, q: float | Sequence[float]) -> Placement:
+        """The moved joint frame in the one that has not moved; q: a number, or nq of them."""
+        values = [float(x) for x in np.atleast_1d(q)]
+        if not self.about_z:
+            rows, moved = self.rotation(values), self.way(values)
+            return Placement(
+                np.eye(3) if rows is None else np.array(rows),
+                np.zeros(3) if moved is None else np.array(moved),
+            )
+        angle, way = self.turn(values[0]), self.slide(values[0])
         c, s = (1.0, 0.0) if angle is None else (math.cos(angle), math.sin(angle))
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return Placement(rotation, np.array([0.0, 0.0, 0.0 if way is None else way]))
+
+    def normalized(self, q: Array) -> Array:
+        """(nq, ...) the coordinates nearest to q that are the joint's: quaternions of length one and so on."""
+        return q
+
+    def integrated(self, q: Array, step: Array) -> Array:
+        """(..., nq) where a joint at q (..., nq) comes that moves at constant rates for one second by `step` (..., nv)."""
+        return q + step
+
+    def difference(self, q: Array, other: Array) -> Array:
+        """(..., nv) the constant rates that bring a joint from q to `other`, (..., nq) each, in one second."""
+        return other - q
+
+    @property
+    def hidden(self) -> int:
+        """How many inertial parameters of its body the joint cannot tell from those of the body before it.
+
+        They are the pseudo-inertias in the common null space of its twists as 4 x 4 matrices: k (k + 1) / 2 of k dimensions.
+        """
+        k = 4 - int(np.linalg.matrix_rank(np.vstack([_generator(twist) for twist in self.twists])))
+        return k * (k + 1) // 2
 
     @property
     def comes_round(self) -> bool:
@@ -96,3 +142,12 @@ class JointType(ABC):
 
     def __repr__(self) -> str:
         return f"<joint type {self.word}>"
+
+
+def _generator(twist: Twist) -> Array:
+    """(4, 4) velocity of a point (x, y, z, 1) at a unit rate."""
+    linear, (x, y, z) = twist
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+    matrix[:3, 3] = linear
+    return matrix

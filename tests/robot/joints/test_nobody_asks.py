@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 
 import psdmc
-from psdmc.robot.joints import JOINT_TYPES
+from psdmc.robot.joints import JOINT_TYPES, WIDE_TYPES
 
 PACKAGE = Path(psdmc.__file__).parent
 WORDS = set(JOINT_TYPES)
-OBJECTS = {word.upper() for word in WORDS} | {word.capitalize() for word in WORDS}
+NAMES = {*JOINT_TYPES, *WIDE_TYPES}
+OBJECTS = {word.upper() for word in NAMES} | {word.capitalize() for word in NAMES}
 ATTRIBUTES = {"kind", "word"}
 """A joint's type as a word."""
 

@@ -1,0 +1,57 @@
+"""Which entries of q, and of the rates, belong to which joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.scalar import Scalar
+
+
+def positions(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
+    """Joint by joint its coordinate, or the tuple of them where there are several."""
+    return _dealt([frame.joint.nq for frame in frames], q)
+
+
+def rates(frames: Sequence[Frame], qd: Sequence[Scalar]) -> list[Scalar]:
+    """Joint by joint its rate, or the tuple of them where it has several."""
+    return _dealt([frame.joint.nv for frame in frames], qd)
+
+
+def first_rates(frames: Sequence[Frame]) -> tuple[int, ...]:
+    """Where each joint's rates start, and behind the last their number."""
+    found = [0]
+    for frame in frames:
+        found.append(found[-1] + frame.joint.nv)
+    return tuple(found)
+
+
+def neutral(frames: Sequence[Frame]) -> list[Scalar]:
+    """q at which no frame has moved."""
+    return [value for frame in frames for value in frame.joint.neutral]
+
+
+def normalized(frames: Sequence[Frame], q: NDArray[Any]) -> NDArray[Any]:
+    """(nq, ...) the nearest coordinates that the joints can have: quaternions of length one and so on."""
+    ends = np.cumsum([frame.joint.nq for frame in frames])[:-1]
+    return np.concatenate([f.joint.normalized(own) for f, own in zip(frames, np.split(q, ends), strict=True)])
+
+
+def flat(values: Iterable[Sequence[Scalar]]) -> list[Scalar]:
+    """What joints have several of, in a row."""
+    return [x for own in values for x in own]
+
+
+def _dealt(counts: Sequence[int], values: Sequence[Scalar]) -> list[Scalar]:
+    if len(values) != sum(counts):
+        raise ValueError(f"{len(values)} values for joints that have {sum(counts)}")
+    found: list[Scalar] = []
+    used = 0
+    for count in counts:
+        found.append(values[used] if count == 1 else tuple(values[used : used + count]))
+        used += count
+    return found

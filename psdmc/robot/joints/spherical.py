@@ -1,0 +1,54 @@
+"""A joint that turns about every axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import ClassVar
+
+from psdmc.robot.joints.basis import NO_BASIS, Basis
+from psdmc.robot.joints.joint_type import JointType, Rows, Scalar, Twist
+from psdmc.robot.joints.quaternion import angles_between, of_length_one, rotation_of, turned_by
+from psdmc.robot.placement import Array
+
+
+class Spherical(JointType):
+    """q is a unit quaternion (x, y, z, w); rates are the angular velocity along the moved frame's axes, rad/s."""
+
+    __slots__ = ()
+
+    word: ClassVar[str] = "spherical"
+    urdf_words: ClassVar[tuple[str, ...]] = ()
+    nq: ClassVar[int] = 4
+    nv: ClassVar[int] = 3
+    neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 1.0)
+    about_z: ClassVar[bool] = False
+    twists: ClassVar[tuple[Twist, ...]] = (
+        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    )
+    basis: ClassVar[Basis] = NO_BASIS
+    length_order: ClassVar[int] = 0
+    position_unit: ClassVar[str] = "1"
+    effort_unit: ClassVar[str] = "N m"
+    free_range: ClassVar[float] = 1.0
+    ordinary: ClassVar[tuple[float, float, float]] = (math.pi, 3.0, 15.0)
+    verb: ClassVar[str] = "turns about every axis"
+    pinocchio: ClassVar[str] = "Spherical"
+    mujoco: ClassVar[str] = "ball"
+
+    def rotation(self, q: Sequence[Scalar]) -> Rows:
+        return rotation_of(q)
+
+    def normalized(self, q: Array) -> Array:
+        return of_length_one(q)
+
+    def integrated(self, q: Array, step: Array) -> Array:
+        return turned_by(q, step)
+
+    def difference(self, q: Array, other: Array) -> Array:
+        return angles_between(q, other)
+
+
+SPHERICAL = Spherical()

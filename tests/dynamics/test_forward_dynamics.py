@@ -1,0 +1,87 @@
+"""Articulated bodies against Pinocchio's and against a factorized mass matrix, on trees with every joint type."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from random_trees import TREES, RandomTree
+
+from psdmc.dynamics.composite_body import mass_matrix
+from psdmc.dynamics.forward_dynamics import forward_dynamics
+from psdmc.dynamics.motion import Choices
+from psdmc.dynamics.newton_euler import inverse_dynamics
+from psdmc.dynamics.solve import SingularMassMatrix, factorize
+
+COUNT = 5
+CHOICES = [Choices(*flags) for flags in product((False, True), repeat=4)]
+KINDS = ("RRRRRRRR", "RPRRPRPR", "RHRPHRRH", "FRRRRRRR", "FSLTRPRS", "SRFRPLTR", "TLRRSRRF")
+
+trees = pytest.mark.parametrize(
+    ("parents", "kinds", "parallel"),
+    [
+        (parents, kinds, parallel)
+        for parents in TREES.values()
+        for kinds in KINDS
+        for parallel in (0.0, 0.6, 1.0)
+    ],
+)
+
+
+def columns(values) -> np.ndarray:
+    return np.stack([np.broadcast_to(np.asarray(v, float), (COUNT,)) for v in values], axis=1)
+
+
+def condition(tree: RandomTree, q: np.ndarray) -> float:
+    rows = mass_matrix(tree.frames, tree.bodies, tree.drives, list(q.T))
+    return float(np.linalg.cond(np.stack([columns(row) for row in rows], axis=1)).max())
+
+
+@trees
+def test_accelerations_are_pinocchios_however_they_are_arranged(parents, kinds, parallel) -> None:
+    tree = RandomTree(31, parents, kinds, parallel)
+    q, qd, tau = tree.motion(COUNT)
+    expected = tree.each(pin.aba, q, qd, tau)
+    allowed = 1e-15 * max(condition(tree, q), 1e3) * np.abs(expected).max()
+    for choices in CHOICES:
+        states = (list(q.T), list(qd.T), list(tau.T))
+        found, _ = forward_dynamics(tree.frames, tree.bodies, tree.drives, *states, tree.up, choices)
+        np.testing.assert_allclose(columns(found), expected, rtol=0, atol=allowed)
+
+
+@trees
+def test_pivots_are_those_of_the_factorized_mass_matrix(parents, kinds, parallel) -> None:
+    tree = RandomTree(32, parents, kinds, parallel)
+    q, qd, tau = tree.motion(COUNT)
+    factors = factorize(mass_matrix(tree.frames, tree.bodies, tree.drives, list(q.T)))
+    _, pivots = forward_dynamics(
+        tree.frames, tree.bodies, tree.drives, list(q.T), list(qd.T), list(tau.T), tree.up
+    )
+    np.testing.assert_allclose(columns(pivots), columns(factors.pivots), rtol=1e-8)
+    assert np.all(columns(pivots) > 0.0)
+
+
+@pytest.mark.parametrize("kinds", ["RRRPRR", "FRRPRR", "SRRLRR"])
+def test_wrenches_of_the_world_accelerate_the_links(kinds: str) -> None:
+    """The torques that give these accelerations under the same wrenches are those given."""
+    tree = RandomTree(33, TREES["a trunk with two arms"], kinds, 0.6)
+    q, qd, tau = tree.motion(1)
+    rng = np.random.default_rng(3)
+    external = {i: (tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for i in (0, 2, 5)}
+    for choices in CHOICES:
+        args = (tree.frames, tree.bodies, tree.drives, q[0], qd[0])
+        found, _ = forward_dynamics(*args, tau[0], tree.up, choices, external)
+        back = inverse_dynamics(*args, found, tree.up, external=external)
+        np.testing.assert_allclose(back, tau[0], atol=1e-9)
+
+
+def test_a_joint_that_moves_no_inertia_is_named() -> None:
+    tree = RandomTree(34, TREES["a fork"], "FRR")
+    bodies = [body._replace(mass=0.0, moment=(0.0,) * 3, second=(0.0,) * 6) for body in tree.bodies]
+    with pytest.raises(SingularMassMatrix) as caught:
+        forward_dynamics(
+            tree.frames, [*tree.bodies[:2], bodies[2]], [0.0] * 3, [0.3] * 9, [0.1] * 8, [0.0] * 8, tree.up
+        )
+    assert caught.value.joint == 7
