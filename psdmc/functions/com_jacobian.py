@@ -24,8 +24,9 @@ def trace(g: Ingredients) -> Outputs:
     bodies = bodies_about(g.link_frames, g.standard)
     mass = sum(body.mass for body in bodies)
     columns = []
-    for j in range(len(g.frames)):
-        linear, _ = total_momentum(g.frames, bodies, g.inputs["q"], _unit(j, len(g.frames)))
+    nv = len(g.still)
+    for j in range(nv):
+        linear, _ = total_momentum(g.frames, bodies, g.inputs["q"], _unit(j, nv))
         columns.append(scale(transform(g.base_axes, linear), 1.0 / mass))
     return {"J": list(zip(*columns, strict=True))}
 
@@ -33,14 +34,14 @@ def trace(g: Ingredients) -> Outputs:
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q, mass = given["q"], sum(body.mass for body in robot.solids)
     columns = [
-        entries(total_momentum(robot.frames, robot.solids, list(q.T), _unit(j, robot.n))[0], len(q))
-        for j in range(robot.n)
+        entries(total_momentum(robot.frames, robot.solids, list(q.T), _unit(j, robot.nv))[0], len(q))
+        for j in range(robot.nv)
     ]
     return {"J": np.stack(columns, axis=-1) / mass}
 
 
-def _unit(j: int, n: int) -> list[Scalar]:
-    return [1.0 if i == j else 0.0 for i in range(n)]
+def _unit(j: int, nv: int) -> list[Scalar]:
+    return [1.0 if i == j else 0.0 for i in range(nv)]
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

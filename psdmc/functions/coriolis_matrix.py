@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 def trace(g: Ingredients) -> Outputs:
     """Column j is the Slotine-Li torque of a unit reference rate of joint j, without gravity."""
-    n = len(g.bodies)
+    nv = len(g.still)
     columns = []
-    for j in range(n):
-        unit: list[Scalar] = [1.0 if i == j else 0.0 for i in range(n)]
+    for j in range(nv):
+        unit: list[Scalar] = [1.0 if i == j else 0.0 for i in range(nv)]
         columns.append(torques(g, g.inputs["qd"], g.still, ZERO, unit))
     return {"C": list(zip(*columns, strict=True))}
 
@@ -31,8 +31,8 @@ def trace(g: Ingredients) -> Outputs:
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     """Column j is what the velocities qd do where qd_r is joint j's unit rate."""
     q, qd = given["q"], given["qd"]
-    rest = np.zeros_like(q)
-    units = [np.broadcast_to(unit, q.shape) for unit in np.eye(robot.n)]
+    rest = np.zeros_like(qd)
+    units = [np.broadcast_to(unit, qd.shape) for unit in np.eye(robot.nv)]
     columns = [robot.torques(q, qd, rest, ZERO, qd_r=unit) for unit in units]
     return {"C": np.stack(columns, axis=-1)}
 

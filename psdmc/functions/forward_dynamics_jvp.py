@@ -52,4 +52,5 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    of_axes=True,
 )

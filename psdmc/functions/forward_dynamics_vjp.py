@@ -74,4 +74,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     benched=True,
+    of_axes=True,
 )

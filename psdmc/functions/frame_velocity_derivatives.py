@@ -61,4 +61,5 @@ RECIPE = Recipe(
     "getFrameVelocityDerivatives",
     pinocchio,
     beside="frame_jacobian",
+    of_axes=True,
 )

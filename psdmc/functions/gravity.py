@@ -23,7 +23,7 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    rest = np.zeros_like(given["q"])
+    rest = np.zeros((len(given["q"]), robot.nv))
     return {"g": robot.torques(given["q"], rest, rest, robot.base_acceleration)}
 
 

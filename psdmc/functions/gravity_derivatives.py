@@ -57,4 +57,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     beside="inverse_dynamics",
+    of_axes=True,
 )

@@ -60,4 +60,5 @@ RECIPE = Recipe(
     "rnea, computeRNEADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    of_axes=True,
 )

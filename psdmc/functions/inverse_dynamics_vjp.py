@@ -60,4 +60,5 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     benched=True,
+    of_axes=True,
 )

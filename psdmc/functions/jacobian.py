@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def trace(g: Ingredients) -> Outputs:
     rows = jacobian(g.frames, g.tip_body, g.tip, g.inputs["q"])
     turned = [
-        [dot(axes, (rows[k][j], rows[k + 1][j], rows[k + 2][j])) for j in range(len(g.frames))]
+        [dot(axes, (rows[k][j], rows[k + 1][j], rows[k + 2][j])) for j in range(len(g.still))]
         for k in (0, 3)
         for axes in g.base_axes
     ]

@@ -22,7 +22,7 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    return {"h": robot.torques(given["q"], given["qd"], np.zeros_like(given["q"]), robot.base_acceleration)}
+    return {"h": robot.torques(given["q"], given["qd"], np.zeros_like(given["qd"]), robot.base_acceleration)}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

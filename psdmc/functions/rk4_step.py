@@ -97,4 +97,5 @@ RECIPE = Recipe(
     "aba",
     pinocchio,
     shares="inverse_dynamics",
+    of_axes=True,
 )

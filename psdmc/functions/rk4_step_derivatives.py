@@ -151,4 +151,5 @@ RECIPE = Recipe(
     "aba, computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    of_axes=True,
 )

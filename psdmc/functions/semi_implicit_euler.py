@@ -53,4 +53,5 @@ RECIPE = Recipe(
     "aba",
     pinocchio,
     starts="inverse_dynamics",
+    of_axes=True,
 )

@@ -112,4 +112,5 @@ def with_parameter_gradient(
         pinocchio,
         shares=state.shares,
         gradient=GRADIENT_THETA.name,
+        of_axes=state.of_axes,
     )

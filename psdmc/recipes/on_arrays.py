@@ -43,6 +43,10 @@ class RobotOnArrays:
     def n(self) -> int:
         return len(self.chain)
 
+    @property
+    def nv(self) -> int:
+        return self.chain.nv
+
     @cached_property
     def frames(self) -> tuple[Frame, ...]:
         return frames_of(self.chain)
@@ -93,12 +97,12 @@ class RobotOnArrays:
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
         """(k, n) joint accelerations."""
-        bias = self.torques(q, qd, np.zeros_like(q), self.base_acceleration)
+        bias = self.torques(q, qd, np.zeros_like(qd), self.base_acceleration)
         found = np.linalg.solve(self.mass_matrix(q), (tau - bias)[..., None])[..., 0]
         return np.asarray(found, dtype=np.float64)
 
     def mass_matrix(self, q: Array) -> Array:
-        """(k, n, n)"""
+        """(k, nv, nv)"""
         return matrix(mass_matrix(self.frames, self.bodies, self.drives, list(q.T)), len(q))
 
 
