@@ -10,7 +10,7 @@ from psdmc.lower.reframe import Foot, Reframed, reframe
 from psdmc.robot.mechanism import Array, Mechanism
 
 LARGE = 10
-"""Joints. What the search tries of a larger robot does not grow with it, as each trial does."""
+"""Joints. Each trial of a larger robot takes longer, so that fewer are made, and less of what they can change is tried."""
 
 
 class Geometry:

@@ -101,7 +101,7 @@ class Search:
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
         self.is_large = len(chain) > LARGE
         self._is_arm = chain.is_serial and not self.is_large and all(kind.about_z for kind in chain.types)
-        self.budget = budget * LARGE // max(LARGE, len(chain))
+        self.budget = budget * LARGE**2 // max(LARGE, len(chain)) ** 2
         self._costs: dict[tuple[str, Reframed, float, tuple[int, ...], Choices], Cost] = {}
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         known = theta_b if known is None else known
