@@ -10,11 +10,11 @@ import pinocchio as pin
 import pytest
 from bundled import bundled_model
 from pinocchio_robots import PinocchioRobot, robot_at_hand
+from random_trees import TREES, RandomTree
 
-from psdmc.derivation import derive
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError, InputError
 from psdmc.functions import RECIPES
-from psdmc.lower import kernels
 from psdmc.lower.factored import trace_dynamics
 from psdmc.lower.kernels import lower
 from psdmc.lower.search import SINGLE, Search
@@ -64,17 +64,10 @@ on_whole = pytest.mark.parametrize(("name", "floating"), WHOLE)
 on_each = pytest.mark.parametrize(("name", "floating"), ROBOTS)
 
 
-@pytest.fixture(autouse=True)
-def trees_pass(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the refusal of whole stages."""
-    for module in (derive, kernels):
-        monkeypatch.setattr(module, "require_derivable", lambda chain: None)
-
-
 @cache
 def derived(name: str, floating: bool) -> tuple[PinocchioRobot, DynamicsModel]:
     robot = robot_at_hand(name, floating)
-    return robot, derive.derive_model(robot.mechanism, expand=False)
+    return robot, derive_model(robot.mechanism, expand=False)
 
 
 @cache
@@ -246,4 +239,28 @@ def test_e_and_p_of_a_free_root_are_refused() -> None:
     with pytest.raises(
         DerivationError, match="joint 'root_joint' moves freely: E and P are of joints of one"
     ):
-        derive.derive_model(robot.mechanism)
+        derive_model(robot.mechanism, expand=True)
+
+
+@pytest.mark.parametrize("parents", [TREES["a fork"], TREES["a trunk with two arms"], TREES["interleaved"]])
+@pytest.mark.parametrize("kinds", ["FRPRRRRR", "SRFRPLTR", "RPLSRFRR", "TLRRSRRF"])
+@pytest.mark.parametrize("parallel", [0.0, 0.6])
+def test_lowered_trees_with_joints_of_every_type_are_pinocchios(parents, kinds: str, parallel: float) -> None:
+    """Wherever frames sit: those of joints of several coordinates stay, others are turned and moved towards them."""
+    tree = RandomTree(41, parents, kinds, parallel)
+    model = derive_model(tree.mechanism(), expand=False)
+    search = Search(model.mechanism, model.representative, model.theta_b, budget=10)
+    q, qd, qdd = tree.motion(COUNT)
+    tau = tree.each(pin.rnea, q, qd, qdd)
+    given = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
+    sizes = {"tau": tree.nv, "qdd": tree.nv, "pivot": tree.nv}
+    for feet in search.geometry.feet:
+        for start in search.starts(feet):
+            program = trace_dynamics(RECIPES["inverse_dynamics"], start, search.robot)
+            assert_near(interpret(program, given, sizes)["tau"], tau, 1e-11)
+        for way in (False, True):
+            arranged = replace(start, choices=replace(start.choices, articulated=way))
+            program = trace_dynamics(RECIPES["forward_dynamics"], arranged, search.robot)
+            found = interpret(program, given, sizes)
+            np.testing.assert_allclose(found["qdd"], qdd, atol=1e-6)
+            assert np.all(found["pivot"] > 0.0)
