@@ -33,7 +33,7 @@ def description(
         "theta_b, base parameters in standard parameters about the file's link frames:",
         *(f"  {i}  {parameter.equation}  [{parameter.unit}]" for i, parameter in enumerate(info.parameters)),
         "",
-        "Arrays: n reals per vector; matrices row-major. Inputs may overlap each other. An output may overlap any",
+        *_arrays(info),
         *_forms(options.target),
     ]
     if any(len(function.signature.outputs) > 1 for function in functions):
@@ -43,6 +43,19 @@ def description(
         lines += ["", "Frames, in the order of every array over them:"]
         lines += [f"  {i}  {name}" for i, name in enumerate(info.frames)]
     return tuple(lines)
+
+
+def _arrays(info: PackageInfo) -> tuple[str, ...]:
+    """Lengths of vectors."""
+    if not info.is_wide:
+        return (
+            "Arrays: n reals per vector; matrices row-major. Inputs may overlap each other. An output may overlap any",
+        )
+    return (
+        f"Arrays: q has NQ = {info.nq} reals, rates and torques have NV = {info.nv} each; matrices row-major. Quaternions,",
+        "and cosine and sine of an angle, are of length one: functions do not see to it, and one off by more than 1e-6",
+        "gives results that are off, too. Inputs may overlap each other. An output may overlap any",
+    )
 
 
 def _forms(target: Target) -> tuple[str, ...]:
@@ -94,7 +107,7 @@ def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
 
 def joint_line(joint: JointInfo) -> str:
     """A joint and its limits; unknown limits are left out."""
-    parts = [f"{joint.name} ({joint.kind})"]
+    parts = [f"{joint.name} ({joint.kind}{': ' if joint.coordinates else ''}{joint.coordinates})"]
     if math.isfinite(joint.lower) or math.isfinite(joint.upper):
         parts.append(f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}")
     for value, unit in (

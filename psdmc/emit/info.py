@@ -18,7 +18,11 @@ from psdmc.version import psdmc_version
 
 @dataclass(frozen=True, slots=True)
 class JointInfo:
-    """A joint's name, its type's word and units, and its limits in these (infinite where unknown)."""
+    """A joint's name, its type's word and units, and its limits in these (infinite where unknown).
+
+    nq, nv       its coordinates and its rates, and
+    coordinates  what these are, where there are several
+    """
 
     name: str
     kind: str
@@ -29,6 +33,9 @@ class JointInfo:
     effort: float = math.inf
     unit: str = "rad"
     effort_unit: str = "N m"
+    nq: int = 1
+    nv: int = 1
+    coordinates: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +77,24 @@ class PackageInfo:
         return len(self.joints)
 
     @property
+    def nq(self) -> int:
+        """Length of q."""
+        return sum(joint.nq for joint in self.joints)
+
+    @property
+    def nv(self) -> int:
+        """Length of qd, qdd and tau: degrees of freedom."""
+        return sum(joint.nv for joint in self.joints)
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether some joint has several coordinates, so that q, rates and tables of joints differ in length."""
+        return any(joint.nq > 1 for joint in self.joints)
+
+    @property
     def sizes(self) -> Sizes:
         """What the words of signatures mean for this robot."""
-        return Sizes.of_chain(self.n, self.l, len(self.frames))
+        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames))
 
     @property
     def l(self) -> int:  # noqa: E743
@@ -100,6 +122,9 @@ def package_info(
             joint.limits.effort,
             joint.type.position_unit,
             joint.type.effort_unit,
+            joint.type.nq,
+            joint.type.nv,
+            joint.type.coordinates,
         )
         for joint in chain.joints
     )

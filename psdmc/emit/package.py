@@ -58,6 +58,18 @@ class PackageView:
         return self.info.n
 
     @property
+    def dof(self) -> int:
+        """Degrees of freedom: length of rates and torques."""
+        return self.info.nv
+
+    @property
+    def size_macros(self) -> dict[str, int]:
+        """Further sizes of the header, where joints, q and rates are not equally many: name and value."""
+        if not self.info.is_wide:
+            return {}
+        return {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv}
+
+    @property
     def l(self) -> int:  # noqa: E743
         return self.info.l
 
@@ -131,12 +143,13 @@ class PackageView:
 
     @property
     def cpp_classes(self) -> tuple[CppClass, ...]:
-        return cpp_classes(self.functions, self.n)
+        return cpp_classes(self.functions, self.dof)
 
     @property
     def cpp_sizes(self) -> dict[str, int]:
         """Constants of the C++ classes."""
-        sizes = {"dof": self.n, "base_parameters": self.l, "lanes": self.lanes}
+        sizes = {"dof": self.dof, "base_parameters": self.l, "lanes": self.lanes}
+        sizes |= {name.lower(): value for name, value in self.size_macros.items()}
         return sizes | ({"frames": len(self.info.frames)} if self.uses_frames else {})
 
     @property
@@ -178,7 +191,7 @@ class PackageView:
     def self_checks(self) -> tuple[SelfCheck, ...]:
         """The self-test's calls: every kernel; those without a reference value are marked."""
         known = () if self.references is None else self.references.expected
-        return self_checks(self.kernels, self.n, self.options, known)
+        return self_checks(self.kernels, self.dof, self.options, known)
 
     @property
     def checked_kernels(self) -> int:
@@ -188,7 +201,7 @@ class PackageView:
     @property
     def given_vectors(self) -> tuple[GivenVector, ...]:
         """Inputs of all kernels, by the reference states' names."""
-        return given_vectors(self.kernels, self.n)
+        return given_vectors(self.kernels, self.dof)
 
     @property
     def largest_output(self) -> int:
@@ -235,7 +248,8 @@ class PackageView:
     @property
     def cdef(self) -> str:
         """The declarations for cffi: tables and functions, without macros."""
-        macros = {f"{self.robot}_DOF": str(self.n), f"{self.robot}_BASE_PARAMETERS": str(self.l)}
+        macros = {f"{self.robot}_{name}": str(value) for name, value in self.size_macros.items()}
+        macros |= {f"{self.robot}_DOF": str(self.dof), f"{self.robot}_BASE_PARAMETERS": str(self.l)}
         macros[f"{self.robot}_FRAMES"] = str(len(self.info.frames))
         lines = list(self.table_declarations)
         for name, value in macros.items():

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from psdmc.functions import DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
-from psdmc.program.signature import TAU, Sizes
+from psdmc.model.random_states import on_joints
+from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.robot.small import times
@@ -95,9 +96,11 @@ def reference_states(
 
 def _drawn(model: DynamicsModel) -> dict[str, Array]:
     """(CANDIDATES, size) of everything that functions read except torques, drawn in the functions' order."""
-    sizes, rng = Sizes.of_chain(model.n, model.l, len(model.mechanism.frames)), np.random.default_rng(SEED)
+    robot, rng = model.mechanism, np.random.default_rng(SEED)
+    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(robot.frames))
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
-    return {q.name: q.largest * rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q))) for q in read.values()}
+    drawn = {q.name: q.largest * rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q))) for q in read.values()}
+    return drawn | {Q.name: on_joints(robot, drawn[Q.name])}
 
 
 def _values(

@@ -35,7 +35,7 @@ def tables(
 ) -> tuple[Table, ...]:
     """All tables of a package, in the header's order; texts only where the target has them."""
     lengths = {"dof": f"{robot}_DOF", "base_parameters": f"{robot}_BASE_PARAMETERS", "3": "3"}
-    lengths["frames"] = f"{robot}_FRAMES"
+    lengths |= {"frames": f"{robot}_FRAMES", "joints": f"{robot}_JOINTS"}
 
     def numbers(name: str, length: str, values: Iterable[float | None]) -> Table:
         kept = tuple(values)
@@ -51,14 +51,15 @@ def tables(
 
     joints, parameters = info.joints, info.parameters
     frames = (texts("frame_names", "frames", info.frames),) if with_frames else ()
+    each = "joints" if info.is_wide else "dof"
     every = (
-        texts("joint_names", "dof", (joint.name for joint in joints)),
-        texts("joint_units", "dof", (joint.unit for joint in joints)),
-        numbers("position_lower", "dof", (joint.lower for joint in joints)),
-        numbers("position_upper", "dof", (joint.upper for joint in joints)),
-        numbers("speed_limit", "dof", (joint.speed for joint in joints)),
-        numbers("acceleration_limit", "dof", (joint.acceleration for joint in joints)),
-        numbers("effort_limit", "dof", (joint.effort for joint in joints)),
+        texts("joint_names", each, (joint.name for joint in joints)),
+        texts("joint_units", each, (joint.unit for joint in joints)),
+        numbers("position_lower", each, (joint.lower for joint in joints)),
+        numbers("position_upper", each, (joint.upper for joint in joints)),
+        numbers("speed_limit", each, (joint.speed for joint in joints)),
+        numbers("acceleration_limit", each, (joint.acceleration for joint in joints)),
+        numbers("effort_limit", each, (joint.effort for joint in joints)),
         numbers("gravity_acceleration", "3", info.gravity),
         numbers("theta_b", "base_parameters", (parameter.value for parameter in parameters)),
         texts("base_parameter_equations", "base_parameters", (p.equation for p in parameters)),

@@ -67,7 +67,8 @@ def chain_to_json(chain: Mechanism) -> dict[str, Any]:
 
 def is_plain_chain(chain: Mechanism) -> bool:
     """Whether every psdmc that reads model files knows such robots."""
-    return chain.is_serial and chain.coordinates == own_coordinates(len(chain))
+    is_known = all(kind.about_z for kind in chain.types)
+    return is_known and chain.is_serial and chain.coordinates == own_coordinates(len(chain))
 
 
 def _frames_to_json(chain: Mechanism) -> dict[str, Any]:

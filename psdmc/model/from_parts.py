@@ -47,12 +47,14 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
     is_known = json.flag(json.part(manifest, "theta_b_known", "the manifest"), "'theta_b_known'")
     certificate = json.part(manifest, "certificate", "the manifest")
     _check_base_parameters(arrays, chain, l, is_known)
+    if is_expanded and not all(kind.about_z for kind in chain.types):
+        raise ValueError("E and P are of joints of one coordinate, and a joint has several")
     return DynamicsModel(
         expansion=_expansion(arrays, n, l) if is_expanded else None,
         theta_b=arrays["theta_b"] if is_known else None,
         B=arrays["B"],
         mechanism=chain,
-        certificate=json.numbers(certificate, "the certificate", n),
+        certificate=json.numbers(certificate, "the certificate", chain.nv),
         provenance=_provenance(json.part(manifest, "provenance", "the manifest"), n),
     )
 

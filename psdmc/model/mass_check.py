@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.dynamics.frames import frames_of
+from psdmc.dynamics.slices import positions
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_states import on_joints
+from psdmc.robot.coordinates import leaders
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint
 
 Array = NDArray[np.float64]
@@ -32,7 +37,7 @@ class MassCheck:
 
     failing   number of poses in which it is not positive definite
     smallest  smallest eigenvalue of all poses, kg m^2 (kg where only sliding joints take part)
-    pose      (n,) pose of that eigenvalue, rad or m
+    pose      (nq,) pose of that eigenvalue, rad or m
     joint     name of the joint that its eigenvector moves most
     """
 
@@ -63,19 +68,22 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
     """M(q) in POSES seeded poses within the joint limits; None while the base parameters are unknown."""
     if model.theta_b is None:
         return None
-    low, high = (np.array(bound) for bound in zip(*map(_range, model.mechanism.joints), strict=True))
-    poses = np.random.default_rng(SEED).uniform(low, high, size=(POSES, model.n))
+    ranges = [_range(joint) for joint in model.mechanism.joints for _ in range(joint.type.nq)]
+    low, high = (np.array(bound) for bound in zip(*ranges, strict=True))
+    drawn = np.random.default_rng(SEED).uniform(low, high, size=(POSES, model.nq))
+    poses = on_joints(model.mechanism, drawn)
     mass = recursive.mass_matrix(model.mechanism, model.standard_parameters(), poses)
     failing = ~_is_definite(mass, ROUNDING * _magnitudes(model, np.abs(poses).max(axis=0)))
     values, vectors = np.linalg.eigh(mass)
     worst = int(np.argmin(np.where(failing == failing.any(), values[:, 0], np.inf)))
-    joint = model.joint_names[int(np.argmax(np.abs(vectors[worst, :, 0])))]
+    moved = int(np.argmax(np.abs(vectors[worst, :, 0])))
+    joint = model.joint_names[model.mechanism.rate_joints[moved]]
     return MassCheck(POSES, int(failing.sum()), float(values[worst, 0]), poses[worst], joint)
 
 
 def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:
     """(poses,) whether M is positive definite, each joint in the unit in which its own inertia is one, so that a
-    finger's inertia does not count as rounding of its arm's. `smallest` (n,) is the inertia below which a joint has
+    finger's inertia does not count as rounding of its arm's. `smallest` (nv,) is the inertia below which a rate has
     none."""
     inertias = np.einsum("pii->pi", mass)
     roots = np.sqrt(np.where(inertias > 0.0, inertias, 1.0))
@@ -85,21 +93,32 @@ def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:
 
 
 def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
-    """(n,) sum of the magnitudes that the parameters contribute to each joint's own inertia. `travel` (n,) is how far
+    """(nv,) sum of the magnitudes that the parameters contribute to the inertia of each rate. `travel` (nq,) is how far
     sliding joints move."""
     mechanism = model.mechanism
     x = np.abs(model.standard_parameters()).reshape(model.n, PARAMETERS_PER_LINK)
-    masses, firsts, seconds, result = x[:, 0], x[:, 1:4].sum(axis=1), x[:, 4:10].sum(axis=1), x[:, 10].copy()
-    slides = [joint.type.turn(1.0) is None for joint in mechanism.joints]
-    steps = [math.hypot(*joint.placement.translation) for joint in mechanism.joints]
-    steps = [step + far * along for step, far, along in zip(steps, travel, slides, strict=True)]
+    masses, firsts, seconds = x[:, 0], x[:, 1:4].sum(axis=1), x[:, 4:10].sum(axis=1)
+    slides = [[not any(angular) for _, angular in joint.type.twists] for joint in mechanism.joints]
+    result = [[drive] * len(rates) for drive, rates in zip(x[:, 10].tolist(), slides, strict=True)]
+    steps = [
+        math.hypot(*joint.placement.translation) + _way(joint, own)
+        for joint, own in zip(mechanism.joints, positions(frames_of(mechanism), travel.tolist()), strict=True)
+    ]
     for body, joint in enumerate(mechanism.joints):
         far = math.hypot(*joint.link_frame.translation)
         for i in reversed(mechanism.path_to(body)):
             turned = seconds[body] + 2.0 * far * firsts[body] + far**2 * masses[body]
-            result[i] += masses[body] if slides[i] else turned
+            for k, along in enumerate(slides[i]):
+                result[i][k] += masses[body] if along else turned
             far += steps[i]
-    return result
+    return np.array([own for i in leaders(mechanism.coordinates) for own in result[i]])
+
+
+def _way(joint: Joint, travel: Any) -> float:
+    """How far a joint goes."""
+    if joint.type.about_z:
+        return abs(float(joint.type.slide(travel) or 0.0))
+    return math.hypot(*(joint.type.way(travel) or (0.0,)))
 
 
 def _range(joint: Joint) -> tuple[float, float]:

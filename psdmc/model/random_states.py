@@ -27,4 +27,9 @@ def states_of(robot: Mechanism, rng: np.random.Generator, count: int) -> tuple[A
     q, qd, qdd = (
         limit * rng.uniform(-1.0, 1.0, (count, size)) for limit, size in zip(RANGES, sizes, strict=True)
     )
-    return normalized(frames_of(robot), q.T).T, qd, qdd
+    return on_joints(robot, q), qd, qdd
+
+
+def on_joints(robot: Mechanism, q: Array) -> Array:
+    """(k, nq) the nearest positions that the joints can have: quaternions of length one and so on."""
+    return normalized(frames_of(robot), q.T).T

@@ -16,7 +16,7 @@ from psdmc.emit.package import PackageView
 from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 
-FORMAT = 2
+FORMAT = 3
 """Version of the text's form."""
 
 
@@ -27,6 +27,7 @@ class Interface:
     robot        prefix of its symbols
     real         C's name of its floating-point type; `dtype` is NumPy's
     n, l         joints, base parameters
+    nq, nv       lengths of q, and of rates and torques
     joint_names  n, from base to tip
     frame_names  the named frames
     kernels      name -> trailing axes of each of its results
@@ -38,6 +39,8 @@ class Interface:
     dtype: str
     n: int
     l: int
+    nq: int
+    nv: int
     joint_names: tuple[str, ...]
     frame_names: tuple[str, ...]
     kernels: Mapping[str, tuple[tuple[int, ...], ...]]
@@ -46,7 +49,7 @@ class Interface:
     @property
     def sizes(self) -> Sizes:
         """What the words of signatures mean for this robot."""
-        return Sizes.of_chain(self.n, self.l, len(self.frame_names))
+        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names))
 
 
 def interface_of(package: PackageView) -> Interface:
@@ -57,6 +60,8 @@ def interface_of(package: PackageView) -> Interface:
         dtype=package.options.real,
         n=package.n,
         l=package.l,
+        nq=package.info.nq,
+        nv=package.info.nv,
         joint_names=tuple(joint.name for joint in package.info.joints),
         frame_names=package.info.frames,
         kernels={kernel.name: tuple(output.shape for output in kernel.outputs) for kernel in package.kernels},

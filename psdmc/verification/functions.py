@@ -48,7 +48,10 @@ def function_errors(
 
 def _states(model: DynamicsModel, robot: Reference) -> dict[str, Array]:
     """(STATES, ...) of everything that functions read."""
-    rng, sizes = np.random.default_rng(SEED), Sizes.of_chain(model.n, model.l, len(model.mechanism.frames))
+    rng, sizes = (
+        np.random.default_rng(SEED),
+        Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames)),
+    )
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
     given = {
         q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()

@@ -26,10 +26,10 @@ __all__ = [
 ]
 
 JOINT_TYPES: dict[str, JointType] = {kind.word: kind for kind in (REVOLUTE, PRISMATIC)}
-"""Of one coordinate, by the word of robot files and model files."""
+"""Of one coordinate, by their word in robot files and model files."""
 
 WIDE_TYPES: dict[str, JointType] = {kind.word: kind for kind in (FREE, SPHERICAL, PLANAR, TRANSLATION)}
-"""Of several coordinates, by their word: no robot file or model file holds them yet."""
+"""Of several coordinates, by their word in model files."""
 
 URDF_TYPES: dict[str, JointType] = {word: kind for kind in JOINT_TYPES.values() for word in kind.urdf_words}
 """By the type of a URDF's <joint>."""
@@ -37,6 +37,7 @@ URDF_TYPES: dict[str, JointType] = {word: kind for kind in JOINT_TYPES.values() 
 
 def joint_type(word: str) -> JointType:
     """The type of that word; ValueError where there is none."""
-    if word not in JOINT_TYPES:
+    known = JOINT_TYPES | WIDE_TYPES
+    if word not in known:
         raise ValueError(f"joint kind {word!r}")
-    return JOINT_TYPES[word]
+    return known[word]

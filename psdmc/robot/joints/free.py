@@ -26,6 +26,11 @@ class Free(JointType):
     urdf_words: ClassVar[tuple[str, ...]] = ()
     nq: ClassVar[int] = 7
     nv: ClassVar[int] = 6
+    coordinates: ClassVar[str] = (
+        "q: x y z (m), unit quaternion x y z w"
+        "; rates: linear (m/s) and angular velocity (rad/s) along its own axes"
+        "; efforts: force (N) and moment (N m)"
+    )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     about_z: ClassVar[bool] = False
     twists: ClassVar[tuple[Twist, ...]] = (

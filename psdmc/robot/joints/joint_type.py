@@ -33,6 +33,7 @@ class JointType:
     word           in robot files, model files and tables
     urdf_words     types of a URDF's <joint> that move so
     nq, nv         numbers of coordinates and of rates
+    coordinates    what q and its rates are, in words, where there are several
     neutral        nq coordinates at which the frame has not moved
     about_z        whether it is moved about and along z by one coordinate
     twists         nv of them, the motion subspace: the joint frame's velocity per unit rate, along its own axes
@@ -53,6 +54,7 @@ class JointType:
     urdf_words: ClassVar[tuple[str, ...]]
     nq: ClassVar[int] = 1
     nv: ClassVar[int] = 1
+    coordinates: ClassVar[str] = ""
     neutral: ClassVar[tuple[float, ...]] = (0.0,)
     about_z: ClassVar[bool] = True
     twists: ClassVar[tuple[Twist, ...]]

@@ -26,6 +26,11 @@ class Planar(JointType):
     urdf_words: ClassVar[tuple[str, ...]] = ()
     nq: ClassVar[int] = 4
     nv: ClassVar[int] = 3
+    coordinates: ClassVar[str] = (
+        "q: x y (m), cosine and sine of the angle"
+        "; rates: velocity along its own x and y (m/s), angular velocity (rad/s)"
+        "; efforts: force (N) and moment (N m)"
+    )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 1.0, 0.0)
     about_z: ClassVar[bool] = False
     twists: ClassVar[tuple[Twist, ...]] = (

@@ -21,6 +21,11 @@ class Spherical(JointType):
     urdf_words: ClassVar[tuple[str, ...]] = ()
     nq: ClassVar[int] = 4
     nv: ClassVar[int] = 3
+    coordinates: ClassVar[str] = (
+        "q: unit quaternion x y z w"
+        "; rates: angular velocity (rad/s) along its own axes"
+        "; efforts: moment (N m)"
+    )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 1.0)
     about_z: ClassVar[bool] = False
     twists: ClassVar[tuple[Twist, ...]] = (

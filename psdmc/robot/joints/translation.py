@@ -18,6 +18,7 @@ class Translation(JointType):
     urdf_words: ClassVar[tuple[str, ...]] = ()
     nq: ClassVar[int] = 3
     nv: ClassVar[int] = 3
+    coordinates: ClassVar[str] = "q: x y z (m); rates: velocity (m/s); efforts: force (N)"
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0)
     about_z: ClassVar[bool] = False
     twists: ClassVar[tuple[Twist, ...]] = (
