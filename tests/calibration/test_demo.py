@@ -1,5 +1,6 @@
 """The whole demonstration on the virtual Denso, in a short form of `make calibrate-demo`: a campaign of half the length,
-whose exciting motion is searched for among a twentieth of the candidates. `make test-demo`: the long one, same bounds."""
+its slow motions logged at 250 Hz and its sines a third as many, whose exciting motion is searched for among a fortieth of
+the candidates. `make test-demo`: the long one, same bounds."""
 
 from __future__ import annotations
 
@@ -16,9 +17,9 @@ from psdmc.report.calibrate_demo import WHOLE, run_demo
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = CampaignOptions(
-    sweep=SweepOptions(seconds=60.0),
-    sines=SineOptions(ratio=4.0),
-    excite=ExciteOptions(evaluations=6000, seconds=600.0),
+    sweep=SweepOptions(seconds=60.0, period=4e-3),
+    sines=SineOptions(ratio=8.0),
+    excite=ExciteOptions(evaluations=3000, random=200, seconds=600.0),
     gravity_runs=1,
     repeats=3,
     table="npz",
