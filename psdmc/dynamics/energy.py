@@ -38,9 +38,8 @@ def potential_energy(
 
     Torques do not depend on the energy there: bodies that have the torques of the real ones give the same differences.
     """
-    rest = neutral(frames)
-    moved, resting = first_moment(frames, bodies, q), first_moment(frames, bodies, rest)
-    return dot(base_acceleration, moved) - dot(base_acceleration, resting)
+    here = dot(base_acceleration, first_moment(frames, bodies, q))
+    return here - dot(base_acceleration, first_moment(frames, bodies, neutral(frames)))
 
 
 def first_moment(frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]) -> Vector:

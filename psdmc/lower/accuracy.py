@@ -10,7 +10,7 @@ import numpy as np
 from psdmc.functions import inverse_dynamics
 from psdmc.lower.factored import Arrangement, RobotConstants, trace_dynamics
 from psdmc.model import recursive
-from psdmc.model.random_states import random_states
+from psdmc.model.random_states import states_of
 from psdmc.program.interpret import interpret
 from psdmc.robot.mechanism import Array
 
@@ -30,7 +30,7 @@ class Accuracy:
 
     def __init__(self, robot: RobotConstants, theta_b: Array) -> None:
         self.robot, self.theta_b = robot, theta_b
-        vectors = random_states(np.random.default_rng(SEED), STATES, len(robot.chain))
+        vectors = states_of(robot.chain, np.random.default_rng(SEED), STATES)
         self._states = dict(zip(("q", "qd", "qdd"), vectors, strict=True))
 
     def error(self, arrangement: Arrangement) -> float:

@@ -48,6 +48,14 @@ class Reference:
         mass, nonlinear = oracle.mass_matrix(q), oracle.nonlinear_effects(q, qd)
         return Reference(states, few, tau, mass, nonlinear, oracle.gravity(q), scale)
 
+    def is_singular_in(self, real: str) -> Array:
+        """(few,) whether rounding the mass matrix to this precision may leave it indefinite, its diagonal made one: that
+        changes eigenvalues by up to n units in the last place."""
+        root = np.sqrt(np.einsum("sii->si", self.mass)).astype(np.float64)
+        scaled = self.mass.astype(np.float64) / root[:, :, None] / root[:, None, :]
+        smallest = np.linalg.eigvalsh(scaled).min(axis=1)
+        return np.asarray(smallest < root.shape[1] * np.finfo(real).eps)
+
     def torque_error(self, found: Array, expected: Array) -> float:
         """Largest difference of any joint, relative to that joint's largest torque."""
         return float((np.abs(found - expected).max(axis=0) / self.joint_scale).max())

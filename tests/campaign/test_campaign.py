@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from campaign_journal import append, read, report, summary
-from campaign_lowered import FUNCTIONS
+from campaign_lowered import FUNCTIONS, _answered
 from campaign_measure import EXPANDED_JOINTS, Found, failures, measured
 from campaign_oracles import Pinocchio, Textbook
 from campaign_reference import Reference, random_states
@@ -84,6 +84,15 @@ def test_the_whole_search_takes_no_arrangement_that_loses_digits() -> None:
     for program in (kernel.single, kernel.batch):
         found = interpret(program, given, {"tau": model.n})["tau"]
         assert np.all(np.abs(found - expected).max(axis=0) <= 1e-11 * np.abs(expected).max(axis=0))
+
+
+def test_no_accelerations_are_accepted_only_where_the_precision_leaves_none() -> None:
+    for seed, real, is_accepted in ((0, "float32", False), (9897, "float32", True), (9897, "float64", False)):
+        robot = random_robot(seed)
+        states = random_states(seed, len(robot.joints), STATES)
+        reference = Reference.of(Textbook(Pinocchio.of_text(robot.text)), states)
+        none = np.full_like(reference.few[2], np.nan)
+        assert (reference.acceleration_error(_answered(none, reference, real)) <= 1e-11) is is_accepted
 
 
 @pytest.mark.parametrize("mixed", [False, True])
