@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-lowest audit fuzz test-sanitize
+.PHONY: help venv demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-lowest audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -55,8 +55,8 @@ test-processes: $(READY) ## kill every command 50 times at random moments, and w
 test-demo: $(READY) ## the virtual Denso's whole campaign by the bounds of its test, three minutes; make test runs a short form
 	PSDMC_DEMO=whole $(RUN)/python -m pytest -q tests/calibration/test_demo.py
 
-test-accuracy: $(READY) ## the table of accuracies with every robot's C optimised; make test takes one robot of each kind
-	PSDMC_ACCURACY=whole $(RUN)/python -m pytest -n $(JOBS) -rP tests/end_to_end/test_accuracy_table.py
+test-accuracy: $(READY) ## accuracy of every robot's and function's C as psdmc.compile builds it; make test optimises some
+	PSDMC_ACCURACY=whole $(RUN)/python -m pytest -n $(JOBS) -rP tests/end_to_end/test_accuracy_table.py tests/functions
 
 test-trees: $(READY) ## 20 whole robots, compiled, and 300 random trees against Pinocchio and MuJoCo, with figures; make test takes a few
 	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py
@@ -117,7 +117,16 @@ fuzz: $(READY) ## hostile files and command lines, minutes: SECONDS=, COUNT=, FO
 	  || echo "atheris does not install here: mutation without guidance by coverage"
 	$(RUN)/python tests/fuzz/fuzz.py $(FUZZ)
 
+MUTANTS ?= 80
+FIRST_MUTANT := psdmc.program.cost.x_cost__mutmut_1
+mutate: $(READY) ## which of MUTANTS=80 sampled faults in program/ and lower/ no fast test sees; minutes, `mutmut show NAME` for one
+	@$(RUN)/python -c 'import mutmut' 2>/dev/null || $(RUN)/python -m pip install --quiet '.[mutate]'
+	rm -rf mutants
+	$(RUN)/mutmut run --max-children 1 $(FIRST_MUTANT)
+	$(RUN)/mutmut run $$($(RUN)/python tests/mutation/sampled.py $(MUTANTS))
+	$(RUN)/mutmut results
+
 clean: ## remove the environment and everything generated but the reference robot
-	rm -rf $(VENV) $(LOWEST) $(AUDIT) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
+	rm -rf mutants $(VENV) $(LOWEST) $(AUDIT) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks *.egg-info
 	find $(GENERATED) -mindepth 1 -maxdepth 1 ! -name two_link ! -name .gitkeep -exec rm -rf {} +
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

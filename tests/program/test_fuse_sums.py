@@ -37,6 +37,24 @@ def test_what_arrives_late_is_added_last():
     ]
 
 
+def test_terms_that_are_there_first_are_added_first_wherever_they_stand():
+    before = parse("""
+        a = load q[0]
+        s = sin a
+        b = load q[1]
+        c = load q[2]
+        x = add s b
+        y = add x c
+        out tau[0] = y
+    """)
+
+    assert show(fuse_sums(before)).splitlines()[4:] == [
+        "t4 = add t2 t3",
+        "t5 = add t1 t4",
+        "out tau[0] = t5",
+    ]
+
+
 def test_two_products_and_a_number_take_two_multiply_adds():
     before = parse("""
         a = load q[0]

@@ -292,3 +292,13 @@ def test_the_pipeline_names_the_pass_that_broke_a_rule(monkeypatch: pytest.Monke
 
     with pytest.raises(InternalError, match="after lose_everything: an output is not defined"):
         optimize(parse("a = load q[0]\nout tau[0] = a"))
+
+
+def test_two_common_factors_leave_one_bracket(outputs: Outputs):
+    """a b c + b a qd0 is a b (c + qd0): the inner sum of the first factor is a product again."""
+    before = parse(LOADS + "u = mul a b\nv = mul u c\nw = mul b a\nx = mul w d\ny = add v x\nout tau[0] = y")
+
+    after = drop_unused(factor_common(before))
+
+    assert (cost(after).mul, cost(after).add) == (2, 1)
+    np.testing.assert_allclose(outputs(after)[:, 0], outputs(before)[:, 0], rtol=1e-14, atol=1e-15)
