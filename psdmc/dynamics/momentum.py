@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.body import Body
+from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
 from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
+from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.dynamics.motion import JointState
 from psdmc.dynamics.regressor import Twist, carried
-from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale
+from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform
 from psdmc.dynamics.slices import positions, rates
 from psdmc.dynamics.twist import combined, own_rates
+from psdmc.dynamics.twist import momentum as unit_momentum
 
 
 def twists(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Twist]:
@@ -54,6 +56,23 @@ def total_momentum(
             before = moving[frame.parent]
             moving[frame.parent] = add(before[0], linear), add(before[1], angular)
     return total
+
+
+def momentum_columns(
+    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]
+) -> list[tuple[Vector, Vector]]:
+    """nv columns: what `total_momentum` is at unit rate of each, by composite bodies. The bodies must be the real ones."""
+    found: list[list[tuple[Vector, Vector]]] = [[] for _ in frames]
+    placed, states, composites = forward_kinematics(frames, q), _states(frames, q), list(bodies)
+    for i in reversed(range(len(frames))):
+        frame, (rotation, origin) = frames[i], placed[i]
+        for twist in frame.joint.twists:
+            force, moment = (transform(rotation, v) for v in unit_momentum(composites[i], twist))
+            found[i].append((force, add(moment, cross(origin, force))))
+        if frame.parent != BASE:
+            before = in_previous(frame, turned(composites[i], states[i].turn))
+            composites[frame.parent] = joined(composites[frame.parent], shifted(before, states[i].offset))
+    return [column for own in found for column in own]
 
 
 def _states(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[JointState]:

@@ -37,6 +37,8 @@ FUNCTIONS = (
     "potential_energy",
     "momentum",
     "com_jacobian",
+    "centre_of_mass",
+    "centroidal_momentum_matrix",
     "mass_matrix_inverse",
 )
 COUNTED = FUNCTIONS[:3]
@@ -176,6 +178,11 @@ def test_energies_momentum_and_jacobians_are_pinocchios(name: str, floating: boo
     assert_near(run(name, floating, "momentum", q=q, qd=qd), robot.each(about_origin, q, qd), 1e-11)
     com = run(name, floating, "com_jacobian", q=q).reshape(COUNT, 3, model.nv)
     assert_near(com, robot.each(pin.jacobianCenterOfMass, q), 1e-11)
+    centre = run(name, floating, "centre_of_mass", q=q)
+    assert_near(centre, robot.each(pin.centerOfMass, q), 1e-11)
+    found = run(name, floating, "centroidal_momentum_matrix", q=q).reshape(COUNT, 6, model.nv)
+    expected = robot.each(pin.computeCentroidalMap, q)
+    assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
     jacobian = run(name, floating, "jacobian", q=q).reshape(COUNT, 6, model.nv)
     assert_near(jacobian, robot.each(tip_jacobian, q))
     kinetic = robot.each(pin.computeKineticEnergy, q, qd)

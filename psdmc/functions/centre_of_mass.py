@@ -1,0 +1,59 @@
+"""The whole robot's centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.energy import first_moment
+from psdmc.dynamics.parameters import bodies_about
+from psdmc.dynamics.scalar import add, scale, transform
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    """Total mass times centre of the links' own bodies, over their mass."""
+    bodies = bodies_about(g.link_frames, g.standard)
+    mass, moment = sum(body.mass for body in bodies), first_moment(g.frames, bodies, g.inputs["q"])
+    axes, origin = g.root
+    return {"c": add(origin, scale(transform(axes, moment), 1.0 / mass))}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, mass = given["q"], sum(body.mass for body in robot.solids)
+    return {"c": entries(first_moment(robot.frames, robot.solids, list(q.T)), len(q)) / mass}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def centre(model: Any, data: Any, q: Array) -> Array:
+        return np.array(pin.centerOfMass(model, data, q))
+
+    return {"c": robot.each(centre, given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "centre_of_mass",
+        165,
+        "all links' common centre of mass (m) in the base frame",
+        (Q,),
+        (Quantity("c", ("3",)),),
+        theta=False,
+    ),
+    "centre of mass",
+    trace,
+    reference,
+    "centerOfMass",
+    pinocchio,
+    needs=Needs.STANDARD,
+)

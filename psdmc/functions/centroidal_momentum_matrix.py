@@ -1,0 +1,75 @@
+"""The matrix that gives the whole robot's momentum about its centre of mass from the joint rates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psdmc.dynamics.body import Body
+from psdmc.dynamics.energy import first_moment
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.momentum import momentum_columns
+from psdmc.dynamics.parameters import bodies_about
+from psdmc.dynamics.scalar import Matrix, Scalar, cross, scale, transform
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, entries
+from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {
+        "A": _rows(g.frames, bodies_about(g.link_frames, g.standard), g.inputs["q"], g.base_axes),
+    }
+
+
+def _rows(
+    frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], axes: Matrix | None
+) -> list[list[Scalar]]:
+    """6 x nv; momentum about the origin, less the centre of mass times the linear momentum."""
+    mass = sum(body.mass for body in bodies)
+    centre = scale(first_moment(frames, bodies, q), 1.0 / mass)
+    columns = []
+    for linear, angular in momentum_columns(frames, bodies, q):
+        x, y, z = (a - b for a, b in zip(angular, cross(centre, linear), strict=True))
+        parts = (linear, (x, y, z))
+        columns.append([v for part in parts for v in (part if axes is None else transform(axes, part))])
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q = given["q"]
+    return {"A": entries(_rows(robot.frames, robot.solids, list(q.T), None), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def matrix(model: Any, data: Any, q: Array) -> Array:
+        return np.reshape(pin.computeCentroidalMap(model, data, q), (6, model.nv))
+
+    return {"A": robot.each(matrix, given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "centroidal_momentum_matrix",
+        175,
+        "A(q) with A qd the linear momentum (kg m/s), then the angular momentum about the centre of mass (kg m^2/s) of all "
+        "links, along the base frame's axes",
+        (Q,),
+        (Quantity("A", ("6", "nv")),),
+        theta=False,
+    ),
+    "centroidal momentum matrix",
+    trace,
+    reference,
+    "computeCentroidalMap",
+    pinocchio,
+    needs=Needs.STANDARD,
+)
