@@ -71,10 +71,11 @@ def _sizes(found: Summary) -> str:
 
 
 def _joints(robot: Mechanism, errors: Sequence[float]) -> Table:
-    """What each joint is; of a tree also the link that it hangs on."""
+    """What each joint is; of a tree also the link that it hangs on. `errors` nv, of which a joint's largest is shown."""
     heads = ("type", "position", "speed", "acceleration", "effort", "error")
     table = Table("joint", "link", *(() if robot.is_serial else ("hangs on",)), *heads)
-    for i, (joint, error) in enumerate(zip(robot.joints, errors, strict=True)):
+    for i, joint in enumerate(robot.joints):
+        own = [error for k, error in zip(robot.rate_joints, errors, strict=True) if k == i]
         unit = joint.type.position_unit
         limits = joint.limits
         table.add_row(
@@ -86,7 +87,7 @@ def _joints(robot: Mechanism, errors: Sequence[float]) -> Table:
             _limit(limits.speed, f"{unit}/s"),
             _limit(limits.acceleration, f"{unit}/s^2"),
             _limit(limits.effort, joint.type.effort_unit),
-            f"{error:.1e}",
+            f"{max(own, default=0.0):.1e}",
         )
     return table
 

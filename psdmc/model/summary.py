@@ -31,7 +31,7 @@ class Summary:
     ends         the tip's name, or how many ends a tree has
     sizes        monomials by kind of acceleration; None where the model was not expanded
     entries      non-zero entries of P; None likewise
-    certificate  largest torque error relative to the joint's largest torque, per joint
+    certificate  largest torque error relative to the rate's largest torque, per rate of the joints
     """
 
     name: str

@@ -199,7 +199,7 @@ def test_operations(name: str, floating: bool) -> None:
     assert not {f: count for f, count in found.items() if count > AT_MOST[name, f]}
 
 
-@pytest.mark.parametrize(("name", "floating"), [*ROBOTS, ("baxter", False)])
+@pytest.mark.parametrize(("name", "floating"), [*ROBOTS, ("baxter", False), ("talos", True)])
 def test_both_ways_to_accelerations_give_the_same_and_the_cheaper_is_taken(name: str, floating: bool) -> None:
     robot, model = derived(name, floating)
     search = Search(robot.mechanism, model.representative, model.theta_b, budget=12)
@@ -219,6 +219,10 @@ def test_both_ways_to_accelerations_give_the_same_and_the_cheaper_is_taken(name:
         interpret(program, {"q": q, "qd": qd, "tau": tau}, sizes) for program in programs.values()
     )
     assert_near(by_bodies["qdd"], by_factors["qdd"], 1e-9)
+    assert_near(by_bodies["qdd"], robot.each(pin.aba, q, qd, tau), 1e-9)
+    torques = trace_dynamics(RECIPES["inverse_dynamics"], start, search.robot)
+    found_tau = interpret(torques, {"q": q, "qd": qd, "qdd": tau}, {"tau": model.nv})["tau"]
+    assert_near(found_tau, robot.each(pin.rnea, q, qd, tau))
     np.testing.assert_allclose(by_bodies["pivot"], by_factors["pivot"], rtol=1e-9)
     scores = {way: SINGLE.score(program) for way, program in programs.items()}
     assert found.choices.articulated is (scores[True] < scores[False])

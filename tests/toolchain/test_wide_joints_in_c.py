@@ -17,6 +17,7 @@ from unoptimised import without_optimisation, wrapper
 
 import psdmc
 from psdmc import compiler
+from psdmc.cli.boundary import run
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
@@ -123,3 +124,15 @@ def test_a_model_file_keeps_the_joints(model: DynamicsModel, tmp_path: Path) -> 
     assert again.content_hash == model.content_hash
     assert again.mechanism.types == model.mechanism.types
     assert (again.nq, again.nv) == (19, 16)
+
+
+def test_the_command_shows_such_a_model(
+    model: DynamicsModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model.save(tmp_path / "tree.npz")
+    with pytest.raises(SystemExit) as ended:
+        run(["show", str(tmp_path / "tree.npz")])
+    assert not ended.value.code
+    shown = capsys.readouterr().out
+    for word in ("free", "spherical", "planar", "translation"):
+        assert re.search(rf"joint\d\W.*\W{word}\W.*\de[-+]\d\d", shown), word
