@@ -124,7 +124,8 @@ def derive(
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"
-    print(f"{target}: {model.n} joints, {sizes}, largest torque error {model.certificate.max():.1e}")
+    own = f" with {model.nv} coordinates" if model.mechanism.has_followers else ""
+    print(f"{target}: {model.n} joints{own}, {sizes}, largest torque error {model.certificate.max():.1e}")
     for note in model.mechanism.notes:
         print(f"note: {note}")
 

@@ -71,9 +71,16 @@ def _sizes(found: Summary) -> str:
 
 
 def _joints(robot: Mechanism, errors: Sequence[float]) -> Table:
-    """What each joint is; of a tree also the link that it hangs on. `errors` nv, of which a joint's largest is shown."""
+    """What each joint is; of a tree also the link that it hangs on, and where joints follow others what their q is. `errors`
+    nv, of which a joint's largest is shown."""
     heads = ("type", "position", "speed", "acceleration", "effort", "error")
-    table = Table("joint", "link", *(() if robot.is_serial else ("hangs on",)), *heads)
+    table = Table(
+        "joint",
+        "link",
+        *(() if robot.is_serial else ("hangs on",)),
+        *(("q",) if robot.has_followers else ()),
+        *heads,
+    )
     for i, joint in enumerate(robot.joints):
         own = [error for k, error in zip(robot.rate_joints, errors, strict=True) if k == i]
         unit = joint.type.position_unit
@@ -82,12 +89,13 @@ def _joints(robot: Mechanism, errors: Sequence[float]) -> Table:
             escape(joint.name),
             escape(joint.link_name),
             *(() if robot.is_serial else (escape(_parent_link(robot, i)),)),
+            *((escape(_followed(robot, i)),) if robot.has_followers else ()),
             joint.type.word,
             _range(limits.lower, limits.upper, unit),
             _limit(limits.speed, f"{unit}/s"),
             _limit(limits.acceleration, f"{unit}/s^2"),
             _limit(limits.effort, joint.type.effort_unit),
-            f"{max(own, default=0.0):.1e}",
+            f"{max(own):.1e}" if own else "",
         )
     return table
 

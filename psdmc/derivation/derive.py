@@ -19,13 +19,13 @@ from psdmc.derivation.expand import (
     expand,
     precision_for,
 )
+from psdmc.derivation.followers import reduction_for
 from psdmc.derivation.link_by_link import EFFECT
 from psdmc.derivation.memory import WITHOUT, refuse_long, refuse_uncountable, types_along_ways
 from psdmc.derivation.reduce import PIVOT_TOLERANCE, Reduction
 from psdmc.derivation.rounding import merged
-from psdmc.derivation.sampled import reduction_of
 from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
-from psdmc.errors import DerivationError
+from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_derivable
@@ -74,14 +74,16 @@ def derive_model(
     require_derivable(chain)
     _refuse_absurd(chain)
     if expand is None:
-        expand = chain.is_serial and all(kind.about_z for kind in chain.types)
+        expand = chain.is_serial and not chain.has_followers and all(kind.about_z for kind in chain.types)
+    if expand and chain.has_followers:
+        raise InputError(f"'{chain.name}': E and P are of joints that follow no other", "leave --expand out")
     if expand:
         _refuse_wide(chain)
         refuse_long(0, types_along_ways(chain.types, chain.parents), len(chain))
         refuse_uncountable(chain.types)
     robot = scaled(chain)
     tell("base parameters")
-    reduction = reduction_of(robot)
+    reduction = reduction_for(robot)
     if not len(reduction.pivots):
         raise DerivationError(
             f"'{chain.name}': no inertial parameter has any effect on any joint",

@@ -11,6 +11,7 @@ from psdmc.derivation.link_by_link import reduction_link_by_link
 from psdmc.derivation.reduce import Reduction, reduced
 from psdmc.derivation.units import Scaled
 from psdmc.dynamics.regressor import regressor
+from psdmc.dynamics.slices import first_rates
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 Array = NDArray[np.float64]
@@ -48,13 +49,13 @@ def sampled_reduction(scaled: Scaled) -> Reduction:
 
 
 def sampled_regressor(scaled: Scaled, count: int) -> Array:
-    """(count, n, 11 n) regressor at random states, in the robot's unit; gravity of strength one."""
-    n = len(scaled.types)
-    states = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, n, count))
+    """(count, nv, 11 n) regressor at random states, in the robot's unit; gravity of strength one."""
+    n, nv = len(scaled.types), first_rates(scaled.frames)[-1]
+    states = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, nv, count))
     wanted = frozenset(range(PARAMETERS_PER_LINK * n))
     q, qd, qdd = (list(vector) for vector in states)
     rows = regressor(scaled.frames, scaled.link_frames, wanted, q, qd, qdd, scaled.up)
-    values = np.zeros((count, n, PARAMETERS_PER_LINK * n))
+    values = np.zeros((count, nv, PARAMETERS_PER_LINK * n))
     for i, row in enumerate(rows):
         for column, entry in row.items():
             values[:, i, column] = entry

@@ -27,7 +27,7 @@ def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
 def _torques(chain: Mechanism) -> Array:
     """(n, SAMPLES)"""
     rng = np.random.default_rng(SEED)
-    q, qd, qdd = random_states(rng, len(chain), SAMPLES)
+    q, qd, qdd = random_states(rng, chain.nv, SAMPLES)
     torques = inverse_dynamics(
         frames_of(chain),
         bodies_of(chain, chain.parameters),

@@ -39,9 +39,18 @@ def in_unit(placement: Placement, unit: float) -> Placement:
     return Placement(placement.rotation, placement.translation / unit)
 
 
-def frame_in_unit(frame: Frame, unit: float) -> Frame:
-    x, y, z = frame.translation
-    return replace(frame, translation=(x / unit, y / unit, z / unit))
+def frames_in_unit(frames: Sequence[Frame], unit: float) -> tuple[Frame, ...]:
+    """Frames in another unit of length: their places, and how joints that slide follow others or are followed."""
+    found = []
+    for frame in frames:
+        x, y, z = frame.translation
+        scaled = replace(frame, translation=(x / unit, y / unit, z / unit))
+        if frame.follows is not None:
+            leader, ratio, offset = frame.follows
+            own, others = frame.joint.length_order, frames[leader].joint.length_order
+            scaled = replace(scaled, follows=(leader, ratio * unit ** (others - own), offset / unit**own))
+        found.append(scaled)
+    return tuple(found)
 
 
 def parameter_units(types: Sequence[JointType], unit: float) -> Array:
@@ -96,7 +105,7 @@ def scaled(chain: Mechanism) -> Scaled:
     x, y, z = (-float(g) / strength if strength else 0.0 for g in chain.gravity)
     return Scaled(
         chain.types,
-        tuple(frame_in_unit(frame, unit) for frame in frames_of(chain)),
+        frames_in_unit(frames_of(chain), unit),
         tuple(in_unit(joint.link_frame, unit) for joint in chain.joints),
         unit,
         span,

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
+from psdmc.dynamics.following import both_summed, on_coordinates
 from psdmc.dynamics.frames import (
     BASE,
     Frame,
@@ -23,6 +24,7 @@ from psdmc.dynamics.slices import first_rates, positions
 from psdmc.dynamics.twist import efforts, momentum
 
 
+@on_coordinates(both_summed)
 def mass_matrix(
     frames: Sequence[Frame],
     bodies: Sequence[Body],

@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, spun, turned
+from psdmc.dynamics.following import both_summed, on_coordinates, summed
 from psdmc.dynamics.frames import BASE, Frame, Turn, about_z, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.joint_wrenches import torque_row, wrenches_of_motion
@@ -54,6 +55,13 @@ class Derivatives(NamedTuple):
     gravity: tuple[Scalar, ...]
 
 
+def _summed(frames: Sequence[Frame], found: Derivatives) -> Derivatives:
+    """Of the robot's coordinates."""
+    by_q, by_qd, by_qdd = (both_summed(frames, rows) for rows in (found.by_q, found.by_qd, found.by_qdd))
+    return Derivatives(by_q, by_qd, by_qdd, summed(frames, found.gravity))
+
+
+@on_coordinates(_summed)
 def inverse_dynamics_derivatives(
     frames: Sequence[Frame],
     bodies: Sequence[Body],

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body
+from psdmc.dynamics.following import on_coordinates
 from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.momentum import momentum_of, twists
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, dot
 from psdmc.dynamics.slices import neutral, positions, rates
 
 
+@on_coordinates()
 def kinetic_energy(
     frames: Sequence[Frame],
     bodies: Sequence[Body],
@@ -30,6 +32,7 @@ def kinetic_energy(
     return 0.5 * twice
 
 
+@on_coordinates()
 def potential_energy(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], base_acceleration: Vector
 ) -> Scalar:
@@ -42,6 +45,7 @@ def potential_energy(
     return here - dot(base_acceleration, first_moment(frames, bodies, neutral(frames)))
 
 
+@on_coordinates()
 def first_moment(frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]) -> Vector:
     """Total mass times its centre, kg m, along and about the frame that the first joint frame turns from."""
     own = positions(frames, q)

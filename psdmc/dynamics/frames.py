@@ -10,7 +10,7 @@ and cosine exactly and cost nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from psdmc.dynamics.scalar import (
@@ -41,6 +41,7 @@ class Frame:
     translation  m, origin of this frame at q = 0 in the parent's
     offset       rad, turn about z at q = 0, beside
     quarters     whole quarter turns, 0 to 3
+    follows      leader, ratio and offset where its joint's q is that of another: ratio q_leader + offset (following.py)
 
     Made of these: whether its axis has the direction of the joint's that it hangs on (`is_parallel`), and the rotation and
     its transpose without their zeros (`inward_rows`, `outward_rows`).
@@ -52,6 +53,7 @@ class Frame:
     translation: Vector
     offset: float = 0.0
     quarters: int = 0
+    follows: tuple[int, float, float] | None = None
     is_parallel: bool = field(init=False, compare=False)
     inward_rows: Fixed = field(init=False, compare=False)
     outward_rows: Fixed = field(init=False, compare=False)
@@ -134,11 +136,19 @@ def as_vector(values: Sequence[float]) -> Vector:
 
 
 def frames_of(chain: Mechanism) -> tuple[Frame, ...]:
-    """The robot's own joint frames, none moved. Algorithms on them take joint values; see coordinates.py."""
+    """The robot's own joint frames, none moved."""
     return tuple(
-        frame_at(joint.type, parent, joint.placement)
-        for joint, parent in zip(chain.joints, chain.parents, strict=True)
+        replace(frame_at(joint.type, parent, joint.placement), follows=what_follows(chain, i))
+        for i, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True))
     )
+
+
+def what_follows(chain: Mechanism, i: int) -> tuple[int, float, float] | None:
+    """A frame's `follows`; None where joint i has a coordinate of its own."""
+    coordinate = chain.coordinates[i]
+    if coordinate.leader is None or coordinate.leader == i:
+        return None
+    return coordinate.leader, coordinate.ratio, coordinate.offset
 
 
 def frame_at(joint: JointType, parent: int, placement: Placement) -> Frame:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from psdmc.dynamics.following import columns_summed, on_coordinates
 from psdmc.dynamics.frames import (
     BASE,
     IDENTITY,
@@ -25,6 +26,7 @@ AT_BASE: tuple[Matrix, Vector] = (IDENTITY, ZERO)
 """Rotation and origin of the base frame in itself."""
 
 
+@on_coordinates()
 def forward_kinematics(frames: Sequence[Frame], q: Sequence[Scalar]) -> tuple[tuple[Matrix, Vector], ...]:
     """Rotation and origin (m) of every joint frame in the base frame."""
     placed: list[tuple[Matrix, Vector]] = []
@@ -47,6 +49,7 @@ def _turned(rotation: Matrix, turn: Turn | Rotation | None) -> Matrix:
     return rows  # type: ignore[return-value]
 
 
+@on_coordinates(columns_summed)
 def jacobian(
     frames: Sequence[Frame], body: int, place: Placement, q: Sequence[Scalar]
 ) -> tuple[tuple[Scalar, ...], ...]:
@@ -104,6 +107,7 @@ def carried_by(frames: Sequence[Frame]) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(found) for found in beyond)
 
 
+@on_coordinates()
 def frame_placement(
     frames: Sequence[Frame], body: int, place: Placement, q: Sequence[Scalar]
 ) -> tuple[Matrix, Vector]:

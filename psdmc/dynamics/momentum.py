@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
+from psdmc.dynamics.following import on_coordinates
 from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.dynamics.motion import JointState
@@ -39,6 +40,7 @@ def momentum_of(body: Body, twist: Twist) -> tuple[Vector, Vector]:
     return moved, add(cross(body.moment, linear), own)
 
 
+@on_coordinates()
 def total_momentum(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar], qd: Sequence[Scalar]
 ) -> tuple[Vector, Vector]:

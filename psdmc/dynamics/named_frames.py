@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from psdmc.dynamics.following import matrices_summed, on_coordinates
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector
 from psdmc.dynamics.kinematics import AT_BASE, columns_at, forward_kinematics, path_to
 from psdmc.dynamics.motion import sweep_outward
@@ -15,6 +16,7 @@ Root = tuple[Matrix, Vector]
 """Axes that the first joint frame turns from, as columns in the base frame, and their origin there."""
 
 
+@on_coordinates()
 def placed_frames(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[tuple[Vector, Matrix]]:
@@ -25,6 +27,7 @@ def placed_frames(
     ]
 
 
+@on_coordinates(matrices_summed)
 def frame_jacobians(
     frames: Sequence[Frame], named: Sequence[NamedFrame], q: Sequence[Scalar], root: Root = AT_BASE
 ) -> list[list[list[Scalar]]]:
@@ -38,6 +41,7 @@ def frame_jacobians(
     return found
 
 
+@on_coordinates()
 def frame_drifts(
     frames: Sequence[Frame],
     named: Sequence[NamedFrame],
@@ -58,6 +62,7 @@ def frame_drifts(
     return found
 
 
+@on_coordinates(matrices_summed)
 def frame_velocity_slopes(
     frames: Sequence[Frame],
     named: Sequence[NamedFrame],

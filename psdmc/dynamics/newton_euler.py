@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from psdmc.dynamics.body import Body, turned
+from psdmc.dynamics.following import on_coordinates, summed
 from psdmc.dynamics.frames import BASE, Frame, Rotation, Turn, inward, joint_angle, to_previous
 from psdmc.dynamics.motion import PLAIN, Choices, Forward, LinkMotion, sweep_outward
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, transform
@@ -34,6 +35,7 @@ def wrench(motion: LinkMotion, body: Body) -> Wrench:
     return force, add(cross(body.moment, a), turning)
 
 
+@on_coordinates(summed)
 def inverse_dynamics(
     frames: Sequence[Frame],
     bodies: Sequence[Body],

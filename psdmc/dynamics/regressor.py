@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
+from psdmc.dynamics.following import on_coordinates, sparse_rows_summed
 from psdmc.dynamics.frames import BASE, Frame, from_previous, outward
 from psdmc.dynamics.motion import PLAIN, JointState, LinkMotion, Rates, spin_of, sweep_outward
 from psdmc.dynamics.scalar import (
@@ -41,6 +42,7 @@ class Placed(Protocol):
     def translation(self) -> NDArray[Any]: ...
 
 
+@on_coordinates(sparse_rows_summed)
 def regressor(
     frames: Sequence[Frame],
     link_frames: Sequence[Placed],

@@ -29,6 +29,7 @@ def description(
         "",
         "Joints, from base to tip:",
         *(f"  {i}  {joint_line(joint)}" for i, joint in enumerate(info.joints)),
+        *(f"     {sentence}" for sentence in info.followers),
         "",
         "theta_b, base parameters in standard parameters about the file's link frames:",
         *(f"  {i}  {parameter.equation}  [{parameter.unit}]" for i, parameter in enumerate(info.parameters)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,6 +13,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
+from psdmc.robot.mechanism import Mechanism
 from psdmc.version import psdmc_version
 
 
@@ -52,6 +53,7 @@ class PackageInfo:
     frames      names of the named frames, untrusted text; empty: the tip alone
     payload     (l, 10) maps of a load to the change of theta_b, at the tip and, where there are others, at each named
                 frame; empty where the package has no function for loads
+    followers   sentences about joints that follow others, untrusted text: they are not among `joints`
     """
 
     name: str
@@ -65,6 +67,7 @@ class PackageInfo:
     options: Mapping[str, str] = field(default_factory=dict)
     frames: tuple[str, ...] = ()
     payload: tuple[NDArray[np.float64], ...] = ()
+    followers: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.joints:
@@ -126,7 +129,7 @@ def package_info(
             joint.type.nv,
             joint.type.coordinates,
         )
-        for joint in chain.joints
+        for joint in map(chain.joints.__getitem__, chain.own_joints)
     )
     gx, gy, gz = (float(g) + 0.0 for g in chain.gravity.tolist())
     return PackageInfo(
@@ -141,7 +144,15 @@ def package_info(
         options=dict(options or {}),
         frames=tuple(frame.name for frame in chain.frames),
         payload=_load_maps(model) if payload else (),
+        followers=tuple(_followers(chain)),
     )
+
+
+def _followers(chain: Mechanism) -> Iterator[str]:
+    for joint, coordinate in zip(chain.joints, chain.coordinates, strict=True):
+        if coordinate.leader is not None and chain.joints[coordinate.leader] is not joint:
+            leader = chain.joints[coordinate.leader].name
+            yield f"{joint.name} follows {leader}: q = {coordinate.ratio:g} q_{leader} + {coordinate.offset:g}"
 
 
 def _load_maps(model: DynamicsModel) -> tuple[NDArray[np.float64], ...]:

@@ -20,7 +20,7 @@ from psdmc.dynamics.body import Body
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
-from psdmc.dynamics.slices import first_rates, normalized
+from psdmc.dynamics.slices import first_rates, neutral, normalized
 from psdmc.dynamics.torque_rows import torque_rows
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.tableau import Long, Tableau
@@ -331,7 +331,7 @@ def _torque_rows(reframed: Reframed) -> Long:
 def _sampled_columns(reframed: Reframed) -> Long:
     """(STATES nv, 11 n) regressor in pseudo-inertia form at fixed random states, in extended precision."""
     n, nv = len(reframed.frames), first_rates(reframed.frames)[-1]
-    nq = sum(frame.joint.nq for frame in reframed.frames)
+    nq = len(neutral(reframed.frames))
     drawn = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(nq + 2 * nv, STATES)).astype(np.longdouble)
     q, qd, qdd = normalized(reframed.frames, drawn[:nq]), drawn[nq : nq + nv], drawn[nq + nv :]
     here = [Placement.identity()] * n

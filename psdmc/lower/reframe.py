@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from psdmc.dynamics.frames import Frame, as_matrix, as_vector
+from psdmc.dynamics.frames import Frame, as_matrix, as_vector, what_follows
 from psdmc.dynamics.scalar import Matrix, Vector
 from psdmc.robot.mechanism import BASE, Array, Mechanism, NamedFrame, Placement
 from psdmc.robot.small import cross, length, times
@@ -103,6 +103,7 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
                 as_vector(_clean_lengths(offset, reach).tolist()),
                 0.0 if abs(rest) < EXACT else float(rest),
                 quarters % 4,
+                what_follows(chain, i),
             )
         )
         mine = Placement(after[i], origins[i])

@@ -14,6 +14,7 @@ from itertools import product
 
 import numpy as np
 
+from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.motion import Choices
 from psdmc.lower.accuracy import LIMIT, Accuracy
 from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace
@@ -169,7 +170,7 @@ class Search:
     def _by_the_cheaper_way(self, recipe: Recipe, start: Arrangement, scoring: Scoring) -> Arrangement:
         """By articulated bodies where these cost less from the start. Serial arms keep the factorized mass matrix: what the
         two differ by there is less than what the search goes on to find."""
-        if not recipe.accelerates or self._is_arm:
+        if not recipe.accelerates or self._is_arm or any_follows(start.reframed.frames):
             return start
         other = replace(start, choices=replace(start.choices, articulated=True))
         costs = [scoring.weight(self.cost(recipe, each)) for each in (start, other)]

@@ -55,7 +55,7 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
         B=arrays["B"],
         mechanism=chain,
         certificate=json.numbers(certificate, "the certificate", chain.nv),
-        provenance=_provenance(json.part(manifest, "provenance", "the manifest"), n),
+        provenance=_provenance(json.part(manifest, "provenance", "the manifest"), n, chain.nv),
     )
 
 
@@ -106,7 +106,7 @@ def _expansion(arrays: Arrays, n: int, l: int) -> Expansion:
     return Expansion(_exponents(arrays["E"], n), entries, l)
 
 
-def _provenance(value: object, n: int) -> dict[str, Any]:
+def _provenance(value: object, n: int, nv: int) -> dict[str, Any]:
     """The model's origin, checked as far as psdmc reads it again."""
     found = json.record(value, "the provenance")
     for name in ("source_text", "source_sha256", "source_name"):
@@ -120,7 +120,7 @@ def _provenance(value: object, n: int) -> dict[str, Any]:
         json.text(json.part(snap, "where", "a snapped rotation"), "a snapped rotation's place")
         json.number(json.part(snap, "angle_rad", "a snapped rotation"), "a snapped rotation's angle")
     if found.get("snap_torque_change") is not None:
-        json.numbers(found["snap_torque_change"], "the provenance's snap_torque_change", n)
+        json.numbers(found["snap_torque_change"], "the provenance's snap_torque_change", nv)
     if "calibration" in found:
         _check_calibration(json.record(found["calibration"], "the calibration"))
     return found

@@ -18,8 +18,8 @@ from psdmc.dynamics.slices import positions
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
-from psdmc.robot.coordinates import leaders
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint
+from psdmc.robot.coordinates import Coordinate
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Joint, Mechanism
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,8 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
     """M(q) in POSES seeded poses within the joint limits; None while the base parameters are unknown."""
     if model.theta_b is None:
         return None
-    ranges = [_range(joint) for joint in model.mechanism.joints for _ in range(joint.type.nq)]
+    own = [model.mechanism.joints[i] for i in model.mechanism.own_joints]
+    ranges = [_range(joint) for joint in own for _ in range(joint.type.nq)]
     low, high = (np.array(bound) for bound in zip(*ranges, strict=True))
     drawn = np.random.default_rng(SEED).uniform(low, high, size=(POSES, model.nq))
     poses = on_joints(model.mechanism, drawn)
@@ -102,7 +103,7 @@ def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
     result = [[drive] * len(rates) for drive, rates in zip(x[:, 10].tolist(), slides, strict=True)]
     steps = [
         math.hypot(*joint.placement.translation) + _way(joint, own)
-        for joint, own in zip(mechanism.joints, positions(frames_of(mechanism), travel.tolist()), strict=True)
+        for joint, own in zip(mechanism.joints, _travels(mechanism, travel), strict=True)
     ]
     for body, joint in enumerate(mechanism.joints):
         far = math.hypot(*joint.link_frame.translation)
@@ -111,7 +112,24 @@ def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
             for k, along in enumerate(slides[i]):
                 result[i][k] += masses[body] if along else turned
             far += steps[i]
-    return np.array([own for i in leaders(mechanism.coordinates) for own in result[i]])
+    for i, coordinate in enumerate(mechanism.coordinates):
+        if coordinate.leader is not None and coordinate.leader != i:
+            result[coordinate.leader][0] += coordinate.ratio**2 * result[i][0]
+    return np.array([own for i in mechanism.own_joints for own in result[i]])
+
+
+def _travels(mechanism: Mechanism, travel: Array) -> list[Any]:
+    """Of each joint how far its own coordinates go; a follower's is that of its leader by its ratio, and its offset."""
+    own = dict(zip(mechanism.own_joints, positions(frames_of(mechanism), travel.tolist()), strict=True))
+    return [
+        own[i] if i in own else abs(other.ratio) * own.get(_leader(other, i), 0.0) + abs(other.offset)
+        for i, other in enumerate(mechanism.coordinates)
+    ]
+
+
+def _leader(coordinate: Coordinate, held: int) -> int:
+    """The joint that a coordinate is of; `held`, which has none of its own, where it is a constant."""
+    return held if coordinate.leader is None else coordinate.leader
 
 
 def _way(joint: Joint, travel: Any) -> float:

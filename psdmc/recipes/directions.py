@@ -66,7 +66,7 @@ def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
 
 def _free(g: Ingredients) -> list[Scalar]:
     """Accelerations as inputs, so that a derivative at fixed accelerations does not follow what they are computed from."""
-    found: list[Scalar] = g.inputs["q"][0].tracer.symbols(_FREE, len(g.frames))
+    found: list[Scalar] = g.inputs["q"][0].tracer.symbols(_FREE, len(g.still))
     return found
 
 

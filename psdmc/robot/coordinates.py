@@ -7,6 +7,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:
@@ -50,3 +53,37 @@ def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coor
                 f"joint {i} follows joint {coordinate.leader}, which has no coordinate of its own"
             )
     return tuple(coordinates)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Following:
+    """How all joints move with the coordinates, of robots whose joints have one each: q_joints = ratios q + offsets.
+
+    ratios   (n, nv)
+    offsets  (n,)
+    """
+
+    ratios: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+
+    @staticmethod
+    def of(coordinates: Sequence[Coordinate]) -> Following:
+        own = leaders(coordinates)
+        ratios, offsets = np.zeros((len(coordinates), len(own))), np.zeros(len(coordinates))
+        for i, coordinate in enumerate(coordinates):
+            if coordinate.leader is not None:
+                ratios[i, own.index(coordinate.leader)] = coordinate.ratio
+            offsets[i] = coordinate.offset
+        return Following(ratios, offsets)
+
+    def positions(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(..., n) from (..., nv)."""
+        return np.asarray(q @ self.ratios.T + self.offsets)
+
+    def rates(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(..., n) from (..., nv)."""
+        return np.asarray(qd @ self.ratios.T)
+
+    def summed(self, values: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
+        """Torques of the joints, or whatever has an axis of them, summed onto the coordinates."""
+        return np.moveaxis(np.moveaxis(values, axis, -1) @ self.ratios, -1, axis)

@@ -166,6 +166,15 @@ class Mechanism:
         """Whether each body hangs on the one before, the first on the base, and the tip is on the last."""
         return self.parents == serial_parents(len(self)) and self.tip_body == len(self) - 1
 
+    @property
+    def own_joints(self) -> tuple[int, ...]:
+        """The joints that follow no other, in order."""
+        return leaders(self.coordinates)
+
+    @property
+    def has_followers(self) -> bool:
+        return len(self.own_joints) < len(self)
+
     def path_to(self, body: int) -> tuple[int, ...]:
         """Bodies from the base to this one, which is the last."""
         path: list[int] = []

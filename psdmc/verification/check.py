@@ -19,10 +19,12 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
 from psdmc.model.random_states import random_states
 from psdmc.recipes.recipe import Needs
+from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
 from psdmc.robot.reference import Reference, pinocchio_version, reference
+from psdmc.robot.reference_followers import OnCoordinates
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
 from psdmc.verification.functions import function_errors
 from psdmc.verification.placements import chain_poses, frames_above, gravity_error, placement_errors, reach_of
@@ -103,7 +105,8 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     theta, parameters = _parameters(model, loaded)
     written = reference(loaded, snapped=False, parameters=parameters)
     snapped = bool(loaded.snap_report)
-    robot = reference(loaded, parameters=parameters) if snapped else written
+    free = reference(loaded, parameters=parameters) if snapped else written
+    robot = OnCoordinates.of(free, model.mechanism)
     angles = angles_by_segment(loaded.snap_report, model.n, loaded.options.snap)
     condition = _condition(model, robot)
     rows = (*_compared(model, theta, robot, condition), *_functions(model, theta, robot, condition))
@@ -161,16 +164,18 @@ def _states(n: int) -> tuple[Array, Array, Array]:
     return random_states(np.random.default_rng(SEED), STATES, n)
 
 
-def _condition(model: DynamicsModel, robot: Reference) -> float:
+def _condition(model: DynamicsModel, robot: OnCoordinates) -> float:
     """The largest condition number of the mass matrix at the states that are compared."""
-    return float(np.linalg.cond(robot.mass_matrix(_states(model.n)[0])).max())
+    return float(np.linalg.cond(robot.mass_matrix(_states(model.nv)[0])).max())
 
 
-def _compared(model: DynamicsModel, theta: Array, robot: Reference, condition: float) -> tuple[CheckRow, ...]:
-    q, qd, qdd = _states(model.n)
+def _compared(
+    model: DynamicsModel, theta: Array, robot: OnCoordinates, condition: float
+) -> tuple[CheckRow, ...]:
+    q, qd, qdd = _states(model.nv)
     rest = np.zeros_like(q)
     tau = model.torques_for(theta, q, qd, qdd)
-    mass = np.stack([model.torques_for(theta, q, rest, rest + unit) for unit in np.eye(model.n)], axis=-1)
+    mass = np.stack([model.torques_for(theta, q, rest, rest + unit) for unit in np.eye(model.nv)], axis=-1)
     gravity = model.torques_for(theta, q, rest, rest)
     mass = mass - gravity[..., None]
     rows = model.regressor(q, qd, qdd)
@@ -191,7 +196,9 @@ def _compared(model: DynamicsModel, theta: Array, robot: Reference, condition: f
     return (*checked, _forward(robot, q, qd, qdd, tau, condition))
 
 
-def _functions(model: DynamicsModel, theta: Array, robot: Reference, condition: float) -> Iterator[CheckRow]:
+def _functions(
+    model: DynamicsModel, theta: Array, robot: OnCoordinates, condition: float
+) -> Iterator[CheckRow]:
     """Rows of functions that are not part of the expansion."""
     if not model.is_reduced:
         remark = "a base parameter has no standard parameter of its own"
@@ -208,7 +215,7 @@ def _solved_limit(condition: float) -> float:
     return max(TORQUE_LIMIT, CONDITION_LIMIT * condition)
 
 
-def _forward(robot: Reference, q: Array, qd: Array, qdd: Array, tau: Array, condition: float) -> CheckRow:
+def _forward(robot: OnCoordinates, q: Array, qd: Array, qdd: Array, tau: Array, condition: float) -> CheckRow:
     """Whether Pinocchio's forward dynamics gives back the accelerations that the torques were computed from."""
     name = "forward dynamics of these torques"
     if not condition < SINGULAR:
@@ -219,8 +226,8 @@ def _forward(robot: Reference, q: Array, qd: Array, qdd: Array, tau: Array, cond
 
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
     """Rows for the placements of links and tip and for gravity, within the angles that snapping reports."""
-    q, _, _ = _states(model.n)
     chain = model.mechanism
+    q = Following.of(chain.coordinates).positions(_states(model.nv)[0])
     links = [joint.link_name for joint in chain.joints]
     expected = written.poses(q, links)
     above = frames_above(chain)
@@ -240,9 +247,9 @@ def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tupl
 
 def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Array) -> CheckRow:
     """The row for snapping: torques compared with the file's own rotations, within the change that its angles allow."""
-    states = _states(model.n)
-    expected = written.inverse_dynamics(*states)
-    bound = torque_bound(written, angles, *states)
+    states, robot = _states(model.nv), OnCoordinates.of(written, model.mechanism)
+    expected = robot.inverse_dynamics(*states)
+    bound = _bound(robot, angles, states)
     error, limit = _worst(model.torques_for(theta, *states), expected, bound)
     return CheckRow(
         "effect of snapped rotations", "rnea", error, limit, "the limit is what the angles can do"
@@ -251,18 +258,27 @@ def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Ar
 
 def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) -> CheckRow:
     """The row for torques of the source's own bodies, compared with MuJoCo's."""
-    states = _states(model.n)
+    states = _states(model.nv)
     try:
-        expected = mujoco_torques(loaded, *states)
+        following = Following.of(loaded.mechanism.coordinates)
+        free = (following.positions(states[0]), *map(following.rates, states[1:]))
+        expected = following.summed(mujoco_torques(loaded, *free))
     except NotCompared as reason:
         return CheckRow("inverse dynamics", MUJOCO, np.nan, None, f"not compared: {reason}")
     tau = model.torques_for(model.B @ loaded.mechanism.parameters.reshape(-1), *states)
-    bound = np.full(model.n, MUJOCO_ROUNDING * float(np.abs(expected).max(initial=0.0)))
+    bound = np.full(model.nv, MUJOCO_ROUNDING * float(np.abs(expected).max(initial=0.0)))
     if not angles.any():
         return CheckRow("inverse dynamics", MUJOCO, *_worst(tau, expected, bound, MUJOCO_LIMIT))
-    bound += torque_bound(reference(loaded, snapped=False), angles, *states)
+    written = OnCoordinates.of(reference(loaded, snapped=False), loaded.mechanism)
+    bound += _bound(written, angles, states)
     figures = _worst(tau, expected, bound, MUJOCO_LIMIT)
     return CheckRow("inverse dynamics", MUJOCO, *figures, "the limit is what snapping can do")
+
+
+def _bound(robot: OnCoordinates, angles: Array, states: tuple[Array, Array, Array]) -> Array:
+    """(nv,) what the angles can change of each coordinate's torque."""
+    bound = torque_bound(robot.free, angles, *robot.on_joints(*states))
+    return np.asarray(bound @ np.abs(robot.following.ratios))
 
 
 def _worst(values: Array, expected: Array, bound: Array, share: float = TORQUE_LIMIT) -> tuple[float, float]:

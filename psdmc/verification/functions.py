@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.standard_parameters import lack_of_standard_parameters
-from psdmc.program.signature import TAU, Sizes
+from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.robot.mechanism import Array
-from psdmc.robot.reference import Reference
+from psdmc.robot.reference_followers import OnCoordinates
 
 STATES = 100
 SEED = 14_631
@@ -30,7 +30,7 @@ ROUNDED = 1e-4
 
 
 def function_errors(
-    model: DynamicsModel, theta: Array, robot: Reference, solvable: bool
+    model: DynamicsModel, theta: Array, robot: OnCoordinates, solvable: bool
 ) -> Iterator[tuple[Recipe, float, str]]:
     """(recipe, largest error relative to each output's largest value, why there is none) for all functions that are no
     part of the expansion; `solvable`: whether the mass matrix can be inverted."""
@@ -43,10 +43,12 @@ def function_errors(
         lack = lack_of_standard_parameters(model) if recipe.needs is Needs.STANDARD else None
         if recipe.needs is Needs.POSITIVE_MASS and not solvable:
             lack = "the mass matrix is singular"
+        elif recipe.needs is Needs.POSITIVE_MASS and robot.follows:
+            lack = "Pinocchio solves no robots with mimic joints"
         yield recipe, np.nan if lack else _error(recipe, arrays, robot, given, theta, least), lack or ""
 
 
-def _states(model: DynamicsModel, robot: Reference) -> dict[str, Array]:
+def _states(model: DynamicsModel, robot: OnCoordinates) -> dict[str, Array]:
     """(STATES, ...) of everything that functions read."""
     rng, sizes = (
         np.random.default_rng(SEED),
@@ -62,12 +64,12 @@ def _states(model: DynamicsModel, robot: Reference) -> dict[str, Array]:
 def _error(
     recipe: Recipe,
     arrays: RobotOnArrays,
-    robot: Reference,
+    robot: OnCoordinates,
     given: Mapping[str, Array],
     theta: Array,
     least: float,
 ) -> float:
-    expected, found = recipe.pinocchio(robot, given), recipe.reference(arrays, given)
+    expected, found = _expected(recipe, robot, given), recipe.reference(arrays, given)
     if recipe.times_theta:
         found = {name: values @ theta for name, values in found.items()}
     if recipe.gradient is not None:
@@ -80,11 +82,36 @@ def _error(
     )
 
 
-def _most_beside(recipe: Recipe, robot: Reference, given: Mapping[str, Array]) -> float:
+def _expected(recipe: Recipe, robot: OnCoordinates, given: Mapping[str, Array]) -> Mapping[str, Array]:
+    """Pinocchio's values; of a robot whose joints follow others from every joint's own, summed along the axes of rates."""
+    if not robot.follows:
+        return recipe.pinocchio(robot.free, given)
+    joints = dict(given)
+    for quantity in recipe.signature.inputs:
+        if quantity.axes in (("nq",), ("nv",)):
+            move = robot.following.positions if quantity.name == Q.name else robot.following.rates
+            joints[quantity.name] = move(given[quantity.name])
+    axes = {quantity.name: quantity.axes for quantity in recipe.signature.outputs}
+    if recipe.times_theta:
+        axes = dict.fromkeys(axes, ("nv",))
+    return {
+        name: _summed(robot, values, axes.get(name, ()))
+        for name, values in recipe.pinocchio(robot.free, joints).items()
+    }
+
+
+def _summed(robot: OnCoordinates, values: Array, axes: Sequence[str]) -> Array:
+    for k, axis in enumerate(axes):
+        if axis in ("nq", "nv"):
+            values = robot.following.summed(values, k - len(axes))
+    return values
+
+
+def _most_beside(recipe: Recipe, robot: OnCoordinates, given: Mapping[str, Array]) -> float:
     """The largest value of the function that this one's values are differences of; zero where there is none."""
     if recipe.beside is None:
         return 0.0
-    values = RECIPES[recipe.beside].pinocchio(robot, given).values()
+    values = _expected(RECIPES[recipe.beside], robot, given).values()
     return max(float(np.abs(value).max(initial=0.0)) for value in values)
 
 

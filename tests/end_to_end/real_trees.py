@@ -12,31 +12,32 @@ import pinocchio as pin
 import pytest
 
 from psdmc.derivation.last_digit import extended_torques
+from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot, load_robot
 
 ROBOTS = {
-    "a1.urdf": 12,
     "alex_sake_hands.urdf": 23,
-    "alexander_v1.lowerBodyOnly.urdf": 13,
     "allegro_right_hand.urdf": 16,
     "anymal.urdf": 12,
     "anymal-kinova.urdf": 18,
     "b1-z1.urdf": 19,
+    "baxter.urdf": 19,
     "centauro.urdf": 39,
     "g1_29dof_with_hand_rev_1_0.urdf": 43,
     "go2.urdf": 12,
     "human.urdf": 36,
-    "hyq_no_sensors.urdf": 12,
     "icub.urdf": 32,
-    "laikago.urdf": 12,
+    "panda.urdf": 9,
+    "pr2.urdf": 30,
     "quadruped.urdf": 8,
     "romeo_small.urdf": 31,
     "simple_humanoid.urdf": 29,
     "solo12.urdf": 12,
     "talos_reduced.urdf": 32,
     "tiago.urdf": 48,
+    "tiago_pro.urdf": 33,
 }
-"""Movable joints of each."""
+"""Movable joints of each; those of baxter, panda, pr2 and tiago_pro that mimic others are among them."""
 
 COUNT = 30
 Array = np.ndarray
@@ -55,21 +56,25 @@ class RealTree:
     """One robot, none of its rotations snapped: exactly the file's.
 
     oracle   Pinocchio's buildModelFromXML of the file; a continuous joint is an angle, not a cosine and a sine
+    free     the same, every joint with a coordinate of its own: Pinocchio has no energies of mimic joints
     """
 
     def __init__(self, name: str) -> None:
         self.loaded: LoadedRobot = load_robot(path_of(name), snap=0.0)
         text = self.loaded.source_text.replace('type="continuous"', 'type="revolute"')
         self.oracle = pin.buildModelFromXML(text, mimic=True)
+        self.free = pin.buildModelFromXML(text)
+        self.following = Following.of(self.loaded.mechanism.coordinates)
         n = self.oracle.nv
         self.q, self.qd, self.qdd = (
             np.random.default_rng(len(name)).uniform(-1.0, 1.0, (3, COUNT, n))
             * (np.array([np.pi, 3.0, 5.0])[:, None, None])
         )
 
-    def each(self, function: Callable[..., object], *states: Array) -> Array:
-        data = self.oracle.createData()
-        return np.array([np.array(function(self.oracle, data, *row)) for row in zip(*states, strict=True)])
+    def each(self, function: Callable[..., object], *states: Array, model: pin.Model | None = None) -> Array:
+        model = model or self.oracle
+        data = model.createData()
+        return np.array([np.array(function(model, data, *row)) for row in zip(*states, strict=True)])
 
     @cached_property
     def tau(self) -> Array:
@@ -96,14 +101,15 @@ class RealTree:
 
     @cached_property
     def kinetic(self) -> Array:
-        return self.each(pin.computeKineticEnergy, self.q, self.qd)
+        q, qd = self.following.positions(self.q), self.following.rates(self.qd)
+        return self.each(pin.computeKineticEnergy, q, qd, model=self.free)
 
     @cached_property
     def potential(self) -> Array:
-        """Above that at q = 0."""
-        data = self.oracle.createData()
-        at_zero = pin.computePotentialEnergy(self.oracle, data, np.zeros(self.oracle.nq))
-        return self.each(pin.computePotentialEnergy, self.q) - at_zero
+        """Above that where every joint is at zero."""
+        at_zero = pin.computePotentialEnergy(self.free, self.free.createData(), np.zeros(self.free.nq))
+        q = self.following.positions(self.q)
+        return self.each(pin.computePotentialEnergy, q, model=self.free) - at_zero
 
     @cached_property
     def condition(self) -> float:
@@ -113,16 +119,16 @@ class RealTree:
     def base_parameters(self) -> int:
         """Rank of Pinocchio's regressor, over bodies that the file has; columns that are rounding beside the largest have no
         effect."""
-        data, rng = self.oracle.createData(), np.random.default_rng(1)
-        bodies = sum(1 for _ in self.oracle.inertias) - 1
+        data, rng = self.free.createData(), np.random.default_rng(1)
+        bodies = self.free.nv
         factor = np.zeros((0, 10 * bodies))
         for _ in range(3 * len(self.loaded.chain)):
-            row = pin.computeJointTorqueRegressor(
-                self.oracle, data, *rng.uniform(-2.0, 2.0, (3, self.oracle.nv))
-            )
-            factor = np.linalg.qr(np.vstack([factor, row]), mode="r")
+            q, qd, qdd = rng.uniform(-2.0, 2.0, (3, self.oracle.nv))
+            joints = self.following.positions(q), self.following.rates(qd), self.following.rates(qdd)
+            rows = pin.computeJointTorqueRegressor(self.free, data, *joints)
+            factor = np.linalg.qr(np.vstack([factor, self.following.ratios.T @ rows]), mode="r")
         sizes = np.linalg.norm(factor, axis=0)
-        sizes[np.repeat([body.mass == 0.0 for body in self.oracle.inertias.tolist()[1:]], 10)] = 0.0
+        sizes[np.repeat([body.mass == 0.0 for body in self.free.inertias.tolist()[1:]], 10)] = 0.0
         kept = factor[:, sizes > 1e-13 * sizes.max()]
         values = np.linalg.svd(kept / np.linalg.norm(kept, axis=0), compute_uv=False)
         return int(np.count_nonzero(values > 1e-10 * values[0]))

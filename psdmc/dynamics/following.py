@@ -1,0 +1,137 @@
+"""Joints that follow others: algorithms run on every joint's own values, their callers on the robot's coordinates.
+
+A follower's q is ratio q_leader + offset. The power of all torques at the joints' rates is that of the coordinates'
+torques, so torques, and whatever has an axis of them, are summed onto the leader with the same ratios; so are Jacobians'
+columns, and derivatives by q.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ParamSpec, TypeVar
+
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.scalar import Scalar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+POSITIONS = ("q",)
+RATES = ("qd", "qdd", "qd_r", "qdd_r")
+"""Arguments of algorithms, by name, that have an entry for each coordinate."""
+
+Gather = Callable[[Sequence[Frame], Any], Any]
+
+
+def any_follows(frames: Sequence[Frame]) -> bool:
+    return any(frame.follows is not None for frame in frames)
+
+
+def on_coordinates(gather: Gather | None = None) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Makes an algorithm on joints, whose first argument are frames, one on coordinates. `gather` brings what it gives from
+    joints to coordinates; None: it has no axis of joints. Robots without followers are passed through."""
+
+    def wrap(algorithm: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(algorithm)
+
+        @functools.wraps(algorithm)
+        def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+            frames: Any = args[0]
+            if not any_follows(frames):
+                return algorithm(*args, **kwargs)
+            given = signature.bind(*args, **kwargs)
+            values: dict[str, Any] = given.arguments
+            for name in {*POSITIONS, *RATES} & values.keys():
+                if values[name] is not None:
+                    values[name] = _on_joints(frames, values[name], name in POSITIONS)
+            values["frames"] = tuple(replace(frame, follows=None) for frame in frames)
+            found: Any = algorithm(*given.args, **given.kwargs)
+            result: R = found if gather is None else gather(frames, found)
+            return result
+
+        return wrapped
+
+    return wrap
+
+
+def _on_joints(frames: Sequence[Frame], values: Sequence[Scalar], are_positions: bool) -> list[Scalar]:
+    """One after the other each joint's values from those of the coordinates."""
+    own: dict[int, list[Scalar]] = {}
+    rest = list(values)
+    for i, frame in enumerate(frames):
+        if frame.follows is None:
+            count = frame.joint.nq if are_positions else frame.joint.nv
+            own[i], rest = rest[:count], rest[count:]
+    found: list[Scalar] = []
+    for i, frame in enumerate(frames):
+        if frame.follows is None:
+            found += own[i]
+            continue
+        leader, ratio, offset = frame.follows
+        value = _times(ratio, own[leader][0])
+        found.append(value + offset if are_positions and offset else value)
+    return found
+
+
+def summed(frames: Sequence[Frame], values: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """Of each coordinate, from one value per joint's rate."""
+    found: dict[int, list[Scalar]] = {}
+    rest = list(values)
+    followers: list[tuple[tuple[int, float, float], Scalar]] = []
+    for i, frame in enumerate(frames):
+        own, rest = rest[: frame.joint.nv], rest[frame.joint.nv :]
+        if frame.follows is None:
+            found[i] = own
+        else:
+            followers.append((frame.follows, own[0]))
+    for (leader, ratio, _), value in followers:
+        found[leader] = [_plus(found[leader][0], _times(ratio, value))]
+    return tuple(x for own in found.values() for x in own)
+
+
+def columns_summed(
+    frames: Sequence[Frame], rows: Sequence[Sequence[Scalar]]
+) -> tuple[tuple[Scalar, ...], ...]:
+    """A matrix whose columns are per rate, such as a Jacobian."""
+    return tuple(summed(frames, row) for row in rows)
+
+
+def matrices_summed(frames: Sequence[Frame], matrices: Sequence[Any]) -> list[Any]:
+    """Several of these."""
+    return [columns_summed(frames, rows) for rows in matrices]
+
+
+def both_summed(frames: Sequence[Frame], rows: Sequence[Sequence[Scalar]]) -> tuple[tuple[Scalar, ...], ...]:
+    """A matrix with rows and columns per rate, such as the mass matrix."""
+    columns = zip(*columns_summed(frames, rows), strict=True)
+    return tuple(zip(*(summed(frames, column) for column in columns), strict=True))
+
+
+def sparse_rows_summed(
+    frames: Sequence[Frame], rows: Sequence[Mapping[int, Scalar]]
+) -> tuple[dict[int, Scalar], ...]:
+    """Rows per rate whose zeros are left out, such as the regressor's."""
+    wanted = sorted({column for row in rows for column in row})
+    found: tuple[dict[int, Scalar], ...] = tuple(
+        {} for frame in frames if frame.follows is None for _ in range(frame.joint.nv)
+    )
+    for column in wanted:
+        for row, value in zip(found, summed(frames, [row.get(column, 0.0) for row in rows]), strict=True):
+            if not (isinstance(value, float) and value == 0.0):
+                row[column] = value
+    return found
+
+
+def _times(ratio: float, value: Scalar) -> Scalar:
+    if isinstance(value, float) and value == 0.0:
+        return 0.0
+    return value if ratio == 1.0 else value * ratio
+
+
+def _plus(a: Scalar, b: Scalar) -> Scalar:
+    if isinstance(a, float) and a == 0.0:
+        return b
+    return a if isinstance(b, float) and b == 0.0 else a + b
