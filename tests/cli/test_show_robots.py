@@ -38,7 +38,7 @@ def test_a_tree_is_shown_whole_with_the_chains_to_choose(hand: Path) -> None:
     assert "a tree with 2 ends of 3 joints with 2 coordinates, from base" in run.stdout
     rows = [line.split() for line in run.stdout.splitlines()]
     assert any("b" in row and "-1" in row and "a" in row and "0.01" in row for row in rows)
-    assert "not derived as a whole: 'hand': joint 'b' follows joint 'a' (-1 q + 0.01)" in run.stdout
+    assert "not derived" not in run.stdout
     assert "--tip 'left finger': 2 joints" in run.stdout
 
 

@@ -19,7 +19,7 @@ def error_of(found: dict[str, float], expected: dict[str, float]) -> float:
         gradient=None,
         beside=None,
     )
-    return _error(recipe, None, None, {}, np.zeros(0), 1e-9)
+    return _error(recipe, None, SimpleNamespace(follows=False, free=None), {}, np.zeros(0), 1e-9)
 
 
 def test_a_small_output_is_not_hidden_behind_a_large_one():
