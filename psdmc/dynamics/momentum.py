@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
-from psdmc.dynamics.following import on_coordinates
+from psdmc.dynamics.following import on_coordinates, pairs_summed
 from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.dynamics.motion import JointState
@@ -60,6 +60,7 @@ def total_momentum(
     return total
 
 
+@on_coordinates(pairs_summed)
 def momentum_columns(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]
 ) -> list[tuple[Vector, Vector]]:
