@@ -133,7 +133,7 @@ def programs_of(robot: str) -> dict[str, Program]:
         "regressor": trace_geometry(RECIPES["regressor"], found.reframed, search.robot),
     }
     if model.p is not None and model.p <= EXPANDED_LIMIT:
-        with patch.object(expanded, "optimize", lambda program: program):
+        with patch.object(expanded, "optimize", lambda program, costs: program):
             programs["expanded"] = expanded.lower_expanded(model, INVERSE, False)
     return programs
 
