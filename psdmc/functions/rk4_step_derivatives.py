@@ -38,7 +38,7 @@ def trace(g: Ingredients) -> Outputs:
         pivots.append(found["pivot"])
         return found["qdd"], found["dqdd_dq"], found["dqdd_dqd"], found["dqdd_dtau"]
 
-    n = len(g.inputs["q"])
+    n = len(g.still)
     q, qd = g.inputs["q"], g.inputs["qd"]
     state, slopes = _stepped([*q, *qd], _start(n), dt, n, at)
     return {

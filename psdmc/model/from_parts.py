@@ -49,6 +49,8 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
     _check_base_parameters(arrays, chain, l, is_known)
     if is_expanded and not all(kind.about_z for kind in chain.types):
         raise ValueError("E and P are of joints of one coordinate, and a joint has several")
+    if is_expanded and chain.has_followers:
+        raise ValueError("E and P are of joints that follow no other, and a joint does")
     return DynamicsModel(
         expansion=_expansion(arrays, n, l) if is_expanded else None,
         theta_b=arrays["theta_b"] if is_known else None,
