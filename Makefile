@@ -56,7 +56,7 @@ test-demo: $(READY) ## the virtual Denso's whole campaign by the bounds of its t
 	PSDMC_DEMO=whole $(RUN)/python -m pytest -q tests/calibration/test_demo.py
 
 test-accuracy: $(READY) ## accuracy of every robot's and function's C as psdmc.compile builds it; make test optimises some
-	PSDMC_ACCURACY=whole $(RUN)/python -m pytest -n $(JOBS) -rP tests/end_to_end/test_accuracy_table.py tests/functions
+	PSDMC_ACCURACY=whole $(RUN)/python -m pytest -n $(JOBS) -rP tests/end_to_end/test_accuracy_table.py tests/functions tests/derivation/test_nearly_parallel.py
 
 test-trees: $(READY) ## 20 whole robots, compiled, and 300 random trees against Pinocchio and MuJoCo, with figures; make test takes a few
 	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py

@@ -29,7 +29,10 @@ from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of
 from psdmc.toolchain.kept_kernels import lowered_once
 
-ROBOTS = ("two_link", "scara", "kr6", "Panda", "sliding", "first slides")
+WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
+"""`make test-accuracy`: more robots, and all that are compiled whole optimised."""
+
+ROBOTS = ("two_link", "scara", "kr6", "Panda", *(("UR5",) if WHOLE else ()), "sliding", "first slides")
 SLIDING = {"sliding": (5, "RPRP"), "first slides": (8, "PRPR")}
 """Seed and joints of oblique chains with sliding joints."""
 
@@ -39,13 +42,11 @@ SINGLE = ("scara", "kr6", "sliding")
 COMPILED = {("scara", "float64"), ("kr6", "float64"), ("sliding", "float64"), ("sliding", "float32")}
 """Robots and precisions whose long functions are compiled; of other robots their PROGRAMs are interpreted."""
 
-OPTIMISED = (
-    COMPILED if os.environ.get("PSDMC_ACCURACY") == "whole" else {("scara", "float64"), ("scara", "float32")}
-)
+OPTIMISED = COMPILED if WHOLE else {("scara", "float64"), ("scara", "float32")}
 """Libraries that are compiled as psdmc.compile does, the others without optimisation: one of each precision shows what a
-compiler makes of each function's C, all show what the C says. `make test-accuracy`: all that are compiled whole."""
+compiler makes of each function's C, all show what the C says."""
 
-INTERPRETED = ("two_link", "first slides")
+INTERPRETED = ("two_link", *(("Panda",) if WHOLE else ()), "first slides")
 
 LONG = frozenset(
     {
