@@ -51,6 +51,7 @@ def derive(
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
+    floating: bool = False,
 ) -> DynamicsModel:
     """The certified model (E, P, theta_b) of a robot file: URDF, or DH table in TOML.
 
@@ -64,6 +65,8 @@ def derive(
     frames         links that kinematic functions are about, in this order; none: the tip, or all ends of a tree
     tool           x y z (m), roll pitch yaw (rad) of one more frame, 'tool', in the tip's
     lock           joints that are held: their positions by name, rad or m
+    floating       the root link of a URDF is on a free joint: q = position, quaternion xyzw, then the joints; rates are
+                   linear and angular velocity along the root link's own axes, then the joints'
 
     Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.
     """
@@ -83,6 +86,7 @@ def derive(
         frames=frames,
         tool=tool,
         lock=lock,
+        floating=floating,
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
 

@@ -9,6 +9,7 @@ import numpy as np
 from psdmc.dynamics.parameters import joint_frame_map, standard_parameters
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.derivable import require_axes
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism
 from psdmc.robot.small import times
 
@@ -33,6 +34,7 @@ class Case:
     derive_bytes: int | None = None
 
     def __post_init__(self) -> None:
+        require_axes(self.chain, "the benchmark")
         if self.model.theta_b is None or np.isnan(self.chain.parameters).any():
             raise InputError(
                 f"{self.name}: the benchmark needs every inertial parameter, and some are unknown",

@@ -30,6 +30,7 @@ from psdmc.calibration.verdict.verdict_on import with_verdict_on_campaign, with_
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
+from psdmc.robot.derivable import require_axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,7 @@ def calibrate(
 
     Raises InputError where a file is missing or a log cannot be used.
     """
+    require_axes(model.mechanism, "calibration")
     options = options or CalibrateOptions()
     if options.physical:
         require_cvxpy()

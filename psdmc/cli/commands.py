@@ -100,6 +100,12 @@ def derive(
         list[str] | None,
         typer.Option(metavar="JOINT=VALUE", help="hold a joint there, rad or m; may be given several times"),
     ] = None,
+    floating: Annotated[
+        bool,
+        typer.Option(
+            "--floating", help="put the root link on a free joint, as of a robot that walks or flies"
+        ),
+    ] = False,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
@@ -121,6 +127,7 @@ def derive(
             tuple(name.strip() for name in frames.split(",") if name.strip()),
             tool,
             parsed_lock(lock or ()),
+            floating,
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"

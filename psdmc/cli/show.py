@@ -65,6 +65,8 @@ def print_model(model: DynamicsModel) -> None:
 def _sizes(found: Summary) -> str:
     if found.sizes is None or found.p is None:
         why = "--no-expand" if found.is_serial else "a tree's are only with --expand"
+        if not all(joint.type.about_z for joint in found.joints):
+            why = "they are of joints of one coordinate"
         return f"l = {found.l} base parameters; monomials not expanded ({why})"
     parts = ", ".join(f"{count} {kind}" for kind, count in found.sizes._asdict().items())
     return f"p = {found.p} monomials ({parts}), l = {found.l} base parameters, {found.entries} entries of P"

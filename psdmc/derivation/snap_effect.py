@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from psdmc.dynamics.frames import base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
-from psdmc.model.random_states import random_states
+from psdmc.dynamics.slices import first_rates, neutral, normalized
+from psdmc.model.random_states import RANGES
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
@@ -18,21 +19,26 @@ SAMPLES = 256
 
 
 def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
-    """(n,) largest torque change per joint over random states, N m (N); None where parameters are unknown."""
+    """(nv,) largest torque change per rate over random states, N m (N); None where parameters are unknown."""
     if np.isnan(snapped.parameters).any() or np.isnan(unsnapped.parameters).any():
         return None
     return np.asarray(np.max(np.abs(_torques(snapped) - _torques(unsnapped)), axis=1))
 
 
 def _torques(chain: Mechanism) -> Array:
-    """(n, SAMPLES)"""
+    """(nv, SAMPLES)"""
     rng = np.random.default_rng(SEED)
-    q, qd, qdd = random_states(rng, chain.nv, SAMPLES)
+    frames = frames_of(chain)
+    rates = first_rates(frames)[-1]
+    sizes = (len(neutral(frames)), rates, rates)
+    q, qd, qdd = (
+        limit * rng.uniform(-1.0, 1.0, (size, SAMPLES)) for limit, size in zip(RANGES, sizes, strict=True)
+    )
     torques = inverse_dynamics(
-        frames_of(chain),
+        frames,
         bodies_of(chain, chain.parameters),
         drive_inertia_of(chain.parameters),
-        list(q),
+        list(normalized(frames, q)),
         list(qd),
         list(qdd),
         base_acceleration(chain),

@@ -57,7 +57,7 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
         B=arrays["B"],
         mechanism=chain,
         certificate=json.numbers(certificate, "the certificate", chain.nv),
-        provenance=_provenance(json.part(manifest, "provenance", "the manifest"), n, chain.nv),
+        provenance=_provenance(json.part(manifest, "provenance", "the manifest"), chain),
     )
 
 
@@ -108,7 +108,7 @@ def _expansion(arrays: Arrays, n: int, l: int) -> Expansion:
     return Expansion(_exponents(arrays["E"], n), entries, l)
 
 
-def _provenance(value: object, n: int, nv: int) -> dict[str, Any]:
+def _provenance(value: object, chain: Mechanism) -> dict[str, Any]:
     """The model's origin, checked as far as psdmc reads it again."""
     found = json.record(value, "the provenance")
     for name in ("source_text", "source_sha256", "source_name"):
@@ -117,18 +117,18 @@ def _provenance(value: object, n: int, nv: int) -> dict[str, Any]:
     if found.get("source_format", "urdf") not in ("urdf", "dh"):
         raise ValueError("the provenance's source_format is neither urdf nor dh")
     if "options" in found:
-        _check_options(json.record(found["options"], "the provenance's options"), n)
+        _check_options(json.record(found["options"], "the provenance's options"), chain)
     for snap in json.entries(found.get("snapped", []), "the provenance's snapped", MOST_ROWS):
         json.text(json.part(snap, "where", "a snapped rotation"), "a snapped rotation's place")
         json.number(json.part(snap, "angle_rad", "a snapped rotation"), "a snapped rotation's angle")
     if found.get("snap_torque_change") is not None:
-        json.numbers(found["snap_torque_change"], "the provenance's snap_torque_change", nv)
+        json.numbers(found["snap_torque_change"], "the provenance's snap_torque_change", chain.nv)
     if "calibration" in found:
         _check_calibration(json.record(found["calibration"], "the calibration"))
     return found
 
 
-def _check_options(options: dict[str, Any], n: int) -> None:
+def _check_options(options: dict[str, Any], chain: Mechanism) -> None:
     """ValueError unless these are keyword arguments of load_robot, of kinds that it takes or refuses with a message."""
     foreign = [name for name in options if name not in {field.name for field in fields(LoadOptions)}]
     if foreign:
@@ -139,7 +139,8 @@ def _check_options(options: dict[str, Any], n: int) -> None:
     if options.get("gravity") is not None:
         json.numbers(options["gravity"], "the option gravity", 3)
     if not isinstance(options.get("drive_inertia", False), bool):
-        json.numbers(options["drive_inertia"], "the option drive_inertia", n)
+        driven = sum(kind.about_z for kind in chain.types)
+        json.numbers(options["drive_inertia"], "the option drive_inertia", driven)
     for statement in json.entries(options.get("assume_zero", []), "the option assume_zero", MOST_ROWS):
         json.text(statement, "an entry of the option assume_zero")
     json.number(options.get("snap", 0.0), "the option snap")
@@ -147,6 +148,7 @@ def _check_options(options: dict[str, Any], n: int) -> None:
         json.text(name, "the option frames")
     for value in json.record(options.get("lock", {}), "the option lock").values():
         json.number(value, "an entry of the option lock")
+    json.flag(options.get("floating", False), "the option floating")
     if options.get("tool") is not None:
         json.numbers(options["tool"], "the option tool", 6)
 

@@ -29,6 +29,7 @@ from psdmc.model.store import save
 from psdmc.progress import Progress, silent
 from psdmc.report.calibrate_plots import excitation_figure
 from psdmc.report.calibrate_report import write_report
+from psdmc.robot.derivable import require_axes
 
 
 def excite_command(
@@ -46,6 +47,7 @@ def excite_command(
     if not force:
         require_free(folder)
     known = load(model)
+    require_axes(known.mechanism, "a campaign")
     runs, found = plan_campaign(known.chain, regressor_of(known, progress), known.l, options, progress)
     one_period = found.motion.sampled(known.joint_names, options.sweep.period)
     picture = excitation_figure(found, known.joint_names)

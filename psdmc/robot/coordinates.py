@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.robot.joints import JointType
+
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:
@@ -57,33 +59,49 @@ def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Following:
-    """How all joints move with the coordinates, of robots whose joints have one each: q_joints = ratios q + offsets.
+    """How all joints move with the coordinates: q_joints = shares q + offsets, rates_joints = ratios rates.
 
-    ratios   (n, nv)
-    offsets  (n,)
+    shares   (all joints' coordinates, nq)
+    offsets  (all joints' coordinates,)
+    ratios   (all joints' rates, nv)
     """
 
-    ratios: NDArray[np.float64]
+    shares: NDArray[np.float64]
     offsets: NDArray[np.float64]
+    ratios: NDArray[np.float64]
 
     @staticmethod
-    def of(coordinates: Sequence[Coordinate]) -> Following:
-        own = leaders(coordinates)
-        ratios, offsets = np.zeros((len(coordinates), len(own))), np.zeros(len(coordinates))
-        for i, coordinate in enumerate(coordinates):
-            if coordinate.leader is not None:
-                ratios[i, own.index(coordinate.leader)] = coordinate.ratio
-            offsets[i] = coordinate.offset
-        return Following(ratios, offsets)
+    def of(coordinates: Sequence[Coordinate], types: Sequence[JointType]) -> Following:
+        offsets = [coordinate.offset for coordinate in coordinates]
+        lengths = [kind.nq for kind in types]
+        return Following(
+            _shares(coordinates, lengths),
+            np.repeat(offsets, lengths),
+            _shares(coordinates, [kind.nv for kind in types]),
+        )
 
     def positions(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(..., n) from (..., nv)."""
-        return np.asarray(q @ self.ratios.T + self.offsets)
+        """All joints' (..., n) from (..., nq)."""
+        return np.asarray(q @ self.shares.T + self.offsets)
 
     def rates(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(..., n) from (..., nv)."""
+        """All joints' (..., n) from (..., nv)."""
         return np.asarray(qd @ self.ratios.T)
 
     def summed(self, values: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
         """Torques of the joints, or whatever has an axis of them, summed onto the coordinates."""
         return np.moveaxis(np.moveaxis(values, axis, -1) @ self.ratios, -1, axis)
+
+
+def _shares(coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> NDArray[np.float64]:
+    """The matrix from what the leaders have, so many entries each, to what all joints have."""
+    own = leaders(coordinates)
+    first = dict(zip(own, np.cumsum([0, *(lengths[i] for i in own)]), strict=False))
+    rows = []
+    for coordinate, length in zip(coordinates, lengths, strict=True):
+        row = np.zeros((length, sum(lengths[i] for i in own)))
+        if coordinate.leader is not None:
+            start = first[coordinate.leader]
+            row[:, start : start + length] = coordinate.ratio * np.eye(length)
+        rows.append(row)
+    return np.concatenate(rows)

@@ -6,6 +6,8 @@ from psdmc.errors import InputError
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Mechanism
 
+AXES = "take a model whose base stands: derive it without --floating"
+
 
 def require_derivable(chain: Mechanism) -> None:
     """InputError with a remedy where a joint is held: readers merge what does not move."""
@@ -15,3 +17,14 @@ def require_derivable(chain: Mechanism) -> None:
                 f"{shown(chain.name)}: joint {shown(joint.name)} is held at {coordinate.offset:g}",
                 "make it a fixed joint",
             )
+
+
+def require_axes(chain: Mechanism, what: str) -> None:
+    """InputError where a joint has several coordinates: `what`, such as "calibration", is of joints with one each."""
+    wide = next((joint for joint in chain.joints if not joint.type.about_z), None)
+    if wide is not None:
+        raise InputError(
+            f"{shown(chain.name)}: {what} is of joints of one coordinate each, and joint {shown(wide.name)}"
+            f" {wide.type.verb}",
+            AXES,
+        )

@@ -63,6 +63,7 @@ def load_robot(
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
+    floating: bool = False,
 ) -> LoadedRobot:
     """The robot in a URDF or DH TOML file (told apart by the suffix .toml). Options as in LoadOptions.
 
@@ -70,7 +71,9 @@ def load_robot(
     """
     file = Path(path)
     text = robot_text(file)
-    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock)
+    options = checked_options(
+        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
+    )
     return _loaded(text, "dh" if file.suffix.lower() == ".toml" else "urdf", file.name, options)
 
 
@@ -88,10 +91,13 @@ def load_robot_text(
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
+    floating: bool = False,
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
-    options = checked_options(base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock)
+    options = checked_options(
+        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
+    )
     return _loaded(text, source_format, source_name, options)
 
 
@@ -130,12 +136,24 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
     gravity = None if options.gravity is None else np.array(options.gravity)
     if source_format == "urdf":
         return urdf_draft(
-            text, source, options.base, options.tip, gravity, options.snap, options.frames, options.lock
+            text,
+            source,
+            options.base,
+            options.tip,
+            gravity,
+            options.snap,
+            options.frames,
+            options.lock,
+            options.floating,
         )
     if options.base is not None or options.tip is not None:
         raise InputError(f"{source}: --base and --tip name links of a URDF", "leave them out for a DH table")
     if options.lock:
         raise InputError(f"{source}: --lock holds joints of a URDF", "leave it out for a DH table")
+    if options.floating:
+        raise InputError(
+            f"{source}: --floating frees the root link of a URDF", "a DH table's base stands: leave it out"
+        )
     return dh_draft(text, source, gravity, options.snap, options.frames)
 
 
@@ -183,18 +201,25 @@ def _frames(draft: Draft, options: LoadOptions, source: str) -> tuple[NamedFrame
 
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:
-    """Each joint's drive inertia where it is a parameter (NaN: unknown), None where it is not."""
+    """Each joint's drive inertia where it is a parameter (NaN: unknown), None where it is not; a joint of several
+    coordinates, such as a free root, has no drive."""
     own = [
         float(x[DRIVE]) if drive else None for x, drive in zip(draft.parameters, draft.drives, strict=True)
     ]
+    driven = [k for k, joint in enumerate(draft.joints) if joint.type.about_z]
+    if not options.drive_inertia and isinstance(options.drive_inertia, bool):
+        return own
     if isinstance(options.drive_inertia, bool):
-        return [value if value is not None or not options.drive_inertia else 0.0 for value in own]
-    if len(options.drive_inertia) != len(own):
-        found, names = len(options.drive_inertia), ", ".join(joint.name for joint in draft.joints)
+        given = [0.0 if own[k] is None else own[k] for k in driven]
+    else:
+        given = list(options.drive_inertia)
+    if len(given) != len(driven):
+        names = ", ".join(draft.joints[k].name for k in driven)
         raise InputError(
-            f"{source}: {found} drive inertias for {len(own)} joints", f"one for each of: {names}"
+            f"{source}: {len(given)} drive inertias for {len(driven)} joints", f"one for each of: {names}"
         )
-    return list(options.drive_inertia)
+    value_of = dict(zip(driven, given, strict=True))
+    return [value_of.get(k) for k in range(len(own))]
 
 
 def _snap_notes(snaps: Sequence[Snap]) -> list[str]:

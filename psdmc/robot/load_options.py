@@ -14,6 +14,9 @@ from psdmc.robot.limits import shown
 DEFAULT_SNAP = 1e-5
 """rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
 
+LATER = ("frames", "tool", "lock", "floating")
+"""Options that the first versions did not have."""
+
 MAX_SNAP = 0.1
 """rad: a robot whose axes may move by more is another robot."""
 
@@ -30,6 +33,7 @@ class LoadOptions:
     frames         names of the links that kinematic functions are about; empty: the tip
     tool           x y z (m), roll pitch yaw (rad) of a further frame 'tool' in the tip frame; None: no such frame
     lock           joints of a URDF that are held: positions by name, rad or m
+    floating       whether the root link of a URDF is on a free joint
     """
 
     base: str | None = None
@@ -41,14 +45,13 @@ class LoadOptions:
     frames: tuple[str, ...] = ()
     tool: tuple[float, ...] | None = None
     lock: dict[str, float] = field(default_factory=dict)
+    floating: bool = False
 
     def as_json(self) -> dict[str, Any]:
-        """Keyword arguments of load_robot_text as plain JSON values. Frames are included only where there are any, so
-        that models without them keep the hash of earlier versions."""
+        """Keyword arguments of load_robot_text as plain JSON values. Later options are included only where they are given,
+        so that models without them keep the hash of earlier versions."""
         plain = asdict(self)
-        return {
-            name: value for name, value in plain.items() if name not in ("frames", "tool", "lock") or value
-        }
+        return {name: value for name, value in plain.items() if name not in LATER or value}
 
 
 def checked_options(
@@ -61,6 +64,7 @@ def checked_options(
     frames: Sequence[str] = (),
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
+    floating: bool = False,
 ) -> LoadOptions:
     """The options as LoadOptions; InputError names the first that is wrong."""
     for name, value in (("base", base), ("tip", tip)):
@@ -68,6 +72,13 @@ def checked_options(
             raise InputError(f"{name} is {shown(value)}, expected a link's name", "give a text")
     if isinstance(assume_zero, str) or not _all_are_texts(assume_zero):
         raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
+    if not isinstance(floating, bool):
+        raise InputError(f"floating is {shown(floating)}, expected True or False", "the default is False")
+    if floating and (base is not None or tip is not None):
+        raise InputError(
+            "--floating puts the whole robot on a free joint, --base and --tip cut a chain out of it",
+            "leave --base and --tip out; --lock holds joints",
+        )
     drives = _drive_inertia(drive_inertia)
     return LoadOptions(
         base,
@@ -79,6 +90,7 @@ def checked_options(
         _frames(frames),
         _tool(tool),
         _lock(lock),
+        floating,
     )
 
 

@@ -3,7 +3,7 @@ Pinocchio's."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
@@ -12,9 +12,10 @@ import numpy as np
 from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
-from psdmc.robot.mechanism import DRIVE, Array
+from psdmc.robot.mechanism import DRIVE, Array, Mechanism
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference import has_assumptions
+from psdmc.robot.rotation import from_quaternion
 from psdmc.robot.urdf import read_urdf
 from psdmc.robot.urdf_chain import STANDARD_GRAVITY
 from psdmc.robot.urdf_words import ATTRIBUTES
@@ -45,7 +46,7 @@ def mujoco_version() -> str:
 
 
 def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Array:
-    """(k, n) torques of the robot's own bodies as MuJoCo reads the file, at states (k, n), N m (N).
+    """(k, nv) torques of the robot's own bodies as MuJoCo reads the file, at q (k, nq), qd and qdd (k, nv), N m (N).
 
     NotCompared where MuJoCo is not installed, or does not read this file.
     """
@@ -56,19 +57,56 @@ def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Arra
     def numbers(names: Iterable[str]) -> list[int]:
         return [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, JOINT_PREFIX + name) for name in names]
 
-    joints, others = numbers(loaded.mechanism.joint_names), numbers(held)
-    if -1 in [*joints, *others] or model.nv != len(joints) + len(others):
+    chain = loaded.mechanism
+    rates = [kind.nv for kind in chain.types]
+    joints, others = numbers(chain.joint_names), numbers(held)
+    if -1 in [*joints, *others] or model.nv != sum(rates) + len(others):
         raise NotCompared("MuJoCo finds other joints")
-    places, speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-    model.dof_armature[speeds] = loaded.mechanism.parameters[:, DRIVE]
+    places = _entries(model.jnt_qposadr[joints], [kind.nq for kind in chain.types])
+    speeds = _entries(model.jnt_dofadr[joints], rates)
+    model.dof_armature[speeds] = np.repeat(chain.parameters[:, DRIVE], rates)
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr[others]] = list(held.values())
-    torques = np.zeros_like(q)
+    torques = np.zeros_like(qd)
+    if loaded.options.floating:
+        q, qd, qdd = to_mujoco(q, qd, qdd)
     for k in range(len(q)):
         data.qpos[places], data.qvel[speeds], data.qacc[speeds] = q[k], qd[k], qdd[k]
         mujoco.mj_inverse(model, data)
         torques[k] = data.qfrc_inverse[speeds]
-    return torques
+    return force_from_mujoco(q, torques) if loaded.options.floating else torques
+
+
+def _entries(first: Array, counts: Sequence[int]) -> list[int]:
+    """Where several joints' entries are: so many from each of these places."""
+    return [int(start) + k for start, count in zip(first, counts, strict=True) for k in range(count)]
+
+
+def to_mujoco(q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+    """States (k, nq), (k, nv) of a robot whose first joint is free, by MuJoCo's conventions: quaternion wxyz, linear rates
+    along the world's axes. Their derivatives are accelerations: a + w x v along the root's axes is that of its origin."""
+    turn = _rotations(q[:, [6, 3, 4, 5]])
+    linear, angular = qd[:, :3], qd[:, 3:6]
+    return (
+        np.concatenate([q[:, :3], q[:, [6, 3, 4, 5]], q[:, 7:]], axis=1),
+        np.concatenate([_turned(turn, linear), qd[:, 3:]], axis=1),
+        np.concatenate([_turned(turn, qdd[:, :3] + np.cross(angular, linear)), qdd[:, 3:]], axis=1),
+    )
+
+
+def force_from_mujoco(q: Array, tau: Array) -> Array:
+    """Efforts (k, nv) at MuJoCo's q with the force on the root along the root's own axes."""
+    back = np.swapaxes(_rotations(q[:, 3:7]), 1, 2)
+    return np.concatenate([_turned(back, tau[:, :3]), tau[:, 3:]], axis=1)
+
+
+def _rotations(wxyz: Array) -> Array:
+    """(k, 3, 3) of quaternions (k, 4)."""
+    return np.array([from_quaternion(x, y, z, w) for w, x, y, z in wxyz])
+
+
+def _turned(turn: Array, v: Array) -> Array:
+    return np.asarray(np.einsum("kij,kj->ki", turn, v))
 
 
 def _held(loaded: LoadedRobot) -> dict[str, float]:
@@ -98,6 +136,8 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     if any(element.get("quat_xyzw") is not None for element in root.iter("origin")):
         raise NotCompared("MuJoCo reads no quat_xyzw")
     moving = [*loaded.mechanism.joint_names, *_held(loaded)]
+    if loaded.options.floating:
+        _free_root(root, loaded.mechanism)
     _drop_still_bodies(root, moving)
     dropped = _massless(root)
     if dropped:
@@ -113,6 +153,14 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     disabled = mujoco.mjtDisableBit
     model.opt.disableflags |= disabled.mjDSBL_CONSTRAINT
     return model
+
+
+def _free_root(root: Element, chain: Mechanism) -> None:
+    """Put the root link on a floating joint, which MuJoCo makes a free one."""
+    free = SubElement(root, "joint", name=chain.joint_names[0], type="floating")
+    SubElement(root, "link", name=chain.base_name)
+    SubElement(free, "parent", link=chain.base_name)
+    SubElement(free, "child", link=chain.joints[0].link_name)
 
 
 def _drop_still_bodies(root: Element, moving: Collection[str]) -> None:

@@ -27,12 +27,17 @@ have."""
 
 
 def pinocchio_model(
-    text: str, source: str, movable: Collection[str] | None = None, kinds: Mapping[str, str] | None = None
+    text: str,
+    source: str,
+    movable: Collection[str] | None = None,
+    kinds: Mapping[str, str] | None = None,
+    free_root: str | None = None,
 ) -> pinocchio.Model:
     """Pinocchio's model of a URDF that read_urdf has accepted, joints called JOINT_PREFIX + name.
 
     movable   names of joints; every other one is fixed, so that its bodies are merged (None: all stay)
     kinds     types of joints that replace the file's, by type
+    free_root name of a free joint for the root link (None: it stands)
 
     A continuous joint becomes a revolute one (Pinocchio would give it a cosine and a sine). InputError where Pinocchio
     refuses the text.
@@ -42,7 +47,9 @@ def pinocchio_model(
         dynamics_of(root, movable, {"continuous": "revolute", **(kinds or {})}), encoding="unicode"
     )
     try:
-        return pinocchio.buildModelFromXML(wanted)
+        if free_root is None:
+            return pinocchio.buildModelFromXML(wanted)
+        return pinocchio.buildModelFromXML(wanted, pinocchio.JointModelFreeFlyer(), JOINT_PREFIX + free_root)
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"{source}: Pinocchio cannot read it: {reason}", "check_urdf may say more") from None

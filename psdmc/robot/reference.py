@@ -26,6 +26,7 @@ from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, 
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
 from psdmc.robot.tool import TOOL
 from psdmc.robot.urdf import read_urdf
+from psdmc.robot.urdf_floating import ROOT_JOINT
 
 
 def reference_model(
@@ -51,7 +52,7 @@ def reference_model(
     if np.isnan(values).any():
         raise ValueError("inertial parameters are unknown: give `parameters`")
     _set_bodies(model, chain, values, replaced)
-    model.armature = values[:, DRIVE].copy()
+    model.armature = np.repeat(values[:, DRIVE], [kind.nv for kind in chain.types])
     return _placed_as(chain, model) if snapped else model
 
 
@@ -166,10 +167,10 @@ class Reference:
 
     @property
     def path_length(self) -> float:
-        """Longest way from the base to the tip, or to an end of a tree, over every frame between, m, at q = 0; with every
+        """Longest way from the base to the tip, or to an end of a tree, over every frame between, m, at neutral; with every
         fixed joint's detour."""
         model, data = self.model, self.model.createData()
-        pinocchio.framesForwardKinematics(model, data, np.zeros(model.nq))
+        pinocchio.framesForwardKinematics(model, data, pinocchio.neutral(model))
         parents = list(model.parents)
         ends = [k for k in range(1, model.njoints) if k not in parents]
         at_ends = [f for f, frame in enumerate(model.frames) if frame.parentJoint in ends]
@@ -205,7 +206,8 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
 def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     """The file as Pinocchio reads it, all but the chain's joints locked at neutral, seen from the base."""
     chain = loaded.mechanism
-    whole = pinocchio_model(loaded.source_text, loaded.source_name)
+    free = ROOT_JOINT if loaded.options.floating else None
+    whole = pinocchio_model(loaded.source_text, loaded.source_name, free_root=free)
     held = held_positions(
         read_urdf(loaded.source_text, loaded.source_name), loaded.options.lock, loaded.source_name
     )
@@ -223,6 +225,8 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     root_gravity = loaded.options.gravity
     if root_gravity is not None:
         model.gravity.linear = np.array(root_gravity)
+    if free is not None:
+        return model
     base = model.frames[model.getFrameId(chain.base_name, pinocchio.FrameType.BODY)].placement
     for k in range(1, model.njoints):
         if model.parents[k] == 0:

@@ -23,7 +23,7 @@ class OnCoordinates:
 
     @staticmethod
     def of(reference: Reference, robot: Mechanism) -> OnCoordinates:
-        return OnCoordinates(reference, Following.of(robot.coordinates))
+        return OnCoordinates(reference, Following.of(robot.coordinates, robot.types))
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         return self.following.summed(self.free.inverse_dynamics(*self.on_joints(q, qd, qdd)))

@@ -49,7 +49,7 @@ Disturbance = Callable[[pinocchio.Model, pinocchio.SE3], None]
 
 def _disturbances(reference: Reference, angles: Array) -> Iterator[tuple[Disturbance, pinocchio.SE3]]:
     """Small motions of a joint in its parent, of a body on its joint with all that follows, and of gravity."""
-    n, reach = reference.model.nv, reference.path_length
+    n, reach = reference.model.njoints - 1, reference.path_length
     for k, angle in enumerate(angles[:n], start=1):
         if angle > 0.0:
             for motion in _motions(angle, reach):

@@ -111,7 +111,9 @@ def _moved_links(path: Sequence[UrdfJoint]) -> set[str]:
 
 
 def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
-    """What a tree is made of, and how to have the chain that psdmc took before it took trees."""
+    """What a tree is made of, and how to have the chain that psdmc took before it took trees, unless its root is free."""
+    if robot.free_root is not None:
+        return f"the whole tree, to its ends {listed(ends)}"
     try:
         before = f", as --tip {shlex.quote(default_tip(robot, robot.root, source)[0])}"
     except InputError:
@@ -232,10 +234,13 @@ def _refuse_unsupported(robot: UrdfRobot, route: Route, source: str) -> None:
     problems = [
         f"joint '{joint.name}': type {shown(joint.type)} is not supported"
         for joint in robot.joints
-        if joint.type not in (*MOVABLE, "fixed") and (joint.name in on_chain or joint.type not in LOCKABLE)
+        if joint.name != robot.free_root
+        and joint.type not in (*MOVABLE, "fixed")
+        and (joint.name in on_chain or joint.type not in LOCKABLE)
     ]
     if problems:
-        cut = "; --tip LINK takes one chain of the tree" if route.ends else ""
+        can_cut = route.ends and robot.free_root is None
+        cut = "; --tip LINK takes one chain of the tree" if can_cut else ""
         hint = f"psdmc models revolute, continuous, prismatic and fixed joints{cut}"
         raise InputError(f"{source}: " + "; ".join(problems), hint)
 

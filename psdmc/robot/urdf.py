@@ -93,7 +93,8 @@ class UrdfJoint:
 class UrdfRobot:
     """A tree of links. `inertials` has every link in the file's order, None where it has no <inertial>.
 
-    notes   contents of the file that no chain holds, one sentence each
+    notes      contents of the file that no chain holds, one sentence each
+    free_root  the joint that was put above the file's root link, if any
     """
 
     name: str
@@ -101,6 +102,7 @@ class UrdfRobot:
     inertials: dict[str, UrdfInertial | None]
     joints: tuple[UrdfJoint, ...]
     notes: tuple[str, ...]
+    free_root: str | None = None
 
     def joints_below(self, link: str) -> tuple[UrdfJoint, ...]:
         return tuple(joint for joint in self.joints if joint.parent == link)

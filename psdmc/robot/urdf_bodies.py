@@ -77,14 +77,15 @@ def hold_against_pinocchio(
     Each link is first compared alone (every joint made a revolute one, so that nothing is merged), then the merged
     bodies. `held` are the joints that are locked elsewhere than at neutral.
     """
-    alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word))
+    free = robot.free_root
+    alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word), free_root=free)
     for joint in robot.joints:
         own = body_parameters(robot.inertials[joint.child], Placement.identity())
         _compare(
             own, alone.inertias[alone.getJointId(JOINT_PREFIX + joint.name)], joint.child, "the body", source
         )
     movable = [joint.name for joint in route.movable]
-    whole = locked_at(pinocchio_model(text, source, [*movable, *held]), held)
+    whole = locked_at(pinocchio_model(text, source, [*movable, *held], free_root=free), held)
     for joint, own in zip(route.movable, merged, strict=True):
         body = whole.inertias[whole.getJointId(JOINT_PREFIX + joint.name)]
         _compare(own, body, joint.child, "all that moves with it", source)

@@ -10,7 +10,6 @@ import numpy as np
 
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
-from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
@@ -27,6 +26,7 @@ from psdmc.robot.snap import (
 from psdmc.robot.tree import Route, find_route, listed
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import hold_against_pinocchio, merged_parameters, place_of
+from psdmc.robot.urdf_floating import ROUTE_TYPES, on_free_root
 from psdmc.robot.urdf_frames import urdf_frames
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
@@ -44,11 +44,15 @@ def urdf_draft(
     snap: float,
     frames: Sequence[str] = (),
     lock: Mapping[str, float] = NO_LOCK,
+    floating: bool = False,
 ) -> Draft:
     """The chain from base to tip, or the whole tree (find_route); gravity in the root frame; rotations near exact ones
-    snapped (rad); the links `frames` as named frames, a tree's ends where none are named; the joints `lock` held."""
+    snapped (rad); the links `frames` as named frames, a tree's ends where none are named; the joints `lock` held;
+    `floating`: the root link on a free joint."""
     read = read_urdf(text, source)
     robot = locked(read, lock, source)
+    if floating:
+        robot = on_free_root(robot, source)
     route = find_route(robot, base, tip, source, frames)
     placed = _placed(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)
@@ -145,7 +149,7 @@ def _reach(route: Route) -> float:
 
 def movable_joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:
     """The joint with its child link, whose frame sits at `link` in the joint frame."""
-    return Joint(joint.name, joint.child, URDF_TYPES[joint.type], placement, link, joint.limits)
+    return Joint(joint.name, joint.child, ROUTE_TYPES[joint.type], placement, link, joint.limits)
 
 
 def _base_rotation(route: Route, snap: float) -> tuple[Array, list[Snap]]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
-from psdmc.model.random_states import random_states
+from psdmc.model.random_states import states_of
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot, load_robot_text
@@ -159,21 +159,21 @@ def _gives(theta: Array, B: Array, parameters: Array) -> bool:
     return bool(np.allclose(B @ parameters.reshape(-1), theta, rtol=1e-9, atol=1e-12))
 
 
-def _states(n: int) -> tuple[Array, Array, Array]:
-    """q, qd, qdd, (STATES, n) each."""
-    return random_states(np.random.default_rng(SEED), STATES, n)
+def _states(robot: Mechanism) -> tuple[Array, Array, Array]:
+    """q (STATES, nq), qd and qdd (STATES, nv)."""
+    return states_of(robot, np.random.default_rng(SEED), STATES)
 
 
 def _condition(model: DynamicsModel, robot: OnCoordinates) -> float:
     """The largest condition number of the mass matrix at the states that are compared."""
-    return float(np.linalg.cond(robot.mass_matrix(_states(model.nv)[0])).max())
+    return float(np.linalg.cond(robot.mass_matrix(_states(model.mechanism)[0])).max())
 
 
 def _compared(
     model: DynamicsModel, theta: Array, robot: OnCoordinates, condition: float
 ) -> tuple[CheckRow, ...]:
-    q, qd, qdd = _states(model.nv)
-    rest = np.zeros_like(q)
+    q, qd, qdd = _states(model.mechanism)
+    rest = np.zeros_like(qd)
     tau = model.torques_for(theta, q, qd, qdd)
     mass = np.stack([model.torques_for(theta, q, rest, rest + unit) for unit in np.eye(model.nv)], axis=-1)
     gravity = model.torques_for(theta, q, rest, rest)
@@ -227,7 +227,7 @@ def _forward(robot: OnCoordinates, q: Array, qd: Array, qdd: Array, tau: Array, 
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
     """Rows for the placements of links and tip and for gravity, within the angles that snapping reports."""
     chain = model.mechanism
-    q = Following.of(chain.coordinates).positions(_states(model.nv)[0])
+    q = Following.of(chain.coordinates, chain.types).positions(_states(model.mechanism)[0])
     links = [joint.link_name for joint in chain.joints]
     expected = written.poses(q, links)
     above = frames_above(chain)
@@ -247,7 +247,7 @@ def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tupl
 
 def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Array) -> CheckRow:
     """The row for snapping: torques compared with the file's own rotations, within the change that its angles allow."""
-    states, robot = _states(model.nv), OnCoordinates.of(written, model.mechanism)
+    states, robot = _states(model.mechanism), OnCoordinates.of(written, model.mechanism)
     expected = robot.inverse_dynamics(*states)
     bound = _bound(robot, angles, states)
     error, limit = _worst(model.torques_for(theta, *states), expected, bound)
@@ -258,9 +258,9 @@ def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Ar
 
 def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) -> CheckRow:
     """The row for torques of the source's own bodies, compared with MuJoCo's."""
-    states = _states(model.nv)
+    states = _states(model.mechanism)
     try:
-        following = Following.of(loaded.mechanism.coordinates)
+        following = Following.of(loaded.mechanism.coordinates, loaded.mechanism.types)
         free = (following.positions(states[0]), *map(following.rates, states[1:]))
         expected = following.summed(mujoco_torques(loaded, *free))
     except NotCompared as reason:
@@ -305,7 +305,7 @@ def _largest(expected: Array) -> float:
 
 
 def _scales(expected: Array, least: float = 0.0) -> Array:
-    """(n,) scale that each joint's error is relative to."""
+    """(nv,) scale that each joint's error is relative to."""
     overall = _largest(expected)
     if overall < least:
         return np.full(expected.shape[-1], least / NO_TORQUE)

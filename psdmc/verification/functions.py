@@ -8,10 +8,12 @@ import numpy as np
 
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_states import on_joints
 from psdmc.model.standard_parameters import lack_of_standard_parameters
 from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
+from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Array
 from psdmc.robot.reference_followers import OnCoordinates
 
@@ -40,12 +42,22 @@ def function_errors(
     for recipe in RECIPES.values():
         if recipe.polynomials is not None:
             continue
-        lack = lack_of_standard_parameters(model) if recipe.needs is Needs.STANDARD else None
+        lack = _not_of(model, recipe) or (
+            lack_of_standard_parameters(model) if recipe.needs is Needs.STANDARD else None
+        )
         if recipe.needs is Needs.POSITIVE_MASS and not solvable:
             lack = "the mass matrix is singular"
         elif recipe.needs is Needs.POSITIVE_MASS and robot.follows:
             lack = "Pinocchio solves no robots with mimic joints"
         yield recipe, np.nan if lack else _error(recipe, arrays, robot, given, theta, least), lack or ""
+
+
+def _not_of(model: DynamicsModel, recipe: Recipe) -> str | None:
+    """Why the robot's joints have no such function; None where they have."""
+    wide = next((joint for joint in model.mechanism.joints if not joint.type.about_z), None)
+    if wide is None or not recipe.of_axes:
+        return None
+    return f"of joints of one coordinate each, and joint {shown(wide.name)} {wide.type.verb}"
 
 
 def _states(model: DynamicsModel, robot: OnCoordinates) -> dict[str, Array]:
@@ -58,6 +70,7 @@ def _states(model: DynamicsModel, robot: OnCoordinates) -> dict[str, Array]:
     given = {
         q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()
     }
+    given["q"] = on_joints(model.mechanism, given["q"])
     return given | {TAU.name: robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
 
 

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def chain_poses(chain: Mechanism, q: Array) -> Array:
-    """(k, n + 1, 4, 4) of the links' frames and the tip's in the base frame, at q (k, n)."""
+    """(k, n + 1, 4, 4) of the links' frames and the tip's in the base frame, at q of all joints, followers too."""
     return np.array([_poses_at(chain, row) for row in q])
 
 
@@ -60,9 +60,10 @@ def _in_the_one_above(poses: Array, above: Sequence[int]) -> Array:
 
 def _poses_at(chain: Mechanism, q: Array) -> list[Array]:
     frames: list[Placement] = []
-    for joint, parent, value in zip(chain.joints, chain.parents, q, strict=True):
+    values = np.split(q, np.cumsum([kind.nq for kind in chain.types])[:-1])
+    for joint, parent, value in zip(chain.joints, chain.parents, values, strict=True):
         before = Placement.identity() if parent == BASE else frames[parent]
-        frames.append(before @ joint.placement @ joint.type.transform(float(value)))
+        frames.append(before @ joint.placement @ joint.type.transform(value.tolist()))
     links = [_matrix(frame @ joint.link_frame) for frame, joint in zip(frames, chain.joints, strict=True)]
     return [*links, _matrix(frames[chain.tip_body] @ chain.tip)]
 

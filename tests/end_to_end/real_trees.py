@@ -64,7 +64,7 @@ class RealTree:
         text = self.loaded.source_text.replace('type="continuous"', 'type="revolute"')
         self.oracle = pin.buildModelFromXML(text, mimic=True)
         self.free = pin.buildModelFromXML(text)
-        self.following = Following.of(self.loaded.mechanism.coordinates)
+        self.following = Following.of(self.loaded.mechanism.coordinates, self.loaded.mechanism.types)
         n = self.oracle.nv
         self.q, self.qd, self.qdd = (
             np.random.default_rng(len(name)).uniform(-1.0, 1.0, (3, COUNT, n))
