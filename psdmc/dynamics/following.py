@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import Any, ParamSpec, TypeVar
 
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.dynamics.scalar import Scalar
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -97,14 +97,6 @@ def columns_summed(
 ) -> tuple[tuple[Scalar, ...], ...]:
     """A matrix whose columns are per rate, such as a Jacobian."""
     return tuple(summed(frames, row) for row in rows)
-
-
-def pairs_summed(
-    frames: Sequence[Frame], columns: Sequence[tuple[Vector, Vector]]
-) -> list[tuple[Vector, Vector]]:
-    """Pairs of vectors per rate, such as momenta."""
-    rows = columns_summed(frames, list(zip(*((*first, *second) for first, second in columns), strict=True)))
-    return [((a, b, c), (d, e, f)) for a, b, c, d, e, f in zip(*rows, strict=True)]
 
 
 def matrices_summed(frames: Sequence[Frame], matrices: Sequence[Any]) -> list[Any]:

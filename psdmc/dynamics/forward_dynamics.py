@@ -22,6 +22,7 @@ from psdmc.dynamics.articulated import (
     rows_of,
 )
 from psdmc.dynamics.body import Body
+from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE, Frame, from_previous, outward
 from psdmc.dynamics.motion import PLAIN, Choices, Forward, sweep_outward
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, seen_bodies, sweep_inward
@@ -46,7 +47,10 @@ def forward_dynamics(
     external: Mapping[int, Wrench] = NO_WRENCHES,
 ) -> Accelerations:
     """Accelerations from torques, and the mass matrix's pivots as `factorize` has them, all positive where it is positive
-    definite; arguments as those of `inverse_dynamics`. Raises SingularMassMatrix where a pivot is a constant not above 0."""
+    definite; arguments as those of `inverse_dynamics`, joints that follow no other.
+    Raises SingularMassMatrix where a pivot is a constant not above 0."""
+    if any_follows(frames):
+        raise ValueError("a joint that follows another: its acceleration is not its own")
     still = [0.0] * first_rates(frames)[-1]
     forward = sweep_outward(frames, q, qd, None, still, base, choices)
     seen = seen_bodies(frames, bodies, q, forward, choices)

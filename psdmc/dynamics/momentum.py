@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
-from psdmc.dynamics.following import on_coordinates, pairs_summed
+from psdmc.dynamics.following import columns_summed, on_coordinates
 from psdmc.dynamics.frames import BASE, Frame, inward, joint_offset, joint_turn, to_previous
 from psdmc.dynamics.kinematics import forward_kinematics
 from psdmc.dynamics.motion import JointState
@@ -60,11 +60,12 @@ def total_momentum(
     return total
 
 
-@on_coordinates(pairs_summed)
-def momentum_columns(
+@on_coordinates(columns_summed)
+def momentum_matrix(
     frames: Sequence[Frame], bodies: Sequence[Body], q: Sequence[Scalar]
-) -> list[tuple[Vector, Vector]]:
-    """nv columns: what `total_momentum` is at unit rate of each, by composite bodies. The bodies must be the real ones."""
+) -> list[list[Scalar]]:
+    """6 x nv: column by column what `total_momentum` is at unit rate of each, by composite bodies. The bodies must be
+    the real ones."""
     found: list[list[tuple[Vector, Vector]]] = [[] for _ in frames]
     placed, states, composites = forward_kinematics(frames, q), _states(frames, q), list(bodies)
     for i in reversed(range(len(frames))):
@@ -75,7 +76,8 @@ def momentum_columns(
         if frame.parent != BASE:
             before = in_previous(frame, turned(composites[i], states[i].turn))
             composites[frame.parent] = joined(composites[frame.parent], shifted(before, states[i].offset))
-    return [column for own in found for column in own]
+    columns = [(*linear, *angular) for own in found for linear, angular in own]
+    return [list(row) for row in zip(*columns, strict=True)]
 
 
 def _states(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[JointState]:

@@ -10,7 +10,7 @@ import numpy as np
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.energy import first_moment
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.momentum import momentum_columns
+from psdmc.dynamics.momentum import momentum_matrix
 from psdmc.dynamics.parameters import bodies_about
 from psdmc.dynamics.scalar import Matrix, Scalar, cross, scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
@@ -35,7 +35,8 @@ def _rows(
     mass = sum(body.mass for body in bodies)
     centre = scale(first_moment(frames, bodies, q), 1.0 / mass)
     columns = []
-    for linear, angular in momentum_columns(frames, bodies, q):
+    for px, py, pz, *angular in zip(*momentum_matrix(frames, bodies, q), strict=True):
+        linear = (px, py, pz)
         x, y, z = (a - b for a, b in zip(angular, cross(centre, linear), strict=True))
         parts = (linear, (x, y, z))
         columns.append([v for part in parts for v in (part if axes is None else transform(axes, part))])
