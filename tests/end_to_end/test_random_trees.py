@@ -61,16 +61,26 @@ def error(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.max(np.abs(found - expected).max(axis=axis) / np.where(scale > 1e-13, scale, 1.0)))
 
 
+SLIGHT = 1e-3
+"""A slider that gravity is all but square to has a torque to which the last digit of a direction adds 1e-12 of itself:
+gravity torques below this share of the robot's largest are compared on that scale."""
+
+
+def gravity_error(found: np.ndarray, expected: np.ndarray) -> float:
+    scale = np.maximum(np.abs(expected).max(axis=0), SLIGHT * np.abs(expected).max())
+    return float(np.max(np.abs(found - expected).max(axis=0) / scale))
+
+
 @pytest.mark.parametrize("seed", range(COUNT))
 def test_models_of_random_trees(seed: int) -> None:
     tree = drawn(seed, BODIES)
-    model = derive_model(tree.mechanism())
+    model = derive_model(tree.mechanism(), expand=False)  # the tests' own screws have no E and P
     q, qd, qdd = tree.states(STATES, 3)
     tau, bias = tree.each(pin.rnea, q, qd, qdd), tree.each(pin.nonLinearEffects, q, qd)
     gravity = tree.each(pin.computeGeneralizedGravity, q)
     assert error(model.inverse_dynamics(q, qd, qdd), tau) <= EXACT
     assert error(model.nonlinear_effects(q, qd), bias) <= EXACT
-    assert error(model.gravity(q), gravity) <= EXACT
+    assert gravity_error(model.gravity(q), gravity) <= EXACT
     assert error(model.regressor(q, qd, qdd) @ model.theta_b, tau) <= EXACT
     assert error(model.mass_matrix(q), mass_matrices(tree, q)) <= EXACT
     assert model.l == rank(tree)
@@ -79,7 +89,7 @@ def test_models_of_random_trees(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(1000, 1000 + LOWERED))
 def test_programs_of_random_trees(seed: int) -> None:
     tree = drawn(seed, BODIES_LOWERED)
-    model: DynamicsModel = derive_model(tree.mechanism())
+    model: DynamicsModel = derive_model(tree.mechanism(), expand=False)
     made = lower(model, "factored", ("inverse_dynamics", "forward_dynamics", "mass_matrix"))
     q, qd, qdd = tree.states(STATES, 3)
     tau, mass = tree.each(pin.rnea, q, qd, qdd), mass_matrices(tree, q)
