@@ -56,13 +56,11 @@ def turned(body: Body, turn: Turn | Rotation | None, double: Turn | None = None)
     return Body(body.mass, turn.inward(body.moment), (xx - moved, yy + moved, zz, xy, xz, yz))
 
 
-def spun(body: Body, turn: Turn | Rotation | None) -> Body:
+def spun(body: Body, turn: Turn | None) -> Body:
     """The same as `turned`, with nested products: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes c t - xy.
     Four operations fewer, in a longer dependency chain."""
     if turn is None:
         return body
-    if isinstance(turn, Rotation):
-        return _rotated(body, turn.rows)
     xx, yy, zz, xy, xz, yz = body.second
     slope = turn.sine * (xx - yy) + turn.cosine * (xy + xy)
     moved = turn.sine * slope

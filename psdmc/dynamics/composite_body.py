@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.body import Body, in_previous, joined, shifted, spun, turned
+from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
 from psdmc.dynamics.following import both_summed, on_coordinates
 from psdmc.dynamics.frames import (
     BASE,
@@ -50,9 +50,7 @@ def mass_matrix(
         parent = frames[i].parent
         if parent != BASE:
             double = _double(frames[i], own[i]) if choices.fold_double_angle else None
-            before = (
-                spun(composites[i], turns[i]) if double is None else turned(composites[i], turns[i], double)
-            )
+            before = turned(composites[i], turns[i], double)
             composites[parent] = joined(
                 composites[parent], shifted(in_previous(frames[i], before), offsets[i])
             )
