@@ -116,7 +116,7 @@ class Search:
         if accuracy is None or accuracy.error(found) <= LIMIT:
             return found
         firsts = [start] if start else [next(self.starts(feet)) for feet in self.geometry.feet]
-        return self._descended(recipe, scoring, start, min(firsts, key=accuracy.error))
+        return self._descended(recipe, scoring, start, self._accurate(firsts, accuracy))
 
     def _descended(
         self,
@@ -145,6 +145,18 @@ class Search:
         while descent.consider(self._exchanges(descent.arrangement)):
             pass
         return descent.arrangement
+
+    def _accurate(self, firsts: Iterable[Arrangement], accuracy: Accuracy) -> Arrangement:
+        """The most accurate of several arrangements; one within LIMIT where exchanges of its carriers lead to it."""
+        best = min(firsts, key=accuracy.error)
+        error = accuracy.error(best)
+        while error > LIMIT:
+            others = {accuracy.error(each): each for each in self._exchanges(best)}
+            least = min(others, default=error)
+            if least >= error:
+                break
+            best, error = others[least], least
+        return best
 
     def _admits(self, accurate: Arrangement | None) -> Callable[[Arrangement], bool]:
         accuracy = self._accuracy
