@@ -11,7 +11,7 @@ from psdmc.derivation.link_by_link import reduction_link_by_link
 from psdmc.derivation.reduce import Reduction, reduced
 from psdmc.derivation.units import Scaled
 from psdmc.dynamics.regressor import regressor
-from psdmc.dynamics.slices import first_rates
+from psdmc.dynamics.slices import first_rates, neutral, normalized
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 Array = NDArray[np.float64]
@@ -51,9 +51,12 @@ def sampled_reduction(scaled: Scaled) -> Reduction:
 def sampled_regressor(scaled: Scaled, count: int) -> Array:
     """(count, nv, 11 n) regressor at random states, in the robot's unit; gravity of strength one."""
     n, nv = len(scaled.types), first_rates(scaled.frames)[-1]
-    states = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(3, nv, count))
+    rng = np.random.default_rng(SEED)
+    drawn, qd, qdd = (
+        list(rng.uniform(-np.pi, np.pi, (size, count))) for size in (len(neutral(scaled.frames)), nv, nv)
+    )
+    q = list(normalized(scaled.frames, np.array(drawn)))
     wanted = frozenset(range(PARAMETERS_PER_LINK * n))
-    q, qd, qdd = (list(vector) for vector in states)
     rows = regressor(scaled.frames, scaled.link_frames, wanted, q, qd, qdd, scaled.up)
     values = np.zeros((count, nv, PARAMETERS_PER_LINK * n))
     for i, row in enumerate(rows):
