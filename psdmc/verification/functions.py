@@ -42,13 +42,7 @@ def function_errors(
     for recipe in RECIPES.values():
         if recipe.polynomials is not None:
             continue
-        lack = _not_of(model, recipe) or (
-            lack_of_standard_parameters(model) if recipe.needs is Needs.STANDARD else None
-        )
-        if recipe.needs is Needs.POSITIVE_MASS and not solvable:
-            lack = "the mass matrix is singular"
-        elif recipe.needs is Needs.POSITIVE_MASS and robot.follows:
-            lack = "Pinocchio solves no robots with mimic joints"
+        lack = _not_of(model, recipe) or _lacking(model, recipe, robot, solvable)
         yield recipe, np.nan if lack else _error(recipe, arrays, robot, given, theta, least), lack or ""
 
 
@@ -58,6 +52,17 @@ def _not_of(model: DynamicsModel, recipe: Recipe) -> str | None:
     if wide is None or not recipe.of_axes:
         return None
     return f"of joints of one coordinate each, and joint {shown(wide.name)} {wide.type.verb}"
+
+
+def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvable: bool) -> str | None:
+    """Why the model has no such function, or Pinocchio none of this robot; None where both have."""
+    if recipe.needs is Needs.STANDARD:
+        return lack_of_standard_parameters(model)
+    if recipe.needs is Needs.POSITIVE_MASS and not solvable:
+        return "the mass matrix is singular"
+    if recipe.needs is Needs.POSITIVE_MASS and robot.follows:
+        return "Pinocchio solves no robots with mimic joints"
+    return None
 
 
 def _states(model: DynamicsModel, robot: OnCoordinates) -> dict[str, Array]:

@@ -1,0 +1,120 @@
+"""A quadruped on a free root, from its URDF to a tested library, as a user types it; and from Python."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from command_line import typed
+from pinocchio_robots import path_of
+
+import psdmc
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_states import states_of
+
+FUNCTIONS = ["inverse_dynamics", "mass_matrix", "forward_dynamics"]
+COUNT = 20
+BODIES, REVOLUTE = 13, 12
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("floating")
+    shutil.copy(path_of("solo12"), folder / "solo12.urdf")
+    done = typed("derive", "solo12.urdf", "--floating", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert f"solo12.npz: {BODIES} joints, l = {10 * BODIES - 3 * REVOLUTE}" in done.stdout
+    assert "link 'base_link' moves freely by joint 'root_joint'" in done.stdout
+    assert "--tip" not in done.stdout
+    return folder
+
+
+@pytest.fixture(scope="module")
+def model(work: Path) -> DynamicsModel:
+    return psdmc.load(work / "solo12.npz")
+
+
+@pytest.fixture(scope="module")
+def oracle(work: Path) -> pin.Model:
+    return pin.buildModelFromUrdf(str(work / "solo12.urdf"), pin.JointModelFreeFlyer())
+
+
+def of_pinocchio(oracle: pin.Model, function, *states: np.ndarray) -> np.ndarray:
+    data = oracle.createData()
+    return np.array([np.array(function(oracle, data, *state)) for state in zip(*states, strict=True)])
+
+
+def test_show_tells_of_the_root_joint(work: Path) -> None:
+    shown = typed("show", "solo12.npz", cwd=work).stdout
+    row = next(line for line in shown.splitlines() if "│ root_joint" in line)
+    cells = [cell.strip() for cell in row.strip("│").split("│")]
+    assert cells[:8] == ["root_joint", "base_link", "universe", "free", *4 * ["none"]]
+    assert "universe to 4 ends" in shown
+    assert "monomials not expanded (they are of joints of one coordinate)" in shown
+
+
+def test_check_passes_pinocchios_free_flyer(work: Path) -> None:
+    done = typed("check", "solo12.npz", cwd=work)
+    assert done.returncode == 0, done.stdout
+    assert "FAIL" not in done.stdout
+    assert "the mass matrix is positive definite" in done.stdout
+
+
+def test_its_package_is_built_and_passes_its_own_test(work: Path) -> None:
+    done = typed("emit-c", "solo12.npz", "-o", "solo", "--functions", "inverse_dynamics", cwd=work)
+    assert done.returncode == 0, done.stderr
+    header = (work / "solo/include/solo/solo.h").read_text(encoding="utf-8")
+    assert "solo_NQ 19" in header
+    assert "solo_NV 18" in header
+    built = typed("build", "solo", cwd=work)
+    assert built.returncode == 0, built.stderr
+    assert "self-test passed" in built.stdout
+
+
+def test_compiled_functions_are_pinocchios(model: DynamicsModel, oracle: pin.Model) -> None:
+    assert list(oracle.names)[1:] == list(model.joint_names)
+    robot = psdmc.compile(model, functions=FUNCTIONS)
+    q, qd, qdd = states_of(model.mechanism, np.random.default_rng(1), COUNT)
+    tau = of_pinocchio(oracle, pin.rnea, q, qd, qdd)
+    found = robot.inverse_dynamics(q, qd, qdd)
+    assert np.all(np.abs(found - tau).max(axis=0) <= 1e-12 * np.abs(tau).max(axis=0))
+    upper = np.triu(of_pinocchio(oracle, pin.crba, q))
+    mass = upper + np.triu(upper, 1).transpose(0, 2, 1)
+    np.testing.assert_allclose(robot.mass_matrix(q), mass, rtol=0, atol=1e-12 * np.abs(mass).max())
+    expected = of_pinocchio(oracle, pin.aba, q, qd, tau)
+    np.testing.assert_allclose(
+        robot.forward_dynamics(q, qd, tau), expected, rtol=0, atol=1e-10 * np.abs(expected).max()
+    )
+
+
+def test_python_derives_what_the_command_does(work: Path, model: DynamicsModel) -> None:
+    again = psdmc.derive(work / "solo12.urdf", floating=True)
+    np.testing.assert_array_equal(again.B, model.B)
+    assert again.joint_names == model.joint_names
+
+
+REFUSED = [
+    (("derive", "solo12.urdf", "--floating", "--tip", "FL_FOOT"), 2, "--floating puts the whole robot"),
+    (("derive", "solo12.urdf", "--floating", "--expand"), 3, "E and P are of joints of one coordinate"),
+    (("derive", "row.toml", "--floating"), 2, "--floating frees the root link of a URDF"),
+    (("excite", "solo12.npz", "-o", "campaign"), 2, "a campaign is of joints of one coordinate each"),
+    (("calibrate", "solo12.npz", "log.csv", "-o", "x.npz"), 2, "calibration is of joints of one coordinate"),
+    (("bench", "solo12.npz"), 2, "the benchmark is of joints of one coordinate each"),
+    (("emit-c", "solo12.npz", "-o", "c", "--functions", "rk4_step"), 2, "no rk4_step"),
+]
+
+
+@pytest.mark.parametrize(("words", "status", "said"), REFUSED, ids=lambda value: str(value)[:40])
+def test_what_is_not_of_free_roots_is_refused_in_a_line(
+    work: Path, words: tuple[str, ...], status: int, said: str
+) -> None:
+    (work / "row.toml").write_text('name = "row"\nconvention = "standard"\n[[joint]]\na = 1.0\n', "utf-8")
+    (work / "log.csv").write_text("t\n", "utf-8")
+    done = typed(*words, cwd=work)
+    assert done.returncode == status, done.stdout + done.stderr
+    lines = done.stderr.splitlines()
+    assert [line.split(":")[0] for line in lines] == ["error", "hint"], done.stderr
+    assert said in lines[0]
