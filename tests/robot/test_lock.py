@@ -87,7 +87,8 @@ def test_what_is_locked_moves_with_a_chain_and_carries_named_frames() -> None:
     np.testing.assert_allclose(there.translation, (own.inverse() * place.placement).translation, atol=1e-15)
 
 
-def test_real_robots_with_locked_joints_are_checked_by_both_readers(tmp_path) -> None:
+def test_real_robots_with_locked_joints_are_checked_by_both_readers() -> None:
+    pytest.importorskip("mujoco")
     path = robot_data("talos_reduced.urdf")
     lock = {f"leg_{side}_{k}_joint": 0.1 * k for side in ("left", "right") for k in range(1, 7)}
     model = derive(path, lock=lock)
