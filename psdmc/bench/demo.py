@@ -19,6 +19,7 @@ from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.model.random_states import random_states
+from psdmc.program.signature import Sizes
 from psdmc.progress import Progress
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
@@ -45,8 +46,13 @@ def errors_against_pinocchio(model: DynamicsModel, robot: CompiledRobot) -> dict
     """Largest error of each compiled function against Pinocchio's reading of the source, relative to each output's
     largest value over random states."""
     pinocchio = reference(source_of(model))
-    q, qd, qdd = random_states(np.random.default_rng(SEED), STATES, model.n)
+    rng, sizes = np.random.default_rng(SEED), Sizes.of_chain(model.n, model.l)
+    q, qd, qdd = random_states(rng, STATES, model.n)
     given = {"q": q, "qd": qd, "qdd": qdd, "tau": pinocchio.inverse_dynamics(q, qd, qdd)}
+    for quantity in (quantity for name in FUNCTIONS for quantity in RECIPES[name].signature.inputs):
+        if quantity.name not in given:
+            drawn = rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(quantity.axes)))
+            given[quantity.name] = quantity.largest * drawn
     errors: dict[str, float] = {}
     for name in FUNCTIONS:
         signature = RECIPES[name].signature
