@@ -38,6 +38,10 @@ MOST_ROWS = 1_000_000
 """Largest number of rows of a table in the provenance; a campaign's friction has seven per joint."""
 
 
+HIGHEST_POWER = 2
+"""Of a factor of a monomial: torques are quadratic in rates, and in each joint's sine and cosine."""
+
+
 def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
     """The model; ValueError says which part is wrong, what was found and what was expected."""
     _check_kinds(arrays)
@@ -88,6 +92,8 @@ def _check_base_parameters(arrays: Arrays, chain: Mechanism, l: int, is_known: b
 def _exponents(E: NDArray[Any], n: int) -> NDArray[np.uint8]:
     if E.shape[0] != BLOCKS * n:
         raise ValueError(f"E has {E.shape[0]} rows for {n} joints")
+    if E.size and E.max() > HIGHEST_POWER:
+        raise ValueError(f"E has exponents up to {E.max()}, expected {HIGHEST_POWER} at most")
     return E
 
 

@@ -156,6 +156,10 @@ FORGED = {
     "E of floats": (array("E", lambda E: E.astype(float)), "E has type float64"),
     "E of objects": (array("E", lambda E: E.astype(object)), ""),
     "E with a row too many": (array("E", lambda E: np.vstack([E, E[:1]])), "E has 11 rows"),
+    "E of a third power": (
+        array("E", lambda E: np.where(E.max() == E, 3, E).astype(E.dtype)),
+        "exponents up to 3",
+    ),
     "E with one axis": (array("E", np.ravel), "1 axes"),
     "theta_b that is not finite": (array("theta_b", entry(math.inf)), "not finite"),
     "theta_b of another length": (array("theta_b", lambda t: t[:-1]), "theta_b"),
