@@ -22,7 +22,7 @@ from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
 from psdmc.robot.coordinates import leaders
 from psdmc.robot.derivable import require_derivable
-from psdmc.robot.mechanism import BASE, Mechanism
+from psdmc.robot.mechanism import Mechanism
 
 if TYPE_CHECKING:
     from psdmc.calibration.verdict.record import Calibration
@@ -90,7 +90,7 @@ def _joints(robot: Mechanism, errors: Sequence[float]) -> Table:
         table.add_row(
             escape(joint.name),
             escape(joint.link_name),
-            *(() if robot.is_serial else (escape(_parent_link(robot, i)),)),
+            *(() if robot.is_serial else (escape(robot.parent_link(i)),)),
             *((escape(_followed(robot, i)),) if robot.has_followers else ()),
             joint.type.word,
             _range(limits.lower, limits.upper, unit),
@@ -226,18 +226,13 @@ def _bodies(found: Mechanism) -> Table:
         table.add_row(
             escape(joint.name),
             escape(joint.link_name),
-            escape(_parent_link(found, i)),
+            escape(found.parent_link(i)),
             joint.type.word,
             escape(_followed(found, i)),
             _range(limits.lower, limits.upper, unit),
             f"{found.parameters[i, 0]:.6g} kg",
         )
     return table
-
-
-def _parent_link(found: Mechanism, i: int) -> str:
-    parent = found.parents[i]
-    return found.base_name if parent == BASE else found.joints[parent].link_name
 
 
 def _followed(found: Mechanism, i: int) -> str:

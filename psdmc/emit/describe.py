@@ -20,14 +20,15 @@ def description(
     unescaped."""
     gx, gy, gz = info.gravity
     lines = [
-        f"Robot: {info.name}, from {info.base} to {info.tip}",
+        f"Robot: {info.name}, "
+        + (f"a tree on {info.base}" if info.is_tree else f"from {info.base} to {info.tip}"),
         f"Model: {info.model_hash or 'not hashed'}",
         f"Options: {', '.join(f'{key}={value}' for key, value in option_items(info, options).items())}",
         *_target(options.target),
         "Units: SI. Positions rad (m), rates rad/s (m/s), torques N m (N) for revolute (prismatic) joints.",
         f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the base frame",
         "",
-        "Joints, from base to tip:",
+        "Joints, each behind those that carry it:" if info.is_tree else "Joints, from base to tip:",
         *(f"  {i}  {joint_line(joint)}" for i, joint in enumerate(info.joints)),
         *(f"     {sentence}" for sentence in info.followers),
         "",
@@ -118,4 +119,6 @@ def joint_line(joint: JointInfo) -> str:
     ):
         if math.isfinite(value):
             parts.append(f"{value:.9g} {unit}")
+    if joint.parent:
+        parts.append(f"on link {joint.parent}")
     return ", ".join(parts)

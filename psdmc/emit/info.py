@@ -23,6 +23,7 @@ class JointInfo:
 
     nq, nv       its coordinates and its rates, and
     coordinates  what these are, where there are several
+    parent       the link that it hangs on, untrusted text; empty in a serial chain
     """
 
     name: str
@@ -37,6 +38,7 @@ class JointInfo:
     nq: int = 1
     nv: int = 1
     coordinates: str = ""
+    parent: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,7 @@ class PackageInfo:
     """One robot's metadata for header, manifest and README.
 
     name        the robot's own name, untrusted text
-    joints      n, from base to tip
+    joints      n, from base to tip; a tree's parents before their children
     gravity     m/s^2 in the base frame
     base, tip   link names
     parameters  l base parameters, in the order of theta_b
@@ -95,6 +97,11 @@ class PackageInfo:
         return any(joint.nq > 1 for joint in self.joints)
 
     @property
+    def is_tree(self) -> bool:
+        """Whether the robot is no serial chain."""
+        return any(joint.parent for joint in self.joints)
+
+    @property
     def sizes(self) -> Sizes:
         """What the words of signatures mean for this robot."""
         return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames))
@@ -128,8 +135,10 @@ def package_info(
             joint.type.nq,
             joint.type.nv,
             joint.type.coordinates,
+            "" if chain.is_serial else chain.parent_link(i),
         )
-        for joint in map(chain.joints.__getitem__, chain.own_joints)
+        for i, joint in enumerate(chain.joints)
+        if i in chain.own_joints
     )
     gx, gy, gz = (float(g) + 0.0 for g in chain.gravity.tolist())
     return PackageInfo(

@@ -69,12 +69,15 @@ def _joint(joint: JointInfo) -> dict[str, Any]:
         "effort": joint.effort,
     }
     known = {key: value for key, value in limits.items() if math.isfinite(value)}
+    wide = {"nq": joint.nq, "nv": joint.nv, "coordinates": joint.coordinates} if joint.nq > 1 else {}
     return {
         "name": joint.name,
         "kind": joint.kind,
         "unit": joint.unit,
         "effort_unit": joint.effort_unit,
         "limits": known,
+        **({"parent": joint.parent} if joint.parent else {}),
+        **wide,
     }
 
 

@@ -175,6 +175,11 @@ class Mechanism:
     def has_followers(self) -> bool:
         return len(self.own_joints) < len(self)
 
+    def parent_link(self, body: int) -> str:
+        """Name of the link that a body's joint hangs on."""
+        parent = self.parents[body]
+        return self.base_name if parent == BASE else self.joints[parent].link_name
+
     def path_to(self, body: int) -> tuple[int, ...]:
         """Bodies from the base to this one, which is the last."""
         path: list[int] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -69,6 +70,14 @@ def test_its_package_is_built_and_passes_its_own_test(work: Path) -> None:
     header = (work / "solo/include/solo/solo.h").read_text(encoding="utf-8")
     assert "solo_NQ 19" in header
     assert "solo_NV 18" in header
+    assert "Robot: solo, a tree on universe" in header
+    assert "from base to tip" not in header
+    assert "FL_HFE (revolute)" in header
+    assert "on link FL_SHOULDER" in header
+    assert "q[solo_NQ], ...;" in (work / "solo/README.md").read_text(encoding="utf-8")
+    root, hip = json.loads((work / "solo/manifest.json").read_text(encoding="utf-8"))["joints"][:2]
+    assert (root["nq"], root["nv"], root["parent"]) == (7, 6, "universe")
+    assert (hip["parent"], "nq" in hip) == ("base_link", False)
     built = typed("build", "solo", cwd=work)
     assert built.returncode == 0, built.stderr
     assert "self-test passed" in built.stdout
