@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from psdmc.dynamics.momentum import total_momentum
+from psdmc.dynamics.momentum import momentum_matrix
 from psdmc.dynamics.parameters import bodies_about
-from psdmc.dynamics.scalar import Scalar, scale, transform
+from psdmc.dynamics.scalar import scale, transform
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
 from psdmc.recipes.recipe import Arrays, Ingredients, Needs, Outputs, Recipe
@@ -20,28 +20,17 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Column j is the whole robot's momentum at unit rate of joint j, over its mass."""
+    """The whole robot's momentum per unit rate of each joint, over its mass."""
     bodies = bodies_about(g.link_frames, g.standard)
     mass = sum(body.mass for body in bodies)
-    columns = []
-    nv = len(g.still)
-    for j in range(nv):
-        linear, _ = total_momentum(g.frames, bodies, g.inputs["q"], _unit(j, nv))
-        columns.append(scale(transform(g.base_axes, linear), 1.0 / mass))
+    per_rate = zip(*momentum_matrix(g.frames, bodies, g.inputs["q"])[:3], strict=True)
+    columns = [scale(transform(g.base_axes, linear), 1.0 / mass) for linear in per_rate]
     return {"J": list(zip(*columns, strict=True))}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     q, mass = given["q"], sum(body.mass for body in robot.solids)
-    columns = [
-        entries(total_momentum(robot.frames, robot.solids, list(q.T), _unit(j, robot.nv))[0], len(q))
-        for j in range(robot.nv)
-    ]
-    return {"J": np.stack(columns, axis=-1) / mass}
-
-
-def _unit(j: int, nv: int) -> list[Scalar]:
-    return [1.0 if i == j else 0.0 for i in range(nv)]
+    return {"J": entries(momentum_matrix(robot.frames, robot.solids, list(q.T))[:3], len(q)) / mass}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
