@@ -23,9 +23,9 @@ MAX_SNAP = 0.1
 
 @dataclass(frozen=True, slots=True)
 class LoadOptions:
-    """The options that define the chain together with the file; plain values, so that a saved model can be read again.
+    """The options that define the robot together with the file; plain values, so that a saved model can be read again.
 
-    base, tip      link names of a URDF; None: the root, the end of the longest chain
+    base, tip      link names of a URDF, ends of the chain that is cut out; None for both: the whole tree from the root
     gravity        m/s^2 in the URDF's root or the DH base frame; None: the file's own, or (0, 0, -9.81)
     drive_inertia  True: drive inertias are parameters; numbers: with these values, one a joint, kg m^2 (kg)
     assume_zero    texts such as "link5:mx" or "link5:Ixz@com"
