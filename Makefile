@@ -2,7 +2,7 @@
 
 PYTHON ?= python3
 VENV ?= .venv
-EXTRAS ?= test,bench,calibrate
+EXTRAS ?= test,bench,calibrate,docs
 JOBS ?= auto
 RUN := $(VENV)/bin
 READY := $(VENV)/ready
@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-lowest audit fuzz mutate test-sanitize
+.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-lowest audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -90,6 +90,7 @@ check: $(READY) ## format, lint, types and the fast tests: seconds
 	$(RUN)/ruff format --check .
 	$(RUN)/ruff check .
 	$(RUN)/mypy
+	$(RUN)/reuse lint --quiet
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' $(FAST)
 
 golden: $(READY) ## rewrite the golden files; review their diff like code
@@ -105,6 +106,10 @@ bench-save: $(READY) ## rewrite benchmarks/baseline.json: operations and instruc
 
 bench-compare: $(READY) ## fail where operations or instructions grew beyond that baseline
 	$(RUN)/python -m psdmc.bench.gate compare
+
+docs: $(READY) ## build the documentation site into generated/site; a warning is an error
+	$(RUN)/python docs/site_pages.py
+	@echo "generated/site/index.html"
 
 calibrate-demo: $(READY) ## excite, simulate and calibrate the virtual Denso; page in generated/
 	$(RUN)/python -m psdmc.report.calibrate_demo

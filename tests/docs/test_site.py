@@ -1,0 +1,56 @@
+"""The documentation site builds without a warning, and its picture shows the figures of the table."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from blocks import ROOT
+
+sys.path.insert(0, str(ROOT / "docs"))
+import picture
+import site_pages
+
+
+def test_the_picture_is_of_the_table_s_figures():
+    text = (ROOT / "docs/benchmarks.md").read_text(encoding="utf-8")
+
+    assert picture.PICTURE.read_text(encoding="utf-8") == picture.draw(picture.table(text, picture.ROBOT))
+
+
+def test_every_document_is_in_the_menu(tmp_path: Path):
+    site_pages.gather(tmp_path / "source")
+    pages = {str(path.relative_to(tmp_path / "source"))[:-3] for path in (tmp_path / "source").rglob("*.md")}
+    listed = {page for group in site_pages.MENU.values() for page in group}
+
+    assert {page for page in pages - listed if not page.startswith("decisions/")} == {"index"}
+
+
+def test_links_out_of_the_site_are_names():
+    text = site_pages.linked(
+        "[the consumers](../examples/consumers), [pass](passes.md#x), [h](../README.md)",
+        "a.md",
+        {"passes.md"},
+    )
+
+    assert text == "the consumers (`examples/consumers`), [pass](passes.md#x), h (`README.md`)"
+
+
+def test_the_site_builds_without_a_warning(tmp_path: Path):
+    pytest.importorskip("furo")
+    site_pages.gather(tmp_path / "source")
+
+    assert site_pages.render(tmp_path / "source", tmp_path / "site") == 0
+    assert (tmp_path / "site/reference/cli.html").exists()
+
+
+def test_a_broken_link_is_an_error(tmp_path: Path):
+    pytest.importorskip("furo")
+    source = tmp_path / "source"
+    shutil.copytree(ROOT / "docs/static", source / "static")
+    shutil.copy(ROOT / "docs/conf.py", source)
+    (source / "index.md").write_text("# Page\n\n[nowhere](nowhere.md)\n", encoding="utf-8")
+
+    assert site_pages.render(source, tmp_path / "site") != 0
