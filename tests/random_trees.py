@@ -1,14 +1,20 @@
-"""Random small trees of bodies, and Pinocchio's own model of each: an oracle that shares no code."""
+"""Random small trees of bodies, and Pinocchio's own model of each: an oracle that shares no code; and how answers for them
+are laid out and compared."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import product
+
 import numpy as np
 import pinocchio as pin
+import pytest
 from helical import HELICAL, PITCH
 from random_chains import _body, _rotation, _tidy
 
 from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.dynamics.frames import BASE, Frame, frame_at
+from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.parameters import moved
 from psdmc.dynamics.slices import first_rates
 from psdmc.robot.joints import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TRANSLATION
@@ -35,6 +41,37 @@ TREES = {
 """Parents, body by body."""
 
 KINDS = ("RRRRRRRR", "RPRRPRPR", "PRPPRRRP", "RHRPHRRH")
+"""Joints of one coordinate each, body by body."""
+
+PARALLEL = (0.0, 0.6, 1.0)
+"""How probable it is that an axis is parallel to its parent's."""
+
+CHOICES = [Choices(*flags) for flags in product((False, True), repeat=4)]
+COUNT = 5
+"""States."""
+
+EXACT = 1e-12
+"""Of the largest value: of a joint, or of a block."""
+
+
+def on_trees(
+    kinds: Iterable[str], parents: Iterable[tuple[int, ...]] = TREES.values()
+) -> pytest.MarkDecorator:
+    """A test of (parents, kinds, parallel) on every tree."""
+    return pytest.mark.parametrize(("parents", "kinds", "parallel"), list(product(parents, kinds, PARALLEL)))
+
+
+def columns(values: Iterable[object], count: int = COUNT) -> np.ndarray:
+    """Values of joints, each a number or one number per state, as (count, joints)."""
+    return np.stack([np.broadcast_to(np.asarray(v, float), (count,)) for v in values], axis=1)
+
+
+def assert_near(found: np.ndarray, expected: np.ndarray, exact: float = EXACT) -> None:
+    """Each column to its own largest value; one that is zero throughout, to 1."""
+    largest = np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)
+    error = np.abs(found - expected).reshape(-1, expected.shape[-1]).max(axis=0)
+    relative = error / np.where(largest > 0.0, largest, 1.0)
+    assert np.all(relative <= exact), relative
 
 
 class RandomTree:

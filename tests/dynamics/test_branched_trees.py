@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 import pytest
-from random_trees import KINDS, TREES, RandomTree
+from random_trees import CHOICES, COUNT, KINDS, TREES, RandomTree, assert_near, columns, on_trees
 
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.energy import first_moment, kinetic_energy, potential_energy
@@ -19,31 +19,7 @@ from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, NamedFrame, Placement
 
-EXACT = 1e-12
-"""Of each joint's largest value."""
-
-COUNT = 6
-CHOICES = [Choices(*flags) for flags in product((False, True), repeat=4)]
-
-trees = pytest.mark.parametrize(
-    ("parents", "kinds", "parallel"),
-    [
-        (parents, kinds, parallel)
-        for parents in TREES.values()
-        for kinds in KINDS
-        for parallel in (0.0, 0.6, 1.0)
-    ],
-)
-
-
-def columns(values, count: int = COUNT) -> np.ndarray:
-    return np.stack([np.broadcast_to(np.asarray(v, float), (count,)) for v in values], axis=1)
-
-
-def assert_near(found: np.ndarray, expected: np.ndarray) -> None:
-    scale = np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)
-    error = np.abs(found - expected).reshape(-1, expected.shape[-1]).max(axis=0)
-    assert np.all(error <= EXACT * np.where(scale > 0.0, scale, 1.0)), error / scale
+trees = on_trees(KINDS)
 
 
 @trees

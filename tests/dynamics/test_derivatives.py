@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-import pytest
-from random_trees import KINDS, TREES, RandomTree
-from test_branched_trees import CHOICES, COUNT, columns, trees
+from random_trees import CHOICES, COUNT, EXACT, KINDS, TREES, RandomTree, columns, on_trees
 
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.motion import Choices
 
-EXACT = 1e-12
-"""Of a block's largest entry."""
-
+trees = on_trees(KINDS)
 CHAINS = {"a chain of one": (-1,), "a chain of two": (-1, 0), "a chain of seven": (-1, 0, 1, 2, 3, 4, 5)}
 
 
@@ -48,9 +44,7 @@ def test_the_derivatives_are_pinocchios_however_they_are_arranged(parents, kinds
         assert_blocks_near(found_in(tree, states, choices), expected)
 
 
-@pytest.mark.parametrize("parents", CHAINS.values(), ids=CHAINS)
-@pytest.mark.parametrize("kinds", KINDS)
-@pytest.mark.parametrize("parallel", [0.0, 0.6, 1.0])
+@on_trees(KINDS, CHAINS.values())
 def test_chains_too(parents, kinds, parallel) -> None:
     tree = RandomTree(12, parents, kinds, parallel)
     states = tree.states(COUNT, 3)

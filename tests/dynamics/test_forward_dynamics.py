@@ -3,37 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from random_trees import TREES, RandomTree
+from random_trees import CHOICES, COUNT, TREES, RandomTree, columns, on_trees
 
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.dynamics.momentum import momentum_matrix, total_momentum
-from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.solve import SingularMassMatrix, factorize
 
-COUNT = 5
-CHOICES = [Choices(*flags) for flags in product((False, True), repeat=4)]
 KINDS = ("RRRRRRRR", "RPRRPRPR", "RHRPHRRH", "FRRRRRRR", "FSLTRPRS", "SRFRPLTR", "TLRRSRRF")
 
-trees = pytest.mark.parametrize(
-    ("parents", "kinds", "parallel"),
-    [
-        (parents, kinds, parallel)
-        for parents in TREES.values()
-        for kinds in KINDS
-        for parallel in (0.0, 0.6, 1.0)
-    ],
-)
-
-
-def columns(values) -> np.ndarray:
-    return np.stack([np.broadcast_to(np.asarray(v, float), (COUNT,)) for v in values], axis=1)
+trees = on_trees(KINDS)
 
 
 def condition(tree: RandomTree, q: np.ndarray) -> float:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pinocchio as pin
 import pytest
-from random_trees import TREES, RandomTree
+from random_trees import CHOICES, COUNT, TREES, RandomTree, assert_near, columns, on_trees
 
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
@@ -21,36 +19,13 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.slices import neutral
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, NamedFrame, Placement
 
-EXACT = 1e-12
-"""Of each joint's largest value."""
-
-COUNT = 5
-CHOICES = [Choices(*flags) for flags in product((False, True), repeat=4)]
 KINDS = ("FRRRRRRR", "FSLTRPRS", "SRFRPLTR", "RPLSRFHR", "TLRRSRRF")
 
-trees = pytest.mark.parametrize(
-    ("parents", "kinds", "parallel"),
-    [
-        (parents, kinds, parallel)
-        for parents in TREES.values()
-        for kinds in KINDS
-        for parallel in (0.0, 0.6, 1.0)
-    ],
-)
-
-
-def columns(values, count: int = COUNT) -> np.ndarray:
-    return np.stack([np.broadcast_to(np.asarray(v, float), (count,)) for v in values], axis=1)
+trees = on_trees(KINDS)
 
 
 def lists(*states: np.ndarray) -> tuple[list, ...]:
     return tuple(list(state.T) for state in states)
-
-
-def assert_near(found: np.ndarray, expected: np.ndarray, scale: float = 0.0) -> None:
-    largest = np.maximum(np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0), scale)
-    error = np.abs(found - expected).reshape(-1, expected.shape[-1]).max(axis=0)
-    assert np.all(error <= EXACT * np.where(largest > 0.0, largest, 1.0)), error / largest
 
 
 @trees

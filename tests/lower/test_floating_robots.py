@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from bundled import bundled_model
 from pinocchio_robots import PinocchioRobot, robot_at_hand
-from random_trees import TREES, RandomTree
+from random_trees import TREES, RandomTree, assert_near
 
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError, InputError
@@ -46,9 +46,6 @@ COUNTED = FUNCTIONS[:3]
 
 ROBOTS = [("anymal_b", True), ("solo12", True), ("allegro", False)]
 WHOLE = [("anymal_b", True), ("allegro", False)]
-EXACT = 1e-12
-"""Of each joint's largest value."""
-
 AT_MOST = {
     ("anymal_b", "inverse_dynamics"): 1310,
     ("anymal_b", "mass_matrix"): 662,
@@ -92,14 +89,6 @@ def run(name: str, floating: bool, function: str, **given: np.ndarray) -> np.nda
     for pivots in (one.get("pivot"), lanes.get("pivot")):
         assert pivots is None or np.all(pivots > 0.0)
     return one[first]
-
-
-def assert_near(found: np.ndarray, expected: np.ndarray, exact: float = EXACT) -> None:
-    """Each column to its own largest value."""
-    largest = np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)
-    error = np.abs(found - expected).reshape(-1, expected.shape[-1]).max(axis=0)
-    allowed = exact * np.where(largest > 0.0, largest, 1.0)
-    assert np.all(error <= allowed), (error / np.where(largest > 0.0, largest, 1.0)).max()
 
 
 @on_each
