@@ -90,7 +90,7 @@ damping = 6.0
 
 QUICK = CampaignOptions(
     sweep=SweepOptions(speed=0.15, seconds=16.0, range=0.8),
-    sines=SineOptions(smallest=4e-5, largest=0.7, ratio=3.0, frequencies=(2.0, 6.0), cycles=1),
+    sines=SineOptions(smallest=4e-5, largest=0.7, ratio=4.0, frequencies=(2.0, 6.0), cycles=1),
     excite=ExciteOptions(duration=6.0, samples=60, evaluations=600, population=16, random=50, seconds=20.0),
     load=Load(3.0, (0.1, 0.05, 0.0)),
     gravity_runs=1,

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from psdmc.calibration.logs.filter import SplitOptions, central_differences, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Log
@@ -32,6 +33,18 @@ def test_a_sine_at_twice_the_cut_off_is_gone():
     # 8th order, both ways; the bilinear transform bends the frequency axis by the tangent
     ratio = np.tan(np.pi * 30.0 * PERIOD) / np.tan(np.pi * 15.0 * PERIOD)
     assert np.abs(smooth)[1500:-1500].max() == pytest.approx(1 / (1 + ratio**16), rel=0.02)
+
+
+@pytest.mark.parametrize("shape", [(4000,), (900, 2), (300, 2, 3), (40, 2), (2,), (1,)])
+def test_it_is_scipys_filter_there_and_back_bit_for_bit(shape: tuple[int, ...]):
+    """Logs shorter than the extension at either end too."""
+    low_pass = LowPass.design(FilterOptions(cutoff=15.0), PERIOD)
+    values = np.random.default_rng(2).normal(3.0, 1.0, shape)
+    extended = min(len(values) - 1, 24 * (2 * len(low_pass.sections) + 1))
+
+    expected = signal.sosfiltfilt(low_pass.sections, values, axis=0, padlen=extended)
+
+    assert np.array_equal(low_pass(values), expected)
 
 
 def test_central_differences_of_a_parabola_are_exact():
