@@ -45,7 +45,7 @@ coverage: $(READY) ## run all tests (COVERED='tests/program tests/model': these)
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal --cov --cov-report=term --cov-report=html:$(GENERATED)/coverage $(COVERED)
 
 CAMPAIGN ?= --robots 10000
-campaign: $(READY) ## 10,000 random robots against Pinocchio and MuJoCo, an hour or more of two cores; CAMPAIGN='--robots 500' for less
+campaign: $(READY) ## 10,000 random chains and 1,000 trees against Pinocchio and MuJoCo, an hour or more of two cores; CAMPAIGN='--robots 500 --trees 50' for less
 	@mkdir -p $(GENERATED)
 	$(RUN)/python tests/campaign/campaign_run.py $(CAMPAIGN) --journal $(GENERATED)/campaign.jsonl --json $(GENERATED)/campaign.json
 

@@ -30,10 +30,10 @@ def reduction_link_by_link(robot: Scaled) -> Reduction:
     long = extended(robot)
     rows = torque_rows(long.frames, long.link_frames, long.up)
     links = robot.leads // PARAMETERS_PER_LINK
-    return _reduced(np.asarray((sparse.csr_array(robot.span.T) @ rows.T).T), links)
+    return reduced_to_digits(np.asarray((sparse.csr_array(robot.span.T) @ rows.T).T), links)
 
 
-def _reduced(rows: Long, links: NDArray[np.int64]) -> Reduction:
+def reduced_to_digits(rows: Long, links: NDArray[np.int64]) -> Reduction:
     """The base parameters from rows, with residuals compared as they are and not relative to their columns.
 
     A small column then becomes a pivot late: earlier, its torque would be a large parameter times small numbers, which

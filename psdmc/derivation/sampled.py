@@ -32,13 +32,20 @@ def reduction_of(scaled: Scaled) -> Reduction:
     and of one scale, angles and
     lengths are not so small that their squares are rounding, and no column is nearly dependent; else link by link in
     extended precision."""
-    is_plain = not is_of_many_scales(scaled) and not has_small_entries(scaled)
-    is_plain = is_plain and all(joint.about_z for joint in scaled.types)
-    if is_plain and len(scaled.types) <= SAMPLED_JOINTS:
+    if (
+        is_plain(scaled)
+        and len(scaled.types) <= SAMPLED_JOINTS
+        and all(joint.about_z for joint in scaled.types)
+    ):
         reduction = sampled_reduction(scaled)
         if reduction.is_clear:
             return reduction
     return reduction_link_by_link(scaled)
+
+
+def is_plain(scaled: Scaled) -> bool:
+    """Whether the robot is of one scale and has no angle or length whose square is rounding."""
+    return not is_of_many_scales(scaled) and not has_small_entries(scaled)
 
 
 def sampled_reduction(scaled: Scaled) -> Reduction:
@@ -49,16 +56,18 @@ def sampled_reduction(scaled: Scaled) -> Reduction:
 
 
 def sampled_regressor(scaled: Scaled, count: int) -> Array:
-    """(count, nv, 11 n) regressor at random states, in the robot's unit; gravity of strength one."""
+    """(count, nv, 11 n) regressor at random states, in the robot's unit and the precision of its vertical; gravity of
+    strength one."""
     n, nv = len(scaled.types), first_rates(scaled.frames)[-1]
-    rng = np.random.default_rng(SEED)
+    rng, real = np.random.default_rng(SEED), np.asarray(scaled.up).dtype
     drawn, qd, qdd = (
-        list(rng.uniform(-np.pi, np.pi, (size, count))) for size in (len(neutral(scaled.frames)), nv, nv)
+        list(rng.uniform(-np.pi, np.pi, (size, count)).astype(real))
+        for size in (len(neutral(scaled.frames)), nv, nv)
     )
     q = list(normalized(scaled.frames, np.array(drawn)))
     wanted = frozenset(range(PARAMETERS_PER_LINK * n))
     rows = regressor(scaled.frames, scaled.link_frames, wanted, q, qd, qdd, scaled.up)
-    values = np.zeros((count, nv, PARAMETERS_PER_LINK * n))
+    values = np.zeros((count, nv, PARAMETERS_PER_LINK * n), real)
     for i, row in enumerate(rows):
         for column, entry in row.items():
             values[:, i, column] = entry

@@ -60,11 +60,15 @@ def _interpreted(model: DynamicsModel, reference: Reference) -> Iterator[tuple[s
         for name, kernel in lower(model, lowering, FUNCTIONS).items():
             function = kernel.function
             given = _arguments(function, reference) | {"theta_b": model.theta_b}
-            sizes = function.sizes(Sizes.of_chain(model.n, model.l))
+            sizes = function.sizes(_sizes(model))
             (output,) = function.outputs
             for form in ("single", "batch"):
                 found = interpret(getattr(kernel, form), given, sizes)[output.name]
                 yield f"PROGRAM {lowering} {name} {form}", _error(function, found, reference, model)
+
+
+def _sizes(model: DynamicsModel) -> Sizes:
+    return Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
 
 
 def _compiled(
@@ -97,7 +101,7 @@ def _arguments(function: Signature, reference: Reference) -> dict[str, Array]:
 
 
 def _error(function: Signature, found: Array, reference: Reference, model: DynamicsModel) -> float:
-    count, n = len(found), model.n
+    count, n = len(found), model.nv
     if function.name == "forward_dynamics":
         return reference.acceleration_error(found)
     if function.name == "mass_matrix":

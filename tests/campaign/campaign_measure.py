@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from campaign_draw import robot_of
 from campaign_lowered import lowered_errors
 from campaign_oracles import MuJoCo, Pinocchio, Textbook
 from campaign_reference import Reference, States, random_states
-from campaign_robots import RandomRobot, random_robot
+from campaign_robots import RandomRobot
 
 from psdmc.derivation.certify import certificate
 from psdmc.derivation.derive import derive_model
+from psdmc.derivation.extended import has_small_entries
+from psdmc.derivation.units import scaled
+from psdmc.dynamics.forward_dynamics import forward_dynamics
 from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.robot.load import DEFAULT_SNAP, load_robot_text
 from psdmc.robot.mechanism import Mechanism
 
 Array = np.ndarray
 
-EXPANDED_JOINTS = 7
-"""E and P are made for robots up to this length."""
+EXPANDED_JOINTS, EXPANDED_BODIES = 7, 5
+"""E and P are made for chains up to this length, and for trees of so many bodies that stand and have no mimic joints."""
 
 VALUES = 3_000_000
 """Values of functions that E and P may take per robot and comparison: with 30,000 functions, 100 states instead of all."""
@@ -28,6 +34,13 @@ VALUES = 3_000_000
 MUJOCO_LIMIT, LIMIT, SINGLE_LIMIT = 1e-10, 1e-11, 1e-3
 """Errors that pass: against MuJoCo, which makes each inertia tensor diagonal by iteration until it is so to 1e-12; against
 Pinocchio; of code in float32."""
+
+CLEAR, UNCLEAR = 1e-7, 1e-11
+"""Singular values of a regressor with columns of length one, relative to the largest: the rank is told where none is
+between these."""
+
+COLUMN_SIZE = 1e-12
+"""Smallest column of a regressor, relative to the largest, that is more than rounding."""
 
 
 @dataclass(slots=True)
@@ -47,31 +60,48 @@ class Found:
 def measured(seed: int, count: int, *, lowered: bool) -> Found:
     """The robot of a seed at `count` random states, lowered and compiled as well where asked. Raises whatever psdmc does:
     nothing is expected to, but refusals of robots of many scales."""
-    robot = random_robot(seed)
-    states = random_states(seed, len(robot.joints), count)
+    robot = robot_of(seed)
+    oracle = Pinocchio.of_robot(robot)
+    coordinates = oracle.joints.coordinates
+    states = random_states(seed, len(coordinates), count, robot.is_floating)
     found = Found()
-    as_written = _reference(robot, Pinocchio.of_text(robot.text), states)
-    if not robot.is_mixed:
-        _of_mujoco(robot, as_written, found)
+    as_written = _reference(robot, oracle, states)
+    if not robot.is_mixed and not robot.is_light:
+        _of_mujoco(MuJoCo(robot, coordinates), as_written, found)
     try:
-        exact, snapped = (load_robot_text(robot.text, "urdf", snap=snap) for snap in (0.0, DEFAULT_SNAP))
+        exact, snapped = (
+            load_robot_text(robot.text, "urdf", snap=snap, **robot.options) for snap in (0.0, DEFAULT_SNAP)
+        )
     except InputError as refusal:
         if not robot.is_mixed:
             raise
         found.refused["file"] = str(refusal)
         return found
-    chains = {"snap 0": (exact.chain, as_written)}
+    _same_coordinates(exact.mechanism, coordinates)
+    chains = {"snap 0": (exact.mechanism, oracle, as_written)}
     if snapped.snap_report:
-        chains["snapped"] = (snapped.chain, _reference(robot, Pinocchio.of_chain(snapped.chain), states))
+        exactly = Pinocchio.of_chain(snapped.mechanism, robot)
+        chains["snapped"] = (snapped.mechanism, exactly, _reference(robot, exactly, states))
     turn = _turn(seed)
-    for k, (name, (chain, reference)) in enumerate(chains.items()):
+    for k, (name, (chain, own, reference)) in enumerate(chains.items()):
         try:
-            _of_chain(chain, name, reference, found, turn if lowered and k == turn % len(chains) else None)
+            plain = _of_chain(
+                chain, name, reference, found, turn if lowered and k == turn % len(chains) else None
+            )
+            if not robot.is_mixed:
+                found.errors |= _of_parameters(plain, name, own, reference)
         except DerivationError as refusal:
             if not robot.is_mixed:
                 raise
             found.refused[name] = str(refusal)
     return found
+
+
+def _same_coordinates(chain: Mechanism, expected: Sequence[str]) -> None:
+    """q is in Pinocchio's order."""
+    own = [chain.joints[k].name for k in chain.own_joints if chain.joints[k].type.about_z]
+    if own != list(expected):
+        raise AssertionError(f"coordinates {own}, Pinocchio has {list(expected)}")
 
 
 def _reference(robot: RandomRobot, oracle: Pinocchio, states: States) -> Reference:
@@ -94,9 +124,8 @@ def _turn(seed: int) -> int:
     return int(np.random.default_rng([40, seed]).integers(1_000_000))
 
 
-def _of_mujoco(robot: RandomRobot, reference: Reference, found: Found) -> None:
-    """Not of robots of many scales: MuJoCo refuses masses and inertias below 1e-15."""
-    mujoco = MuJoCo(robot.text)
+def _of_mujoco(mujoco: MuJoCo, reference: Reference, found: Found) -> None:
+    """Not of robots of many scales, or with links that have no body: MuJoCo refuses masses and inertias below 1e-15."""
     q, qd, _ = reference.few
     found.errors |= {
         "MuJoCo, Pinocchio inverse_dynamics": reference.torque_error(
@@ -109,8 +138,11 @@ def _of_mujoco(robot: RandomRobot, reference: Reference, found: Found) -> None:
     }
 
 
-def _of_chain(chain: Mechanism, name: str, reference: Reference, found: Found, turn: int | None) -> None:
-    expands = len(chain) <= EXPANDED_JOINTS
+def _of_chain(
+    chain: Mechanism, name: str, reference: Reference, found: Found, turn: int | None
+) -> DynamicsModel:
+    """Without E and P."""
+    expands = _expands(chain)
     model = derive_model(chain, expand=expands)
     plain = replace(model, expansion=None) if expands else model
     plain = replace(plain, certificate=certificate(plain))
@@ -121,6 +153,69 @@ def _of_chain(chain: Mechanism, name: str, reference: Reference, found: Found, t
         found.states[kind] += states
     if turn is not None:
         found.errors |= {f"{name}, {what}": e for what, e in lowered_errors(model, reference, turn)}
+    return plain
+
+
+def _expands(chain: Mechanism) -> bool:
+    if chain.has_followers or not all(kind.about_z for kind in chain.types):
+        return False
+    return len(chain) <= (EXPANDED_JOINTS if chain.is_serial else EXPANDED_BODIES)
+
+
+def _of_parameters(
+    model: DynamicsModel, name: str, oracle: Pinocchio, reference: Reference
+) -> dict[str, float]:
+    """Of base parameters by themselves: the regressor, which columns it can tell apart, and accelerations.
+
+    Not of robots of many scales, whose mass matrices NumPy does not solve with to all digits.
+    """
+    rows = model.regressor(*reference.few)
+    tau = reference.tau[: len(rows)]
+    errors = {
+        "regressor": reference.torque_error(rows @ model.known_theta_b(), tau),
+        **_of_rank(rows, oracle.regressor(*reference.few), has_small_entries(scaled(model.mechanism))),
+    }
+    if not reference.is_singular_in("float32").any():
+        errors |= _of_accelerations(model, reference, tau)
+    return {f"{name}, base parameters {what}": error for what, error in errors.items()}
+
+
+def _of_accelerations(model: DynamicsModel, reference: Reference, tau: Array) -> dict[str, float]:
+    """By the mass matrix, and by articulated bodies where no joint follows another; of mass matrices that are well away from
+    singular: links without bodies may leave none to speak of."""
+    q, qd, _ = reference.few
+    robot = RobotOnArrays.of(model, model.known_theta_b())
+    errors = {"forward_dynamics": reference.acceleration_error(robot.accelerations(q, qd, tau))}
+    if not model.mechanism.has_followers:
+        given = (list(vectors.T) for vectors in (q, qd, tau))
+        found = forward_dynamics(robot.frames, robot.bodies, robot.drives, *given, robot.base_acceleration)
+        errors["articulated bodies"] = reference.acceleration_error(columns(found[0], len(q)))
+    return errors
+
+
+def _of_rank(rows: Array, standard: Array, is_fine: bool) -> dict[str, float]:
+    """Base parameters too many or too few, where the rank of the standard parameters' regressor is clear; and what of that
+    regressor theirs does not span, relative to its largest column.
+
+    rows     (count, nv, l), standard (count, nv, 10 bodies)
+    is_fine  whether angles or lengths are so small that a parameter's effect may be less than rounding: more of them than
+             doubles can tell apart are right then
+    """
+    own, every = (matrix.reshape(-1, matrix.shape[-1]) for matrix in (rows, standard))
+    sizes = np.linalg.norm(every, axis=0)
+    basis = np.linalg.qr(_unit_columns(own))[0]
+    left = np.linalg.norm(every - basis @ (basis.T @ every), axis=0)
+    values = np.linalg.svd(_unit_columns(every), compute_uv=False)
+    rank, most = (int((values > share * values[0]).sum()) for share in (CLEAR, UNCLEAR))
+    found = {"span": float(left.max() / sizes.max())}
+    more = own.shape[1] - rank
+    return found if most > rank or (is_fine and more > 0) else found | {"number": float(abs(more))}
+
+
+def _unit_columns(matrix: Array) -> Array:
+    sizes = np.linalg.norm(matrix, axis=0)
+    kept = sizes > COLUMN_SIZE * sizes.max()
+    return np.asarray(matrix[:, kept] / sizes[kept])
 
 
 def _of_model(model: DynamicsModel, reference: Reference) -> tuple[dict[str, float], int]:
@@ -135,9 +230,3 @@ def _of_model(model: DynamicsModel, reference: Reference) -> tuple[dict[str, flo
         "gravity": reference.torque_error(model.gravity(q), reference.gravity),
         "certificate": float(model.certificate.max()),
     }, count
-
-
-def described(robot: RandomRobot) -> str:
-    tilts = f", tilts {min(robot.tilts):.1g} to {max(robot.tilts):.1g} rad" if robot.tilts else ""
-    mixed = ", of many scales" if robot.is_mixed else ""
-    return f"{len(robot.joints)} joints, {robot.style}{tilts}{mixed}"

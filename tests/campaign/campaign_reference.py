@@ -5,29 +5,36 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from campaign_joints import ROOT_RATES
 from campaign_oracles import Pinocchio, Textbook
 
 Array = np.ndarray
 States = tuple[Array, Array, Array]
 
 RANGES = (np.pi, 3.0, 5.0)
-"""q (rad or m), qd and qdd are drawn from plus or minus these."""
+"""q (rad or m), qd and qdd are drawn from plus or minus these; a free root's quaternions are of any direction."""
 
 FEW = 50
 """States at which the mass matrix, nonlinear effects, gravity and forward dynamics are compared."""
 
 
-def random_states(seed: int, n: int, count: int) -> States:
+def random_states(seed: int, n: int, count: int, is_floating: bool = False) -> States:
+    """Of n joints of one coordinate, a free root before them where the robot has one."""
     rng = np.random.default_rng([20, seed])
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (count, n)) for limit in RANGES)
-    return q, qd, qdd
+    if not is_floating:
+        return q, qd, qdd
+    turns = rng.normal(size=(count, 4))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    roots = [limit * rng.uniform(-1.0, 1.0, (count, ROOT_RATES)) for limit in RANGES]
+    return np.hstack([roots[0][:, :3], turns, q]), np.hstack([roots[1], qd]), np.hstack([roots[2], qdd])
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
     """A robot's dynamics by an oracle: torques at all states, the rest at the first FEW.
 
-    joint_scale  (n,) each joint's largest torque over all states: what errors of torques are relative to
+    joint_scale  (nv,) each joint's largest torque over all states: what errors of torques are relative to
     """
 
     states: States

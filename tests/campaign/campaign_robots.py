@@ -6,7 +6,9 @@ The text is all that psdmc, Pinocchio and MuJoCo get to see; each reads it by it
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -50,12 +52,25 @@ class Scale:
 
 
 @dataclass(frozen=True, slots=True)
-class RandomRobot:
-    """A robot's file.
+class Follows:
+    """q = ratio q_leader + offset"""
 
-    joints    their names, base to tip
+    leader: str
+    ratio: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True)
+class RandomRobot:
+    """A robot's file, and how it is to be read.
+
+    joints    names of movable joints, parents before what they carry
     tilts     rad, the tilts drawn, zeros left out
     is_mixed  links a million times as long, or as heavy, as their neighbours
+    options   of load_robot_text
+    follows   mimic joints by name
+    held      positions, rad or m, of joints that do not move: those locked, and those beside a chain that is cut out
+    is_light  some link that a joint moves has no body
     """
 
     seed: int
@@ -64,6 +79,24 @@ class RandomRobot:
     joints: tuple[str, ...]
     tilts: tuple[float, ...]
     is_mixed: bool
+    options: Mapping[str, Any] = field(default_factory=dict)
+    follows: Mapping[str, Follows] = field(default_factory=dict)
+    held: Mapping[str, float] = field(default_factory=dict)
+    is_light: bool = False
+
+    @property
+    def is_floating(self) -> bool:
+        return bool(self.options.get("floating"))
+
+    def follower(self, joint: str) -> Follows:
+        """What moves a joint in the end: a joint that follows none, itself maybe, or one that is held, with ratio 0."""
+        if joint in self.held:
+            return Follows(joint, 0.0, self.held[joint])
+        if joint not in self.follows:
+            return Follows(joint, 1.0, 0.0)
+        own = self.follows[joint]
+        first = self.follower(own.leader)
+        return Follows(first.leader, own.ratio * first.ratio, own.ratio * first.offset + own.offset)
 
 
 def random_robot(seed: int) -> RandomRobot:
@@ -71,8 +104,8 @@ def random_robot(seed: int) -> RandomRobot:
     rng = np.random.default_rng([10, seed])
     n = int(rng.choice(np.arange(1, LARGEST + 1), p=np.array(JOINT_SHARES) / sum(JOINT_SHARES)))
     style = str(rng.choice(STYLES))
-    is_mixed = seed % MIXED[0] == MIXED[1]
-    scales = _scales(seed, n) if is_mixed else (Scale(),) * n
+    is_mixed = is_mixed_seed(seed)
+    scales = scales_of(seed, n) if is_mixed else (Scale(),) * n
     tilts: list[float] = []
     parts = ["<link name='base'/>"]
     previous = "base"
@@ -80,36 +113,53 @@ def random_robot(seed: int) -> RandomRobot:
         kind = str(rng.choice(KINDS, p=KIND_SHARES))
         if k and rng.random() < 0.15:
             parts += [
-                _fixed(rng, k, previous, scales[k - 1], tilts),
-                _link(rng, f"plate{k}", 0.4, scales[k - 1]),
+                fixed_joint(rng, str(k), previous, scales[k - 1], tilts),
+                body_link(rng, f"plate{k}", 0.4, scales[k - 1]),
             ]
             previous = f"plate{k}"
-        parts.append(_joint(rng, k, kind, previous, style, scales[max(0, k - 1)], tilts))
-        parts.append(_link(rng, f"link{k}", 0.75**k, scales[k]))
+        parts.append(moving_joint(rng, str(k), kind, previous, style, scales[max(0, k - 1)], tilts))
+        parts.append(body_link(rng, f"link{k}", 0.75**k, scales[k]))
         previous = f"link{k}"
-    body = "\n".join(parts)
-    text = f"<?xml version='1.0'?>\n<robot name='random{seed}'>\n{body}\n</robot>\n"
+    text = robot_text(seed, parts)
     return RandomRobot(seed, text, style, tuple(f"joint{k}" for k in range(n)), tuple(tilts), is_mixed)
 
 
-def _scales(seed: int, n: int) -> tuple[Scale, ...]:
+def is_mixed_seed(seed: int) -> bool:
+    return seed % MIXED[0] == MIXED[1]
+
+
+def robot_text(seed: int, parts: Sequence[str]) -> str:
+    body = "\n".join(parts)
+    return f"<?xml version='1.0'?>\n<robot name='random{seed}'>\n{body}\n</robot>\n"
+
+
+def scales_of(seed: int, n: int) -> tuple[Scale, ...]:
     rng = np.random.default_rng([30, seed])
     pairs = zip(_log_uniform(rng, SHRUNK, n), _log_uniform(rng, WEIGHED, n), strict=True)
     return tuple(Scale(float(length), float(mass)) for length, mass in pairs)
 
 
-def _fixed(rng: np.random.Generator, k: int, parent: str, scale: Scale, tilts: list[float]) -> str:
+def fixed_joint(rng: np.random.Generator, name: str, parent: str, scale: Scale, tilts: list[float]) -> str:
+    """The joint mountNAME of link plateNAME."""
     place = _origin(_lengths(rng) * scale.length, _angles(rng, "mixed", tilts))
-    return f"<joint name='mount{k}' type='fixed'><parent link='{parent}'/><child link='plate{k}'/>{place}</joint>"
+    ends = f"<parent link='{parent}'/><child link='plate{name}'/>"
+    return f"<joint name='mount{name}' type='fixed'>{ends}{place}</joint>"
 
 
-def _joint(
-    rng: np.random.Generator, k: int, kind: str, parent: str, style: str, scale: Scale, tilts: list[float]
+def moving_joint(
+    rng: np.random.Generator,
+    name: str,
+    kind: str,
+    parent: str,
+    style: str,
+    scale: Scale,
+    tilts: list[float],
 ) -> str:
+    """The joint jointNAME of link linkNAME."""
     place = _origin(_lengths(rng) * scale.length, _angles(rng, style, tilts))
     limit = "" if kind == "continuous" else "<limit lower='-3' upper='3' effort='100' velocity='3'/>"
     return (
-        f"<joint name='joint{k}' type='{kind}'><parent link='{parent}'/><child link='link{k}'/>{place}"
+        f"<joint name='joint{name}' type='{kind}'><parent link='{parent}'/><child link='link{name}'/>{place}"
         f"<axis xyz='{_numbers(_axis(rng))}'/>{limit}</joint>"
     )
 
@@ -161,7 +211,7 @@ def _log_uniform(rng: np.random.Generator, limits: tuple[float, float], count: i
     return np.exp(rng.uniform(low, high, count))
 
 
-def _link(rng: np.random.Generator, name: str, size: float, scale: Scale) -> str:
+def body_link(rng: np.random.Generator, name: str, size: float, scale: Scale) -> str:
     """A physical body: principal moments of a box, centre of mass and axes anywhere."""
     mass = float(np.round(rng.uniform(1.0, 10.0) * size, 4)) * scale.mass
     a, b, c = (rng.uniform(0.05, 0.3, 3) * scale.length) ** 2 * mass / 12.0

@@ -1,8 +1,9 @@
 """The differential campaign: random robots through psdmc, Pinocchio and MuJoCo; worst errors and their robots.
 
-python tests/campaign/campaign_run.py --robots 1000          the robots of seeds 0 to 999
+python tests/campaign/campaign_run.py --robots 1000          the chains of seeds 0 to 999 and the usual trees
 python tests/campaign/campaign_run.py --robots 1000:2000 --journal generated/campaign.jsonl
                                                              the next thousand, added to what that file holds
+python tests/campaign/campaign_run.py --robots 0 --trees 100 the trees of seeds 1,000,000 to 1,000,099 alone
 python tests/campaign/campaign_run.py --lowered-only         those of them alone that are lowered and compiled
 python tests/campaign/campaign_run.py --seed 52 --urdf       one robot again, all its errors and its file
 """
@@ -21,11 +22,11 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
+from campaign_draw import FIRST_TREE, described, robot_of
 from campaign_journal import Outcome, append, read, report, summary
-from campaign_measure import described, failures, limit_of, measured
-from campaign_robots import random_robot
+from campaign_measure import failures, limit_of, measured
 
-ROBOTS, STATES, LOWERED_EVERY = 10_000, 1_000, 50
+ROBOTS, TREES, STATES, LOWERED_EVERY = 10_000, 1_000, 1_000, 50
 
 CHUNK = 4
 """Robots handed to a process at once."""
@@ -36,7 +37,7 @@ def outcome(seed: int, states: int, every: int, commit: str) -> Outcome:
     started = time.process_time()
     lowered = is_lowered(seed, every)
     one: Outcome = {"seed": seed, "commit": commit, "count": states, "lowered": lowered}
-    one["mixed"] = random_robot(seed).is_mixed
+    one["mixed"] = robot_of(seed).is_mixed
     try:
         found = measured(seed, states, lowered=lowered)
     except Exception as raised:  # whatever a robot makes psdmc raise is a finding, and the campaign goes on
@@ -62,7 +63,7 @@ def outcomes(seeds: Sequence[int], states: int, every: int, jobs: int, commit: s
 
 
 def one_robot(seed: int, states: int, with_urdf: bool) -> int:
-    robot = random_robot(seed)
+    robot = robot_of(seed)
     print(f"seed {seed}: {described(robot)}")
     if with_urdf:
         print(robot.text)
@@ -94,7 +95,8 @@ def arguments() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("--robots", type=seed_range, default=range(ROBOTS), help="seeds of robots: N or A:B")
+    add("--robots", type=seed_range, default=range(ROBOTS), help="seeds of chains: N or A:B")
+    add("--trees", type=seed_range, default=range(TREES), help=f"trees by seed less {FIRST_TREE:,}: N or A:B")
     add("--states", type=int, default=STATES, help="random states of each robot")
     add("--lowered-every", type=int, default=LOWERED_EVERY, help="lower and compile one in so many; 0: none")
     add("--lowered-only", action="store_true", help="those robots alone")
@@ -125,7 +127,8 @@ def main() -> int:
 
 def _run(chosen: argparse.Namespace, journal: Path) -> None:
     known = read(journal)
-    seeds = [seed for seed in chosen.robots if seed not in known]
+    wanted = [*chosen.robots, *(FIRST_TREE + number for number in chosen.trees)]
+    seeds = [seed for seed in wanted if seed not in known]
     if chosen.lowered_only:
         seeds = [seed for seed in seeds if is_lowered(seed, chosen.lowered_every)]
     ran = outcomes(seeds, chosen.states, chosen.lowered_every, chosen.jobs, chosen.commit)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign_draw import FIRST_TREE, described, robot_of
 from campaign_journal import append, read, report, summary
 from campaign_lowered import FUNCTIONS, _answered
 from campaign_measure import EXPANDED_JOINTS, Found, failures, measured
@@ -13,14 +15,16 @@ from campaign_oracles import Pinocchio, Textbook
 from campaign_reference import Reference, random_states
 from campaign_robots import LARGEST, STYLES, TILTS, random_robot
 from campaign_run import is_lowered, outcome, seed_range
+from campaign_trees import FEWEST, MOST, random_tree
 
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
 from psdmc.lower.search import BUDGET, Search
 from psdmc.program.interpret import interpret
-from psdmc.robot.load import load_robot_text
+from psdmc.robot.load import LoadedRobot, load_robot_text
 
 SEEDS = range(40)
+TREES = range(FIRST_TREE, FIRST_TREE + 16)
 STATES = 40
 
 
@@ -31,6 +35,13 @@ def failing(seed: int, *, lowered: bool = False) -> dict[str, float]:
 @pytest.mark.parametrize("seed", [seed for seed in SEEDS if len(random_robot(seed).joints) < EXPANDED_JOINTS])
 def test_a_random_robot(seed: int) -> None:
     assert failing(seed) == {}
+
+
+@pytest.mark.parametrize("seed", TREES)
+def test_a_random_tree(seed: int) -> None:
+    found = measured(seed, STATES, lowered=False)
+    assert failures(found.errors) == {}
+    assert "snap 0, base parameters inverse_dynamics" in found.errors or found.refused
 
 
 @pytest.mark.parametrize("seed", [453, 989, 4495, 577, 2057, 1927, 7157, 2327])
@@ -92,7 +103,7 @@ def test_no_accelerations_are_accepted_only_where_the_precision_leaves_none() ->
     for seed, real, is_accepted in ((0, "float32", False), (9897, "float32", True), (9897, "float64", False)):
         robot = random_robot(seed)
         states = random_states(seed, len(robot.joints), STATES)
-        reference = Reference.of(Textbook(Pinocchio.of_text(robot.text)), states)
+        reference = Reference.of(Textbook(Pinocchio.of_robot(robot)), states)
         none = np.full_like(reference.few[2], np.nan)
         assert (reference.acceleration_error(_answered(none, reference, real)) <= 1e-11) is is_accepted
 
@@ -109,6 +120,58 @@ def test_a_random_robot_lowered_and_compiled(mixed: bool, tmp_path, monkeypatch:
         assert any(f"PROGRAM factored {function} batch" in what for what in errors)
 
 
+def test_a_random_tree_lowered_and_compiled(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A free root, and joints that follow others."""
+    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
+    robots = map(random_tree, range(FIRST_TREE, FIRST_TREE + 1000))
+    seed = next(
+        r.seed for r in robots if len(r.joints) == 4 and r.is_floating and r.follows and not r.is_light
+    )
+    errors = measured(seed, STATES, lowered=True).errors
+    assert failures(errors) == {}
+    for function in FUNCTIONS:
+        assert any(what.endswith(f"C auto float64 inline {function}") for what in errors)
+        assert any(f"PROGRAM factored {function} batch" in what for what in errors)
+
+
+def test_trees_are_of_all_kinds() -> None:
+    robots = [random_tree(seed) for seed in range(FIRST_TREE, FIRST_TREE + 300)]
+    assert {robot.style for robot in robots} == set(STYLES)
+    assert {len(robot.joints) for robot in robots} == set(range(FEWEST, MOST + 1))
+    assert {name for robot in robots for name in robot.options} == {"lock", "floating", "base", "tip"}
+    assert any(robot.is_light for robot in robots)
+    assert any(robot.is_mixed for robot in robots)
+    followers = [(robot, one) for robot in robots for one in robot.follows.values()]
+    assert any(one.leader in robot.follows for robot, one in followers)
+    assert any(one.ratio == 0.0 for _, one in followers)
+    assert any(robot.joints.index(one.leader) > 0 and one.leader in robot.held for robot, one in followers)
+    text = "".join(robot.text for robot in robots)
+    assert all(f"type='{kind}'" in text for kind in ("revolute", "continuous", "prismatic", "fixed"))
+
+
+@pytest.mark.parametrize("forgotten", [("lock",), ("floating",), ("base", "tip")])
+def test_an_option_that_psdmc_forgets_is_seen(
+    forgotten: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read(text: str, kind: str, **options: object) -> LoadedRobot:
+        left = {name: value for name, value in options.items() if name not in forgotten}
+        return load_robot_text(text, kind, **left)
+
+    robots = map(random_tree, range(FIRST_TREE, FIRST_TREE + 300))
+    robot = next(r for r in robots if forgotten[-1] in r.options and not r.follows)
+    monkeypatch.setattr("campaign_measure.load_robot_text", read)
+    with pytest.raises(AssertionError):
+        measured(robot.seed, STATES, lowered=False)
+
+
+def test_a_ratio_that_is_a_little_off_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    robots = map(random_tree, range(FIRST_TREE, FIRST_TREE + 300))
+    robot = next(r for r in robots if any(one.ratio for one in r.follows.values()) and not r.options)
+    follows = {name: replace(one, ratio=one.ratio * (1.0 + 1e-9)) for name, one in robot.follows.items()}
+    monkeypatch.setattr("campaign_measure.robot_of", lambda seed: replace(robot, follows=follows))
+    assert failures(measured(robot.seed, STATES, lowered=False).errors)
+
+
 def test_robots_are_of_all_kinds() -> None:
     robots = [random_robot(seed) for seed in range(300)]
     assert {robot.style for robot in robots} == set(STYLES)
@@ -122,6 +185,12 @@ def test_robots_are_of_all_kinds() -> None:
 
 def test_a_seed_is_a_robot() -> None:
     assert random_robot(7).text == random_robot(7).text != random_robot(8).text
+    assert robot_of(7) == random_robot(7)
+    tree = robot_of(FIRST_TREE + 5)
+    assert tree == random_tree(FIRST_TREE + 5) != random_tree(FIRST_TREE + 6)
+    assert (
+        described(tree) == "5 joints, 1 of them mimic joints, tilted, tilts 8e-09 to 0.04 rad, floating True"
+    )
 
 
 def test_what_does_not_pass_is_named() -> None:
@@ -164,7 +233,7 @@ def test_seeds_and_which_are_lowered() -> None:
 def test_the_textbook_agrees_with_pinocchio() -> None:
     for seed in (0, 1, 3, 4):
         robot = random_robot(seed)
-        oracle = Pinocchio.of_text(robot.text)
+        oracle = Pinocchio.of_robot(robot)
         states = random_states(seed, len(robot.joints), STATES)
         reference = Reference.of(Textbook(oracle), states)
         q, qd, _ = reference.few

@@ -11,6 +11,7 @@ import numpy as np
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.motions.trajectory import Trajectory, write_trajectory
+from psdmc.compiler import derive
 from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot, load_robot_text
@@ -59,12 +60,14 @@ def write_files(folder: Path) -> None:
     """One file of each kind, and a campaign with logs, in a folder that does not exist yet."""
     (folder / "campaign" / "logs").mkdir(parents=True)
     (folder / "campaign" / "trajectories").mkdir()
-    for name in ("two_link.toml", "arm.urdf", "plant.toml"):
+    for name in ("two_link.toml", "branches.toml", "arm.urdf", "hand.urdf", "legs.urdf", "plant.toml"):
         (folder / name).write_text(text(name), encoding="utf-8")
     for name, content in {"empty": "", "broken.npz": "PK\x03\x04", "text.npz": "hello"}.items():
         (folder / name).write_text(content, encoding="utf-8")
     two_link_model().save(folder / "two_link.npz")
     derive_model(load_robot(folder / "arm.urdf").chain).save(folder / "arm.npz")
+    derive(folder / "hand.urdf").save(folder / "hand.npz")
+    derive(folder / "legs.urdf", floating=True).save(folder / "legs.npz")
     write_log(log(*FIT_TO_USE), folder / "log.csv")
     write_log(log(*SHORT), folder / "log.npz")
     (folder / "campaign" / "campaign.toml").write_text(text("campaign.toml"), encoding="utf-8")

@@ -13,11 +13,12 @@ import target_logs
 import target_models
 import target_packages
 import target_robots
-from minimise import smaller_archive, smaller_lines, smaller_runs, smaller_xml
+from minimise import smaller_archive, smaller_lines, smaller_options, smaller_runs, smaller_xml
 from mutate_argv import mutate_argv
 from mutate_bytes import mutate_bytes, mutate_lines
 from mutate_csv import mutate_csv
 from mutate_npz import mutate_npz
+from mutate_options import mutate_options
 from mutate_package import mutate_package
 from mutate_tables import mutate_parquet, mutate_sqlite
 from mutate_toml import mutate_toml
@@ -61,6 +62,7 @@ FORMATS = {
     for format in (
         Format("urdf", ".urdf", target_robots.urdf, mutate_xml, (smaller_xml, *_TEXT), 0.2, 20),
         Format("dh", ".toml", target_robots.dh, mutate_toml, _TEXT, 0.2, 20),
+        Format("options", ".json", target_robots.with_options, mutate_options, (smaller_options, *_TEXT), 0.1, 20),
         Format("model", ".npz", target_models.model, mutate_npz, _ZIP, 0.1, 10),
         Format("log-csv", ".csv", target_logs.csv, mutate_csv, _TEXT, 0.1, 40),
         Format("log-npz", ".npz", target_logs.npz, mutate_npz, _ZIP, 0.06, 40),

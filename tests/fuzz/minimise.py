@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import io
+import json
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -76,6 +77,22 @@ def smaller_xml(data: bytes) -> Iterator[bytes]:
             other = copy.deepcopy(root)
             del list(other.iter())[k].attrib[name]
             yield tostring(other, encoding="utf-8")
+
+
+def smaller_options(data: bytes) -> Iterator[bytes]:
+    """A robot with options: without an option, or with a smaller text."""
+    try:
+        whole = json.loads(data)
+        text, options = whole["robot"].encode(), dict(whole["options"])
+    except (ValueError, RecursionError, KeyError, TypeError, AttributeError):
+        return
+    for name in options:
+        left = {other: value for other, value in options.items() if other != name}
+        yield json.dumps({"robot": text.decode(), "options": left}).encode()
+    for smaller in (smaller_xml(text), smaller_lines(text)):
+        for shorter in smaller:
+            robot = shorter.decode(errors="replace")
+            yield json.dumps({"robot": robot, "options": options}).encode()
 
 
 def smaller_archive(data: bytes) -> Iterator[bytes]:

@@ -10,9 +10,14 @@ from nasty import NUMBERS, TEXTS, number, text
 FILES = (
     *(
         "two_link.toml",
+        "branches.toml",
         "arm.urdf",
+        "hand.urdf",
+        "legs.urdf",
         "two_link.npz",
         "arm.npz",
+        "hand.npz",
+        "legs.npz",
         "broken.npz",
         "text.npz",
         "empty",
@@ -33,8 +38,14 @@ FILES = (
 COMMANDS = ("derive", "show", "check", "emit-c", "build", "bench", "excite", "simulate", "calibrate")
 VALUES: dict[str, tuple[str, ...]] = {
     "--output": ("new.npz", "new", "two_link.npz", "missing/x.npz", "empty", "package", "é.npz", "a b", "new.csv"),
-    "--base": ("base", "base_link", "arm", "link1", "nowhere", ""),
-    "--tip": ("tip", "arm", "link1", "nowhere", ""),
+    "--base": ("base", "base_link", "arm", "link1", "palm", "trunk", "thumb", "nowhere", ""),
+    "--tip": ("tip", "arm", "link1", "thumb", "nail", "palm", "left", "camera", "nowhere", ""),
+    "--lock": ("wrist=0.5", "close=0.01", "bend=0", "curl=1e300", "hip_l=-0.3", "tip=0", "wrist=", "=1", "wrist", "a=b=1",
+               "wrist=nan", "wrist=1,close=0", "root_joint=0", "second=5e-324", "nowhere=0"),
+    "--frames": ("thumb,nail", "palm", "left,right", "left,left", "camera", "base", ",", "nowhere", "universe"),
+    "--with": ("casadi", "casadi,casadi", "x", ""),
+    "--target": ("native", "cortex-m4f", "avx2", "x", ""),
+    "--cutoff": ("8", "0", "nan", "1e300"),
     "--drive-inertia": ("all", "0", "1,2", "0.1,-1", "nan", "1e300,1e300", "1,,2", ",", "x"),
     "--assume-zero": ("link1:mx", "shoulder:Ixz@com", "link9:mx", "link1", ":", "link1:", "link1:mx,link1:mx", "@com"),
     "--snap": ("0", "1e-5", "0.1", "0.2", "-1", "nan", "inf", "1e-400"),
@@ -60,7 +71,8 @@ VALUES: dict[str, tuple[str, ...]] = {
 """Never a place outside the folder that the target makes; --seconds, --workers and --rounds stay small."""
 
 FLAGS = ("--debug", "--version", "--help", "--no-expand", "--expand", "--terms", "--cost", "--force", "--counts",
-         "--log-det", "--ideal", "--harness", "--physical", "--", "-o", "-h", "-x")  # fmt: skip
+         "--log-det", "--ideal", "--harness", "--physical",
+         "--floating", "--payload", "--edited", "--keep", "--", "-o", "-h", "-x")  # fmt: skip
 SLOW = ("--seconds", "--workers", "--rounds")
 
 

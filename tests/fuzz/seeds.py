@@ -12,10 +12,11 @@ import shutil
 import sqlite3
 import sysconfig
 from pathlib import Path
+from typing import Any
 
 import fixtures
 import numpy as np
-from fixtures import FIT_TO_READ, FIT_TO_USE, SHORT, log, text, trajectory, write_bag, write_files
+from fixtures import FILES, FIT_TO_READ, FIT_TO_USE, SHORT, log, text, trajectory, write_bag, write_files
 from target_packages import manifest_seed
 
 from psdmc.calibration.logs.log_files import columns_of, write_log
@@ -26,6 +27,27 @@ from psdmc.model.store import file_bytes
 ROOT = Path(__file__).parents[2]
 LARGEST_URDF = 20_000
 """bytes; larger ones repeat what smaller ones have and take their time"""
+
+
+OPTIONS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("hand.urdf", {}),
+    ("hand.urdf", {"lock": {"close": 0.01}}),
+    ("hand.urdf", {"lock": {"wrist": -0.5}, "floating": True, "gravity": [0.0, 1.0, -9.0]}),
+    (
+        "hand.urdf",
+        {"base": "palm", "tip": "thumb", "frames": ["thumb"], "tool": [0.1, 0.0, 0.0, 0.0, 0.5, 0.0]},
+    ),
+    ("hand.urdf", {"drive_inertia": [0.1, 0.2, 0.3, 0.4], "assume_zero": ["palm:mx"], "snap": 0.0}),
+    ("legs.urdf", {"floating": True, "lock": {"hip_l": 0.3}}),
+    ("legs.urdf", {"floating": True, "frames": ["left", "right"], "drive_inertia": True}),
+    ("legs.urdf", {"tip": "left"}),
+    ("arm.urdf", {"lock": {"second": 0.5}, "base": "upper", "tip": "tip"}),
+    (
+        "branches.toml",
+        {"gravity": [0.0, 0.0, -1.6], "frames": ["left"], "tool": [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]},
+    ),
+)
+"""Files, and options that they are read with."""
 
 
 def write_seeds(below: Path) -> Path:
@@ -71,12 +93,16 @@ def read_seeds(folder: Path, format: str) -> list[bytes]:
 def _seeds(own: Path) -> dict[str, list[bytes]]:
     robots = sorted((ROOT / "examples" / "robots").iterdir())
     tables = [path.read_bytes() for path in robots if path.suffix == ".toml"]
-    dh = [text(name).encode() for name in ("sliding.toml", "two_link.toml", "unknown.toml")]
+    dh = [text(name).encode() for name in ("sliding.toml", "two_link.toml", "branches.toml", "unknown.toml")]
     plants = sorted((ROOT / "examples" / "plants").iterdir())
     sizes = (SHORT, FIT_TO_READ, FIT_TO_USE)
     return {
-        "urdf": [text("arm.urdf").encode(), text("pendulum.urdf").encode(), *_urdfs(robots)],
+        "urdf": [
+            *(text(f"{name}.urdf").encode() for name in ("arm", "pendulum", "hand", "legs")),
+            *_urdfs(robots),
+        ],
         "dh": [*dh, *tables],
+        "options": [_with_options(*words) for words in OPTIONS],
         "model": [*_models(robots), (own / "files" / "arm.npz").read_bytes()],
         **{
             f"log-{kind}": [_log(own, f".{kind}", *size) for size in sizes]
@@ -101,6 +127,10 @@ def _seeds(own: Path) -> dict[str, list[bytes]]:
     }
 
 
+def _with_options(name: str, options: dict[str, Any]) -> bytes:
+    return json.dumps({"robot": text(name), "options": options}).encode()
+
+
 def _urdfs(bundled: list[Path]) -> list[bytes]:
     """Bundled ones, and those of the example-robot-data wheel where it is installed."""
     wheel = Path(sysconfig.get_path("purelib"), "cmeel.prefix", "share", "example-robot-data", "robots")
@@ -113,6 +143,8 @@ def _models(robots: list[Path]) -> list[bytes]:
     named = {path.stem: path for path in robots}
     small = [derive(named["two_link"])]
     small += [derive(named[name], expand=False) for name in ("scara_zeros", "rounded_arm")]
+    small += [derive(FILES / "hand.urdf"), derive(FILES / "legs.urdf", floating=True)]
+    small += [derive(FILES / "branches.toml", expand=True)]
     return [file_bytes(model) for model in small]
 
 

@@ -24,7 +24,7 @@ def model(data: bytes, folder: Path, deep: bool) -> None:
     with contextlib.redirect_stdout(io.StringIO()):
         print_model(found)
     if found.theta_b is not None:
-        found.inverse_dynamics(*np.full((3, 1, found.n), 0.3))
+        found.inverse_dynamics(*(np.full((1, size), 0.5) for size in (found.nq, found.nv, found.nv)))
     if deep:
         file_bytes(found)
         check_model(found)

@@ -1,9 +1,11 @@
-"""Robot files: read; now and then derived, checked, and held against Pinocchio's own reading."""
+"""Robot files, alone and with options: read; now and then derived, checked, and held against Pinocchio's own reading."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+from mutate_options import robot_and_options
 from oracle import torque_error
 from outcome import BrokenRule
 
@@ -11,7 +13,7 @@ from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.load import LoadedRobot, SourceFormat, load_robot, load_robot_text
+from psdmc.robot.load import LoadedRobot, SourceFormat, load_robot
 from psdmc.verification.check import check_model
 
 MOST_EXPANDED = 4
@@ -22,16 +24,28 @@ TORQUE_LIMIT = 1e-8
 
 
 def urdf(data: bytes, folder: Path, deep: bool) -> None:
-    _robot(data, folder / "robot.urdf", "urdf", deep)
+    _robot(data, folder / "robot.urdf", "urdf", deep, {})
 
 
 def dh(data: bytes, folder: Path, deep: bool) -> None:
-    _robot(data, folder / "robot.toml", "dh", deep)
+    _robot(data, folder / "robot.toml", "dh", deep, {})
 
 
-def _robot(data: bytes, file: Path, source_format: SourceFormat, deep: bool) -> None:
+def with_options(data: bytes, folder: Path, deep: bool) -> None:
+    """The keyword arguments of load_robot, of any JSON values, and the robot that they are for."""
+    given = robot_and_options(data)
+    if given is None:
+        return
+    text, options = given
+    source_format: SourceFormat = "urdf" if text.lstrip().startswith("<") else "dh"
+    suffix = "urdf" if source_format == "urdf" else "toml"
+    robot = text.encode(errors="surrogatepass")
+    _robot(robot, folder / f"robot.{suffix}", source_format, deep, options)
+
+
+def _robot(data: bytes, file: Path, source_format: SourceFormat, deep: bool, options: dict[str, Any]) -> None:
     file.write_bytes(data)
-    loaded = load_robot(file)
+    loaded = load_robot(file, **options)
     if deep:
         _derived(loaded, source_format)
 
@@ -43,9 +57,9 @@ def _derived(loaded: LoadedRobot, source_format: SourceFormat) -> None:
     if failed:
         raise BrokenRule("CheckFails", "psdmc/verification/check.py", "; ".join(failed))
     if loaded.snap_report:
-        loaded = load_robot_text(loaded.source_text, source_format, snap=0.0)
+        loaded = loaded.unsnapped()
         model = _model(loaded)
-    error = torque_error(loaded.source_text, source_format, model)
+    error = torque_error(loaded.source_text, source_format, model, loaded.options)
     if error is not None and not error < TORQUE_LIMIT:
         raise BrokenRule(
             "WrongTorque", "psdmc/derivation/derive.py", f"off Pinocchio by {error:.2g} of the largest"
@@ -57,7 +71,7 @@ def _model(loaded: LoadedRobot) -> DynamicsModel:
     kept = provenance(loaded)
     if len(loaded.chain) <= MOST_EXPANDED:
         try:
-            return derive_model(loaded.chain, provenance=kept)
+            return derive_model(loaded.mechanism, provenance=kept)
         except DerivationError:
             pass
-    return derive_model(loaded.chain, expand=False, provenance=kept)
+    return derive_model(loaded.mechanism, expand=False, provenance=kept)

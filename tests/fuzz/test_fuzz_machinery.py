@@ -207,6 +207,30 @@ def test_the_oracle_agrees_and_disagrees(name: str, kind: str):
     assert torque_error(text, kind, wrong) > 1e-3
 
 
+@pytest.mark.parametrize(
+    ("name", "options", "change"),
+    [
+        ("hand.urdf", {}, ('multiplier="-0.8"', 'multiplier="0.8"')),
+        ("hand.urdf", {"lock": {"close": 0.5}}, ('offset="0.02"', 'offset="0.2"')),
+        ("hand.urdf", {"floating": True, "lock": {"bend": 0.3}}, ('value="0.1"', 'value="0.2"')),
+        ("hand.urdf", {"base": "palm", "tip": "thumb", "lock": {"wrist": 1.0}}, ("0 0.6 0.8", "0 0.8 0.6")),
+        ("hand.urdf", {"drive_inertia": [0.1, 0.2, 0.3, 0.4]}, ('multiplier="2"', 'multiplier="3"')),
+        ("legs.urdf", {"floating": True, "gravity": [1.0, 2.0, 3.0]}, ('value="8"', 'value="9"')),
+        ("branches.toml", {"gravity": [1.0, 2.0, 3.0]}, ('parent = "trunk"', 'parent = "base"')),
+    ],
+)
+def test_the_oracle_knows_trees_and_options(name: str, options: dict, change: tuple[str, str]):
+    text, kind = fixtures.text(name), "urdf" if name.endswith("urdf") else "dh"
+
+    def error(read: str) -> float | None:
+        robot = load_robot_text(read, kind, snap=0.0, **options)
+        return torque_error(text, kind, derive_model(robot.mechanism, expand=False), robot.options)
+
+    assert error(text) < 1e-12
+    assert text != text.replace(*change)
+    assert error(text.replace(*change)) > 1e-6
+
+
 def test_messages_differ_by_their_gist():
     assert gist_of("run.csv: row 17: 'x' is 3.5e-3") == gist_of("run.csv: row 4: 'y' is 2")
 
