@@ -31,18 +31,20 @@ def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
     is_modified = table.get("convention", "standard") == "modified"
     model = pinocchio.Model()
     model.name = str(table.get("name", "robot"))
-    ends = {"base": (pinocchio.SE3.Identity(), 0)}
+    ends = {"base": (pinocchio.SE3.Identity(), 0, 0)}
     last = "base"
     for number, row in enumerate(table["joint"], start=1):
-        before, parent = ends[row.get("parent", last)]
+        before, parent, frame = ends[row.get("parent", last)]
         kind = MODELS[row.get("type", "revolute")]()
         whole = pinocchio.SE3((modified_matrix if is_modified else standard_matrix)(*_numbers(row)))
         place, link = (before * whole, pinocchio.SE3.Identity()) if is_modified else (before, whole)
         last = row.get("name", f"joint{number}")
         parent = model.addJoint(parent, kind, place, last)
         model.appendBodyToJoint(parent, _body(row.get("link", {})), link)
-        model.addFrame(pinocchio.Frame(f"link{number}", parent, 0, link, pinocchio.FrameType.BODY))
-        ends[last] = link, parent
+        frame = model.addFrame(
+            pinocchio.Frame(f"link{number}", parent, frame, link, pinocchio.FrameType.BODY)
+        )
+        ends[last] = link, parent, frame
     model.gravity.linear = np.array(
         table.get("gravity", (0.0, 0.0, -9.81)) if gravity is None else gravity, float
     )

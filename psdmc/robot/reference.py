@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio
 
-from psdmc.errors import InputError
+from psdmc.errors import InputError, InternalError
 from psdmc.robot.dh_textbook import dh_model
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
@@ -188,12 +188,17 @@ class Reference:
 
 
 def _way_to(frame: int, model: pinocchio.Model, data: pinocchio.Data) -> float:
-    length = 0.0
-    while frame:
-        above = model.frames[frame].parentFrame
-        length += float(np.linalg.norm(data.oMf[frame].translation - data.oMf[above].translation))
-        frame = above
-    return length
+    """m, over every frame from the first one to this; InternalError where their parents do not lead there."""
+    length, here = 0.0, frame
+    for _ in range(model.nframes):
+        if not here:
+            return length
+        above = model.frames[here].parentFrame
+        if above >= model.nframes:
+            break
+        length += float(np.linalg.norm(data.oMf[here].translation - data.oMf[above].translation))
+        here = above
+    raise InternalError(f"frame {model.frames[frame].name!r} of Pinocchio's model hangs on no root")
 
 
 def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None) -> Reference:
@@ -278,17 +283,19 @@ def _placed_as(chain: Mechanism, model: pinocchio.Model) -> pinocchio.Model:
     """The model's bodies on joints that are placed as the chain's are, about their z."""
     placed = pinocchio.Model()
     placed.name = model.name
+    numbers = [0]
     for k, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True)):
         about = getattr(pinocchio, f"JointModel{joint.type.pinocchio}")()
         placed.addJoint(parent + 1, about, _se3(joint.placement), joint.name)
         own = model.frames[model.getFrameId(joint.link_name, pinocchio.FrameType.BODY)].placement
         place = _se3(joint.link_frame)
         placed.inertias[k + 1] = (place * own.inverse()).act(model.inertias[k + 1])
-        placed.addFrame(pinocchio.Frame(joint.link_name, k + 1, 0, place, pinocchio.FrameType.BODY))
+        kind, above = pinocchio.FrameType.BODY, numbers[parent + 1]
+        numbers.append(placed.addFrame(pinocchio.Frame(joint.link_name, k + 1, above, place, kind)))
     for frame in (chain.tip_frame, *chain.frames):
         if not placed.existFrame(frame.name):
-            place, kind = _se3(frame.placement), pinocchio.FrameType.OP_FRAME
-            placed.addFrame(pinocchio.Frame(frame.name, frame.joint + 1, 0, place, kind))
+            place, kind, above = _se3(frame.placement), pinocchio.FrameType.OP_FRAME, numbers[frame.joint + 1]
+            placed.addFrame(pinocchio.Frame(frame.name, frame.joint + 1, above, place, kind))
     placed.gravity.linear = np.array(chain.gravity)
     placed.armature = model.armature.copy()
     return placed

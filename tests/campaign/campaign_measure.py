@@ -202,20 +202,25 @@ def _of_rank(rows: Array, standard: Array, is_fine: bool) -> dict[str, float]:
              doubles can tell apart are right then
     """
     own, every = (matrix.reshape(-1, matrix.shape[-1]) for matrix in (rows, standard))
-    sizes = np.linalg.norm(every, axis=0)
-    basis = np.linalg.qr(_unit_columns(own))[0]
-    left = np.linalg.norm(every - basis @ (basis.T @ every), axis=0)
+    triangle = np.linalg.qr(np.hstack([_unit_columns(own), every]), mode="r")
+    left, every = triangle[own.shape[1] :, own.shape[1] :], triangle[:, own.shape[1] :]
     values = np.linalg.svd(_unit_columns(every), compute_uv=False)
     rank, most = (int((values > share * values[0]).sum()) for share in (CLEAR, UNCLEAR))
-    found = {"span": float(left.max() / sizes.max())}
+    found = {"span": _longest(left) / _longest(every)}
     more = own.shape[1] - rank
     return found if most > rank or (is_fine and more > 0) else found | {"number": float(abs(more))}
 
 
+def _longest(matrix: Array) -> float:
+    """Length of the longest column."""
+    return float(np.linalg.norm(matrix, axis=0).max())
+
+
 def _unit_columns(matrix: Array) -> Array:
+    """Columns that are more than rounding, of length one; others zero."""
     sizes = np.linalg.norm(matrix, axis=0)
     kept = sizes > COLUMN_SIZE * sizes.max()
-    return np.asarray(matrix[:, kept] / sizes[kept])
+    return np.asarray(matrix * kept / np.where(kept, sizes, 1.0))
 
 
 def _of_model(model: DynamicsModel, reference: Reference) -> tuple[dict[str, float], int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio
 import pytest
 from small_robots import EXAMPLES, joint, largest_difference, link, load_dh, load_urdf, robot_data
 
@@ -10,8 +11,9 @@ from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.parameters import bodies_of
+from psdmc.errors import InternalError
 from psdmc.robot.load import load_robot
-from psdmc.robot.reference import reference, reference_model
+from psdmc.robot.reference import Reference, reference, reference_model
 
 TOLERANCE = 1e-12
 
@@ -201,3 +203,28 @@ def test_the_reference_takes_other_parameters():
     assert model.armature.tolist() == x[:, 10].tolist()
     with pytest.raises(ValueError, match="unknown"):
         reference_model(loaded)
+
+
+@pytest.mark.parametrize("snapped", [False, True])
+def test_the_longest_way_is_that_over_all_links(snapped: bool):
+    urdf = load_urdf(
+        *(link(name) for name in ("base", "a", "b", "c")),
+        joint("j1", "base", "a", xyz="0 0 3"),
+        joint("j2", "a", "b", xyz="4 0 0"),
+        joint("j3", "a", "c", xyz="1 0 0"),
+    )
+    dh = load_dh("[[joint]]\nd = 3.0\nname = 'a'\n[[joint]]\na = 4.0\n[[joint]]\nparent = 'a'\na = 1.0\n")
+
+    for robot in (urdf, dh):
+        parameters = np.zeros(robot.mechanism.parameters.shape)
+        assert reference(robot, snapped=snapped, parameters=parameters).path_length == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize("parents", [{1: 2, 2: 1}, {2: 2}, {2: 1000}, {2: 2**64 - 1}])
+def test_frames_that_hang_on_no_root_are_an_error_and_no_endless_loop(parents: dict[int, int]):
+    model = pinocchio.buildSampleModelManipulator()
+    for frame, parent in parents.items():
+        model.frames[frame].parentFrame = parent
+
+    with pytest.raises(InternalError, match="hangs on no root"):
+        _ = Reference(model, model.frames[2].name).path_length
