@@ -7,16 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from psdmc.robot.joints.basis import NO_BASIS, Basis
-from psdmc.robot.joints.joint_type import JointType, Rows, Scalar, Twist, Vector
+from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
 from psdmc.robot.joints.quaternion import angles_between, of_length_one, rotation_of, turned_by
+from psdmc.robot.joints.wide_joint import WideJoint
 from psdmc.robot.placement import Array
 
 SMALL = 1e-2
 """rad; below, the way that a turning frame goes comes from series, whose next term is below 1e-16."""
 
 
-class Free(JointType):
+class Free(WideJoint):
     """q is the position (m) and a unit quaternion (x, y, z, w); rates are the velocity of the moved frame's origin (m/s) and
     its angular velocity (rad/s), both along its own axes. Efforts are the force and the moment about that origin."""
 
@@ -32,21 +32,7 @@ class Free(JointType):
         "; efforts: force (N) and moment (N m)"
     )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-    about_z: ClassVar[bool] = False
-    twists: ClassVar[tuple[Twist, ...]] = (
-        ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-        ((0.0, 1.0, 0.0), (0.0, 0.0, 0.0)),
-        ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),
-        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-        ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    )
-    basis: ClassVar[Basis] = NO_BASIS
-    length_order: ClassVar[int] = 1
-    position_unit: ClassVar[str] = "m"
-    effort_unit: ClassVar[str] = "N"
-    free_range: ClassVar[float] = 1.0
-    ordinary: ClassVar[tuple[float, float, float]] = (1.0, 1.0, 10.0)
+    twists: ClassVar[tuple[Twist, ...]] = (*SLIDES, *TURNS)
     verb: ClassVar[str] = "moves freely"
     pinocchio: ClassVar[str] = "FreeFlyer"
     mujoco: ClassVar[str] = "free"

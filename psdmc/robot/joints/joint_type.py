@@ -21,6 +21,20 @@ Scalar = Any
 Twist = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Linear velocity of a frame's origin and angular velocity, along the frame's own axes."""
 
+SLIDES: tuple[Twist, Twist, Twist] = (
+    ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    ((0.0, 1.0, 0.0), (0.0, 0.0, 0.0)),
+    ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),
+)
+"""Along x, y and z."""
+
+TURNS: tuple[Twist, Twist, Twist] = (
+    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+)
+"""About x, y and z."""
+
 Vector = tuple[Scalar, Scalar, Scalar]
 Rows = tuple[Vector, Vector, Vector]
 
@@ -28,7 +42,6 @@ Rows = tuple[Vector, Vector, Vector]
 class JointType:
     """One way to move: a turn about z, a slide along z, or both in a fixed ratio; or, where not `about_z`, by several
     coordinates, from which `rotation` and `way` give the frame's place. Rates are along the moved frame's own axes.
-
 
     word           in robot files, model files and tables
     urdf_words     types of a URDF's <joint> that move so

@@ -7,16 +7,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from psdmc.robot.joints.basis import NO_BASIS, Basis
-from psdmc.robot.joints.joint_type import JointType, Rows, Scalar, Twist, Vector
+from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
 from psdmc.robot.joints.quaternion import of_length_one
+from psdmc.robot.joints.wide_joint import WideJoint
 from psdmc.robot.placement import Array
 
 SMALL = 1e-2
 """rad; below, the way that a turning frame goes comes from series, whose next term is below 1e-16."""
 
 
-class Planar(JointType):
+class Planar(WideJoint):
     """q is x and y (m), cosine and sine of the angle about z; rates are the velocity of the moved frame's origin along its
     own x and y (m/s) and the angular velocity about z (rad/s)."""
 
@@ -32,18 +32,7 @@ class Planar(JointType):
         "; efforts: force (N) and moment (N m)"
     )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 1.0, 0.0)
-    about_z: ClassVar[bool] = False
-    twists: ClassVar[tuple[Twist, ...]] = (
-        ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-        ((0.0, 1.0, 0.0), (0.0, 0.0, 0.0)),
-        ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    )
-    basis: ClassVar[Basis] = NO_BASIS
-    length_order: ClassVar[int] = 1
-    position_unit: ClassVar[str] = "m"
-    effort_unit: ClassVar[str] = "N"
-    free_range: ClassVar[float] = 1.0
-    ordinary: ClassVar[tuple[float, float, float]] = (1.0, 1.0, 10.0)
+    twists: ClassVar[tuple[Twist, ...]] = (SLIDES[0], SLIDES[1], TURNS[2])
     verb: ClassVar[str] = "moves in a plane"
     pinocchio: ClassVar[str] = "Planar"
     mujoco: ClassVar[str] = "none"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from psdmc.robot.joints.basis import POLYNOMIAL, Basis
-from psdmc.robot.joints.joint_type import JointType, Scalar, Twist
+from psdmc.robot.joints.joint_type import SLIDES, JointType, Scalar, Twist
 
 
 class Prismatic(JointType):
@@ -15,7 +15,7 @@ class Prismatic(JointType):
 
     word: ClassVar[str] = "prismatic"
     urdf_words: ClassVar[tuple[str, ...]] = ("prismatic",)
-    twists: ClassVar[tuple[Twist, ...]] = (((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),)
+    twists: ClassVar[tuple[Twist, ...]] = (SLIDES[2],)
     basis: ClassVar[Basis] = POLYNOMIAL
     length_order: ClassVar[int] = 1
     position_unit: ClassVar[str] = "m"

@@ -6,7 +6,7 @@ import math
 from typing import ClassVar
 
 from psdmc.robot.joints.basis import TRIGONOMETRIC, Basis
-from psdmc.robot.joints.joint_type import JointType, Scalar, Twist
+from psdmc.robot.joints.joint_type import TURNS, JointType, Scalar, Twist
 
 
 class Revolute(JointType):
@@ -16,7 +16,7 @@ class Revolute(JointType):
 
     word: ClassVar[str] = "revolute"
     urdf_words: ClassVar[tuple[str, ...]] = ("revolute", "continuous")
-    twists: ClassVar[tuple[Twist, ...]] = (((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),)
+    twists: ClassVar[tuple[Twist, ...]] = (TURNS[2],)
     basis: ClassVar[Basis] = TRIGONOMETRIC
     length_order: ClassVar[int] = 0
     position_unit: ClassVar[str] = "rad"

@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
-from psdmc.robot.joints.basis import NO_BASIS, Basis
-from psdmc.robot.joints.joint_type import JointType, Rows, Scalar, Twist
+from psdmc.robot.joints.joint_type import TURNS, Rows, Scalar, Twist
 from psdmc.robot.joints.quaternion import angles_between, of_length_one, rotation_of, turned_by
+from psdmc.robot.joints.wide_joint import WideJoint
 from psdmc.robot.placement import Array
 
 
-class Spherical(JointType):
+class Spherical(WideJoint):
     """q is a unit quaternion (x, y, z, w); rates are the angular velocity along the moved frame's axes, rad/s."""
 
     __slots__ = ()
@@ -27,17 +27,10 @@ class Spherical(JointType):
         "; efforts: moment (N m)"
     )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 1.0)
-    about_z: ClassVar[bool] = False
-    twists: ClassVar[tuple[Twist, ...]] = (
-        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-        ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-        ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    )
-    basis: ClassVar[Basis] = NO_BASIS
+    twists: ClassVar[tuple[Twist, ...]] = TURNS
     length_order: ClassVar[int] = 0
     position_unit: ClassVar[str] = "1"
     effort_unit: ClassVar[str] = "N m"
-    free_range: ClassVar[float] = 1.0
     ordinary: ClassVar[tuple[float, float, float]] = (math.pi, 3.0, 15.0)
     verb: ClassVar[str] = "turns about every axis"
     pinocchio: ClassVar[str] = "Spherical"

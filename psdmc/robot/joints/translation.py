@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from psdmc.robot.joints.basis import NO_BASIS, Basis
-from psdmc.robot.joints.joint_type import JointType, Scalar, Twist, Vector
+from psdmc.robot.joints.joint_type import SLIDES, Scalar, Twist, Vector
+from psdmc.robot.joints.wide_joint import WideJoint
 
 
-class Translation(JointType):
+class Translation(WideJoint):
     """q is the position, m."""
 
     __slots__ = ()
@@ -20,18 +20,7 @@ class Translation(JointType):
     nv: ClassVar[int] = 3
     coordinates: ClassVar[str] = "q: x y z (m); rates: velocity (m/s); efforts: force (N)"
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0)
-    about_z: ClassVar[bool] = False
-    twists: ClassVar[tuple[Twist, ...]] = (
-        ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
-        ((0.0, 1.0, 0.0), (0.0, 0.0, 0.0)),
-        ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)),
-    )
-    basis: ClassVar[Basis] = NO_BASIS
-    length_order: ClassVar[int] = 1
-    position_unit: ClassVar[str] = "m"
-    effort_unit: ClassVar[str] = "N"
-    free_range: ClassVar[float] = 1.0
-    ordinary: ClassVar[tuple[float, float, float]] = (1.0, 1.0, 10.0)
+    twists: ClassVar[tuple[Twist, ...]] = SLIDES
     verb: ClassVar[str] = "goes along every axis"
     pinocchio: ClassVar[str] = "Translation"
     mujoco: ClassVar[str] = "none"
