@@ -29,11 +29,11 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    """Pinocchio's energy less its energy at q = 0."""
+    """Pinocchio's energy less its energy where no joint has moved."""
     import pinocchio as pin
 
     def energy(model: Any, data: Any, q: Array) -> Array:
-        at_zero = pin.computePotentialEnergy(model, data, np.zeros(model.nq))
+        at_zero = pin.computePotentialEnergy(model, data, pin.neutral(model))
         return np.asarray(pin.computePotentialEnergy(model, data, q) - at_zero)
 
     return {"U": robot.each(energy, given["q"])}

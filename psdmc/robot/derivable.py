@@ -6,7 +6,7 @@ from psdmc.errors import InputError
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Mechanism
 
-AXES = "take a model whose base stands: derive it without --floating"
+AXES = "take a model without such joints: derive it without --floating, or hold them with --lock JOINT=0"
 
 
 def require_derivable(chain: Mechanism) -> None:

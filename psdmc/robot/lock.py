@@ -31,7 +31,7 @@ def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> 
             raise InputError(
                 f"{source}: joint {shown(name)}, to be locked, {what}", f"movable joints: {listed(movable)}"
             )
-        if known[name].type not in URDF_TYPES and value != 0.0:
+        if not _has_position(known[name]) and value != 0.0:
             raise InputError(
                 f"{source}: joint {shown(name)} of type {shown(known[name].type)} is locked at {value:g}",
                 "such joints are locked where they are in the file: at 0",
@@ -70,10 +70,15 @@ def _note(joint: UrdfJoint, value: float) -> str:
 def _moved(joint: UrdfJoint, value: float) -> Placement:
     """The placement of the child link in the file's joint frame; that at zero where the joint's type has no single
     position."""
-    if joint.type not in URDF_TYPES:
+    if not _has_position(joint):
         return Placement.identity()
     axis = Placement(link_rotation(snap_axis(np.array(joint.axis), 0.0)[0]), np.zeros(3))
     return axis.inverse() @ URDF_TYPES[joint.type].transform(value) @ axis
+
+
+def _has_position(joint: UrdfJoint) -> bool:
+    """Whether one number says where it is."""
+    return joint.type in URDF_TYPES and URDF_TYPES[joint.type].about_z
 
 
 def parsed(texts: Sequence[str]) -> dict[str, float]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from psdmc.errors import InputError
 from psdmc.robot.coordinates import Coordinate
+from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.limits import shown
 from psdmc.robot.urdf import UrdfJoint
 
@@ -57,6 +58,7 @@ def followed(
 
     InputError where the joints form a ring, or its leader is no movable joint.
     """
+    _refuse_wide(joint, source)
     ratio, offset, here, passed = 1.0, 0.0, joint, [joint.name]
     while here.mimic is not None and (here is joint or here.name not in ends):
         ratio, offset = ratio * here.mimic.multiplier, offset + ratio * here.mimic.offset
@@ -73,4 +75,15 @@ def followed(
             )
         passed.append(leader)
         here = known[leader]
+        _refuse_wide(here, source)
     return Followed(here, ratio, offset)
+
+
+def _refuse_wide(joint: UrdfJoint, source: str) -> None:
+    """InputError where a joint that follows, or is followed, has several coordinates."""
+    if joint.type in URDF_TYPES and not URDF_TYPES[joint.type].about_z:
+        raise InputError(
+            f"{source}: joint {shown(joint.name)} of type {shown(joint.type)} has several coordinates: such joints"
+            " neither follow others by <mimic> nor lead them",
+            "leave that <mimic> out",
+        )

@@ -12,7 +12,7 @@ import numpy as np
 from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
-from psdmc.robot.mechanism import DRIVE, Array, Mechanism
+from psdmc.robot.mechanism import DRIVE, Array, Mechanism, Placement
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference import has_assumptions
 from psdmc.robot.rotation import from_quaternion
@@ -68,13 +68,30 @@ def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Arra
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr[others]] = list(held.values())
     torques = np.zeros_like(qd)
-    if loaded.options.floating:
+    free = _free_joint(chain)
+    if free:
         q, qd, qdd = to_mujoco(q, qd, qdd)
     for k in range(len(q)):
         data.qpos[places], data.qvel[speeds], data.qacc[speeds] = q[k], qd[k], qdd[k]
         mujoco.mj_inverse(model, data)
         torques[k] = data.qfrc_inverse[speeds]
-    return force_from_mujoco(q, torques) if loaded.options.floating else torques
+    return force_from_mujoco(q, torques) if free else torques
+
+
+def _free_joint(chain: Mechanism) -> bool:
+    """Whether the first joint is free, and no other; NotCompared where MuJoCo has no such joints, or means others."""
+    kinds = [joint.type.mujoco for joint in chain.joints]
+    if "none" in kinds:
+        raise NotCompared(f"MuJoCo has no joint like {shown(chain.joints[kinds.index('none')].name)}")
+    if "free" in kinds[1:]:
+        raise NotCompared("MuJoCo's free joints are compared where they come first")
+    if "free" in kinds and not _is_world(chain.joints[0].placement):
+        raise NotCompared("MuJoCo's free joints are about the world's frame")
+    return "free" in kinds
+
+
+def _is_world(placement: Placement) -> bool:
+    return bool(np.all(placement.rotation == np.eye(3)) and not placement.translation.any())
 
 
 def _entries(first: Array, counts: Sequence[int]) -> list[int]:

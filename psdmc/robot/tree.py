@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from psdmc.errors import InputError
+from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.limits import MAX_JOINTS, shown
 from psdmc.robot.urdf import LOCKABLE, MOVABLE, UrdfJoint, UrdfRobot
+
+BALLS = ("spherical", "ball")
+"""Types that no standard of URDF has, and some writers use."""
+
+BALL = "a URDF has no joint about every axis: write it as three revolute ones through one point"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +61,7 @@ def find_route(
             "choose other --base or --tip",
         )
     _refuse_unsupported(robot, route, source)
+    _refuse_other_planes(route, source)
     return replace(route, notes=(*route.notes, *_locked_note(robot, route)))
 
 
@@ -229,19 +237,37 @@ def _refuse_many(route: Route, source: str) -> None:
         )
 
 
+def _refuse_other_planes(route: Route, source: str) -> None:
+    """InputError for joints whose <axis> programs understand in different ways."""
+    problems = [
+        f"joint {shown(joint.name)} of type {shown(joint.type)} has <axis> {' '.join(f'{x:g}' for x in joint.axis)}"
+        for joint in route.movable
+        if not _is_only_axis(joint)
+    ]
+    if problems:
+        raise InputError(
+            f"{source}: {'; '.join(problems)}: the plane's normal by the standard, where other readers always take z",
+            'write <axis xyz="0 0 1"/>, and turn the plane by rpy of its <origin>',
+        )
+
+
+def _is_only_axis(joint: UrdfJoint) -> bool:
+    only, length = URDF_TYPES[joint.type].only_axis, math.hypot(*joint.axis)
+    return only is None or all(x == length * a for x, a in zip(joint.axis, only, strict=True))
+
+
 def _refuse_unsupported(robot: UrdfRobot, route: Route, source: str) -> None:
     on_chain = {joint.name for joint in route.movable}
     problems = [
         f"joint '{joint.name}': type {shown(joint.type)} is not supported"
         for joint in robot.joints
-        if joint.name != robot.free_root
-        and joint.type not in (*MOVABLE, "fixed")
-        and (joint.name in on_chain or joint.type not in LOCKABLE)
+        if joint.type not in (*MOVABLE, "fixed") and (joint.name in on_chain or joint.type not in LOCKABLE)
     ]
     if problems:
         can_cut = route.ends and robot.free_root is None
         cut = "; --tip LINK takes one chain of the tree" if can_cut else ""
-        hint = f"psdmc models revolute, continuous, prismatic and fixed joints{cut}"
+        ball = f"; {BALL}" if any(joint.type in BALLS for joint in robot.joints) else ""
+        hint = f"psdmc models {', '.join(MOVABLE)} and fixed joints{ball}{cut}"
         raise InputError(f"{source}: " + "; ".join(problems), hint)
 
 

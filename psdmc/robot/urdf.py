@@ -31,7 +31,7 @@ Quadruple = tuple[float, float, float, float]
 MOVABLE = tuple(URDF_TYPES)
 """Joint types that psdmc models; fixed ones are merged, all others refused on the chain."""
 
-LOCKABLE = (*MOVABLE, "fixed", "floating", "planar")
+LOCKABLE = (*MOVABLE, "fixed")
 """Joint types that have a neutral position, where those beside the chain are locked."""
 
 UNIT_SLACK = 1e-2
@@ -229,7 +229,7 @@ def _axis(joint: Element, kind: str) -> Triple:
     if element is not None and element.get("xyz") is None:
         raise ValueError("<axis> has no xyz")
     x, y, z = numbers(element, "xyz", (1.0, 0.0, 0.0), limits.DIRECTION)
-    if kind not in (*MOVABLE, "planar"):
+    if kind not in MOVABLE or not _has_axis(kind):
         return (x, y, z)
     if not any((x, y, z)):
         raise ValueError("<axis> is zero, expected a direction")
@@ -237,6 +237,11 @@ def _axis(joint: Element, kind: str) -> Triple:
     if fault:
         raise ValueError(f"length of <axis>, {math.hypot(x, y, z):g}, {fault}")
     return (x, y, z)
+
+
+def _has_axis(kind: str) -> bool:
+    """Whether <axis> says anything of a joint of this type."""
+    return URDF_TYPES[kind].follows_axis or URDF_TYPES[kind].only_axis is not None
 
 
 def _origin(parent: Element) -> Origin:
@@ -272,7 +277,7 @@ def _mimic(joint: Element) -> Mimic | None:
 
 def _limits(joint: Element, kind: str) -> Limits:
     """The joint's limits; position limits only where the file gives one, as URDF's default, 0 to 0, would be a joint
-    that cannot move."""
+    that cannot move. A joint of several coordinates has none: a URDF does not say which of them it means."""
     element = only(joint, "limit")
     if element is None:
         return Limits()
@@ -282,6 +287,8 @@ def _limits(joint: Element, kind: str) -> Limits:
     )
     written = element.get("lower") is not None or element.get("upper") is not None
     lower, upper = (number(element, name, 0.0, limits.ANY) for name in ("lower", "upper"))
+    if kind in MOVABLE and not URDF_TYPES[kind].about_z:
+        return Limits()
     if kind == "continuous" or not written:
         return Limits(speed=speed, effort=effort, acceleration=acceleration)
     if lower > upper:

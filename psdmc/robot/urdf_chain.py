@@ -10,6 +10,8 @@ import numpy as np
 
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
+from psdmc.robot.joints import URDF_TYPES, JointType
+from psdmc.robot.limits import shown
 from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
@@ -26,11 +28,13 @@ from psdmc.robot.snap import (
 from psdmc.robot.tree import Route, find_route, listed
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import hold_against_pinocchio, merged_parameters, place_of
-from psdmc.robot.urdf_floating import ROUTE_TYPES, on_free_root
+from psdmc.robot.urdf_floating import on_free_root
 from psdmc.robot.urdf_frames import urdf_frames
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""
+
+ALONG_Z = (0.0, 0.0, 1.0)
 
 NO_LOCK: Mapping[str, float] = {}
 
@@ -76,6 +80,7 @@ def urdf_draft(
             *robot.notes,
             *route.notes,
             *(f"link '{link}' has no inertia: none assumed" for link in bare),
+            *_of_several_coordinates(route),
             *_unmodelled(route),
             *_faults(robot),
         ),
@@ -123,7 +128,7 @@ def _placed(route: Route, snap: float) -> _Placed:
         if not joint.is_movable:
             ways[joint.child] = _Way(outer.body, at, tuple(turned))
             continue
-        axis, angle = snap_axis(np.array(joint.axis), snap)
+        axis, angle = snap_axis(np.array(joint.axis if _kind(joint).follows_axis else ALONG_Z), snap)
         _record(turned, f"axis of joint '{joint.name}'", angle, n)
         link = Placement(link_rotation(axis), np.zeros(3))
         where = f"joint '{joint.name}', merged"
@@ -149,7 +154,11 @@ def _reach(route: Route) -> float:
 
 def movable_joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:
     """The joint with its child link, whose frame sits at `link` in the joint frame."""
-    return Joint(joint.name, joint.child, ROUTE_TYPES[joint.type], placement, link, joint.limits)
+    return Joint(joint.name, joint.child, _kind(joint), placement, link, joint.limits)
+
+
+def _kind(joint: UrdfJoint) -> JointType:
+    return URDF_TYPES[joint.type]
 
 
 def _base_rotation(route: Route, snap: float) -> tuple[Array, list[Snap]]:
@@ -182,6 +191,15 @@ def merged_placement(
 def _record(snaps: list[Snap], where: str, angle: float, segment: int) -> None:
     if angle > ROUNDING:
         snaps.append(Snap(where, angle, segment))
+
+
+def _of_several_coordinates(route: Route) -> list[str]:
+    """A note for each joint of several coordinates: what moves, and what its coordinates are."""
+    return [
+        f"link {shown(joint.child)} {_kind(joint).verb} by joint {shown(joint.name)}: {_kind(joint).coordinates}"
+        for joint in route.movable
+        if not _kind(joint).about_z
+    ]
 
 
 def _unmodelled(route: Route) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from psdmc.errors import InputError
-from psdmc.robot.joints import FREE, URDF_TYPES, JointType
+from psdmc.robot.joints import FREE
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Limits
 from psdmc.robot.urdf import Origin, UrdfJoint, UrdfRobot
@@ -15,9 +15,6 @@ ROOT_JOINT = "root_joint"
 
 WORLD = "universe"
 """Pinocchio's name of what the free joint hangs on; more underscores follow where a link of the file is called so."""
-
-ROUTE_TYPES: dict[str, JointType] = {**URDF_TYPES, FREE.word: FREE}
-"""Types of joints that a robot is made of, by UrdfJoint.type: a file's, and that of the free root."""
 
 
 def on_free_root(robot: UrdfRobot, source: str) -> UrdfRobot:
@@ -35,7 +32,7 @@ def on_free_root(robot: UrdfRobot, source: str) -> UrdfRobot:
         world += "_"
     free = UrdfJoint(
         name=ROOT_JOINT,
-        type=FREE.word,
+        type=FREE.urdf_words[0],
         parent=world,
         child=robot.root,
         origin=Origin(),
@@ -44,12 +41,10 @@ def on_free_root(robot: UrdfRobot, source: str) -> UrdfRobot:
         mimic=None,
         has_dynamics=False,
     )
-    note = f"link {shown(robot.root)} moves freely by joint {shown(ROOT_JOINT)}: {FREE.coordinates}"
     return replace(
         robot,
         root=world,
         inertials={world: None, **robot.inertials},
         joints=(free, *robot.joints),
-        notes=(*robot.notes, note),
         free_root=ROOT_JOINT,
     )

@@ -54,7 +54,7 @@ ROBOTS = {
     "a mass that is no number": (urdf(BASE, link("arm", "nan"), SHOULDER), "'arm'"),
     "a negative mass": (urdf(BASE, link("arm", "-1"), SHOULDER), "'arm'"),
     "a joint that mimics itself": (urdf(BASE, ARM, link("tip"), SHOULDER, MIMIC), "'finger'"),
-    "a floating joint": (urdf(BASE, ARM, joint("loose", "base", "arm", "floating")), "'loose'"),
+    "a spherical joint": (urdf(BASE, ARM, joint("loose", "base", "arm", "spherical")), "'loose'"),
 }
 
 

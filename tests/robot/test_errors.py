@@ -169,15 +169,15 @@ def test_negative_and_missing_masses_all_at_once():
 def test_bad_joints_are_named_all_at_once():
     found = message(
         *(link(name) for name in ("base", "a", "b", "c", "d")),
-        joint("one", "base", "a", kind="floating"),
-        joint("two", "a", "b", kind="planar"),
+        joint("one", "base", "a", kind="spherical"),
+        joint("two", "a", "b", kind="screw"),
         joint("three", "b", "c", extra='<limit effort="1" velocity="1"/><mimic joint="two"/>'),
         joint("four", "c", "d", kind="hinge"),
     )
 
     assert found == (
-        "arm.urdf: joint 'one': type 'floating' is not supported; "
-        "joint 'two': type 'planar' is not supported; "
+        "arm.urdf: joint 'one': type 'spherical' is not supported; "
+        "joint 'two': type 'screw' is not supported; "
         "joint 'four': type 'hinge' is not supported"
     )
 

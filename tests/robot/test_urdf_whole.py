@@ -150,7 +150,7 @@ def test_a_turn_that_two_joints_lie_beyond_is_snapped_for_both_and_said_once() -
         ),
         ((joint("a", "base", "one", extra='<mimic joint="c"/>'),), "mimics 'c', which is no movable joint"),
         ((joint("a", "base", "one", extra='<mimic multiplier="x" joint="a"/>'),), "multiplier='x'"),
-        ((joint("a", "base", "one", kind="floating"),), "joint 'a': type 'floating' is not supported"),
+        ((joint("a", "base", "one", kind="ball"),), "joint 'a': type 'ball' is not supported"),
         ((joint("a", "base", "one", kind="fixed"),), "no movable joint below link 'base'"),
     ],
 )

@@ -31,7 +31,9 @@ JOINT_TYPES: dict[str, JointType] = {kind.word: kind for kind in (REVOLUTE, PRIS
 WIDE_TYPES: dict[str, JointType] = {kind.word: kind for kind in (FREE, SPHERICAL, PLANAR, TRANSLATION)}
 """Of several coordinates, by their word in model files."""
 
-URDF_TYPES: dict[str, JointType] = {word: kind for kind in JOINT_TYPES.values() for word in kind.urdf_words}
+URDF_TYPES: dict[str, JointType] = {
+    word: kind for kind in (JOINT_TYPES | WIDE_TYPES).values() for word in kind.urdf_words
+}
 """By the type of a URDF's <joint>."""
 
 

@@ -23,7 +23,7 @@ class Free(WideJoint):
     __slots__ = ()
 
     word: ClassVar[str] = "free"
-    urdf_words: ClassVar[tuple[str, ...]] = ()
+    urdf_words: ClassVar[tuple[str, ...]] = ("floating",)
     nq: ClassVar[int] = 7
     nv: ClassVar[int] = 6
     coordinates: ClassVar[str] = (

@@ -45,6 +45,8 @@ class JointType:
 
     word           in robot files, model files and tables
     urdf_words     types of a URDF's <joint> that move so
+    follows_axis   whether its frame's z is along a URDF's <axis>; else its frame is the child link's
+    only_axis      the only direction that a URDF's <axis> may have, in the child link; None: any
     nq, nv         numbers of coordinates and of rates
     coordinates    what q and its rates are, in words, where there are several
     neutral        nq coordinates at which the frame has not moved
@@ -65,6 +67,8 @@ class JointType:
 
     word: ClassVar[str]
     urdf_words: ClassVar[tuple[str, ...]]
+    follows_axis: ClassVar[bool] = True
+    only_axis: ClassVar[tuple[float, float, float] | None] = None
     nq: ClassVar[int] = 1
     nv: ClassVar[int] = 1
     coordinates: ClassVar[str] = ""

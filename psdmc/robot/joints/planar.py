@@ -23,7 +23,8 @@ class Planar(WideJoint):
     __slots__ = ()
 
     word: ClassVar[str] = "planar"
-    urdf_words: ClassVar[tuple[str, ...]] = ()
+    urdf_words: ClassVar[tuple[str, ...]] = ("planar",)
+    only_axis: ClassVar[tuple[float, float, float] | None] = (0.0, 0.0, 1.0)
     nq: ClassVar[int] = 4
     nv: ClassVar[int] = 3
     coordinates: ClassVar[str] = (

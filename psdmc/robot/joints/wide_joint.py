@@ -14,6 +14,7 @@ class WideJoint(JointType):
     __slots__ = ()
 
     about_z: ClassVar[bool] = False
+    follows_axis: ClassVar[bool] = False
     basis: ClassVar[Basis] = NO_BASIS
     length_order: ClassVar[int] = 1
     position_unit: ClassVar[str] = "m"

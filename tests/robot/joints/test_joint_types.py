@@ -92,9 +92,11 @@ def test_a_urdf_joint_moves_as_pinocchio_reads_it(word: str) -> None:
     )
     model = pin.buildModelFromXML(text)
     data = model.createData()
-    q = np.array([np.cos(0.7), np.sin(0.7)]) if model.nq == 2 else np.array([0.7])
+    kind = URDF_TYPES[word]
+    own = kind.normalized(np.linspace(0.7, -0.4, kind.nq)) if kind.nq > 1 else np.array([0.7])
+    q = np.array([np.cos(0.7), np.sin(0.7)]) if model.nq == 2 else own
     pin.forwardKinematics(model, data, q)
-    np.testing.assert_allclose(matrix(URDF_TYPES[word], 0.7), data.oMi[1].homogeneous, atol=1e-15)
+    np.testing.assert_allclose(matrix(kind, own if kind.nq > 1 else 0.7), data.oMi[1].homogeneous, atol=1e-15)
 
 
 def basis_values(joint: JointType, q: np.ndarray, count: int | None = None) -> np.ndarray:
