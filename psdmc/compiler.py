@@ -124,8 +124,9 @@ def emit_c(
     """Write the model's C package; returns the paths of the files that changed.
 
     lowering   which arithmetic: "auto" takes the cheaper per function
-    functions  names of functions to generate; None: psdmc.functions.DEFAULT. InputError where theta_b is known and the
-               mass matrix is not positive definite within the joint limits, unless forward_dynamics is left out
+    functions  names of functions to generate; None: psdmc.functions.default_of the robot. InputError where theta_b is
+               known and the mass matrix is not positive definite within the joint limits, unless forward_dynamics is left
+               out
     real       precision of the package, "float64" or "float32"; None: the target's
     trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"; None: the
                target's
@@ -178,7 +179,7 @@ def compile(
         progress("compiling")
         return package
 
-    parts = (model.content_hash, lowering, options.real, options.trig, *wanted(functions))
+    parts = (model.content_hash, lowering, options.real, options.trig, *wanted(functions, model.mechanism))
 
     def more(function: str) -> CompiledRobot:
         return compile(model, lowering, [function], real, trig, progress, target)
@@ -196,7 +197,7 @@ def _package(
     payload: bool = False,
     adapters: Sequence[str] = (),
 ) -> PackageView:
-    names = wanted(with_needed(wanted(functions), adapters))
+    names = wanted(with_needed(wanted(functions, model.mechanism), adapters), model.mechanism)
     require(model, names)
     costs = options.target.costs
     kernels = lowered_once(

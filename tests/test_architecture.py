@@ -24,7 +24,7 @@ MAY_IMPORT = {
     "verification": {"robot", "dynamics", "model", "program", "recipes", "functions"},
     "lower": {"robot", "dynamics", "model", "program", "recipes", "functions", "target"},
     "emit": {"robot", "program", "model", "recipes", "functions", "target"},
-    "toolchain": {"emit", "program", "functions", "target"},
+    "toolchain": {"robot", "emit", "program", "functions", "target"},
 }
 LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {

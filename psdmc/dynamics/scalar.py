@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
+from psdmc.robot.joints.scalars import sincos as sincos
 
 Scalar = Any
 """A float, an array of states, or an object with arithmetic and `sincos()`."""
@@ -24,14 +24,6 @@ Terms = tuple[tuple[int, float], ...]
 
 Fixed = tuple[Terms, Terms, Terms]
 """A constant 3 x 3 matrix row by row: in most of a robot's rotations all but three entries are zero."""
-
-
-def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
-    """(sin, cos) of an angle in rad; symbols have a method for it."""
-    if hasattr(angle, "sincos"):
-        sine, cosine = angle.sincos()
-        return sine, cosine
-    return np.sin(angle), np.cos(angle)
 
 
 def add(a: Vector, b: Vector) -> Vector:

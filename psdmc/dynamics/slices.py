@@ -14,30 +14,30 @@ from psdmc.dynamics.scalar import Scalar
 
 def positions(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
     """Joint by joint its coordinate, or the tuple of them where there are several."""
-    return _dealt([frame.joint.nq for frame in _leading(frames)], q)
+    return _dealt([frame.joint.nq for frame in leading(frames)], q)
 
 
 def rates(frames: Sequence[Frame], qd: Sequence[Scalar]) -> list[Scalar]:
     """Joint by joint its rate, or the tuple of them where it has several."""
-    return _dealt([frame.joint.nv for frame in _leading(frames)], qd)
+    return _dealt([frame.joint.nv for frame in leading(frames)], qd)
 
 
 def first_rates(frames: Sequence[Frame]) -> tuple[int, ...]:
     """Where each joint's rates start, and behind the last their number."""
     found = [0]
-    for frame in _leading(frames):
+    for frame in leading(frames):
         found.append(found[-1] + frame.joint.nv)
     return tuple(found)
 
 
 def neutral(frames: Sequence[Frame]) -> list[Scalar]:
     """q at which no frame has moved."""
-    return [value for frame in _leading(frames) for value in frame.joint.neutral]
+    return [value for frame in leading(frames) for value in frame.joint.neutral]
 
 
 def normalized(frames: Sequence[Frame], q: NDArray[Any]) -> NDArray[Any]:
     """(nq, ...) the nearest coordinates that the joints can have: quaternions of length one and so on."""
-    own = _leading(frames)
+    own = leading(frames)
     ends = np.cumsum([frame.joint.nq for frame in own])[:-1]
     return np.concatenate([f.joint.normalized(part) for f, part in zip(own, np.split(q, ends), strict=True)])
 
@@ -47,7 +47,7 @@ def flat(values: Iterable[Sequence[Scalar]]) -> list[Scalar]:
     return [x for own in values for x in own]
 
 
-def _leading(frames: Sequence[Frame]) -> list[Frame]:
+def leading(frames: Sequence[Frame]) -> list[Frame]:
     """Those whose joints have coordinates of their own; algorithms see no others (following.py)."""
     return [frame for frame in frames if frame.follows is None]
 

@@ -14,7 +14,7 @@ from psdmc.emit.store_groups import GROUP, StoreGroups
 from psdmc.program.products import Product
 from psdmc.program.program import Op, Program, Slot
 
-_ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG})
+_ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SQRT})
 
 
 def spread(text: str, uniform: bool) -> str:
@@ -106,11 +106,13 @@ class Body:
 
     unused    vectors of the signature that the PROGRAM never reads
     products  done behind everything else
+    has_roots whether square roots are taken
     """
 
     sections: tuple[Section, ...]
     unused: tuple[str, ...]
     products: tuple[Multiplication, ...] = ()
+    has_roots: bool = False
 
 
 def make_body(
@@ -140,7 +142,8 @@ def make_body(
     )
     sections = writer.sections(sizes)
     read = {slot.vector for slot in program.inputs()}
-    return Body(sections, tuple(name for name in inputs if name not in read), multiplied)
+    unused = tuple(name for name in inputs if name not in read)
+    return Body(sections, unused, multiplied, any(instr.op is Op.SQRT for instr in program))
 
 
 class _Writer:
@@ -264,7 +267,10 @@ class _Writer:
 
     def _operation(self, i: int) -> Expr:
         instr = self.program.body[i]
-        return combine(instr.op, [self._value(a) for a in instr.args])
+        operands = [self._value(a) for a in instr.args]
+        if instr.op is Op.SQRT:
+            return Expr(f"SQRT({spread(operands[0].text, self.names.uniform[instr.args[0]])})")
+        return combine(instr.op, operands)
 
 
 def _load_name(slot: Slot) -> str:

@@ -62,7 +62,7 @@ def _is_uniform(instr: Instr, known: list[bool]) -> bool:
     op, args, slot, _ = instr
     if slot is not None:
         return slot.vector in UNIFORM_VECTORS
-    if op is Op.SIN or op is Op.COS:
+    if op is Op.SIN or op is Op.COS or op is Op.SQRT:
         return False
     return all(known[a] for a in args)
 
@@ -71,7 +71,7 @@ def _cut_deep_trees(program: Program, named: list[bool]) -> None:
     """Also name the values at which an expression would nest deeper than DEEPEST."""
     depth = [0] * len(program)
     for i, (op, args, _, _) in enumerate(program):
-        if not args or op is Op.SIN or op is Op.COS:
+        if not args or op is Op.SIN or op is Op.COS or op is Op.SQRT:
             continue
         for a in args:
             if depth[a] == DEEPEST:

@@ -14,6 +14,7 @@ from psdmc.model.equations import BaseParameter
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.unit_lengths import units_of
 from psdmc.version import psdmc_version
 
 
@@ -55,6 +56,7 @@ class PackageInfo:
     frames      names of the named frames, untrusted text; empty: the tip alone
     payload     (l, 10) maps of a load to the change of theta_b, at the tip and, where there are others, at each named
                 frame; empty where the package has no function for loads
+    units       parts of q, from an entry to before another, whose length must be one
     followers   sentences about joints that follow others, untrusted text: they are not among `joints`
     """
 
@@ -70,6 +72,7 @@ class PackageInfo:
     frames: tuple[str, ...] = ()
     payload: tuple[NDArray[np.float64], ...] = ()
     followers: tuple[str, ...] = ()
+    units: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
         if not self.joints:
@@ -154,6 +157,7 @@ def package_info(
         frames=tuple(frame.name for frame in chain.frames),
         payload=_load_maps(model) if payload else (),
         followers=tuple(_followers(chain)),
+        units=units_of(chain.joints[i].type for i in chain.own_joints),
     )
 
 

@@ -270,6 +270,7 @@ TAKEN = {
         "NAME",
         "SPLAT",
         "SINCOS",
+        "SQRT",
         "LANES",
         "WIDTH",
         "real",

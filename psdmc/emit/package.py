@@ -223,6 +223,12 @@ class PackageView:
         return tuple(sorted({p.shape for function in self.functions for p in function.products}))
 
     @property
+    def has_roots(self) -> bool:
+        """Whether some kernel takes square roots."""
+        bodies = (body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body))
+        return any(body.has_roots for body in bodies)
+
+    @property
     def has_several_outputs(self) -> bool:
         return any(len(kernel.outputs) > 1 for kernel in self.kernels)
 
@@ -324,6 +330,8 @@ def library_files(package: PackageView) -> dict[str, str]:
     }
     if package.products:
         named["src/products.h"] = "products.h.jinja"
+    if package.has_roots:
+        named["src/roots.h"] = "roots.h.jinja"
     files = {path: render(template, package=package) for path, template in named.items()}
     for function in package.functions:
         files[f"src/{function.name}.c"] = render(_template(function), package=package, function=function)

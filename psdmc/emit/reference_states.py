@@ -100,7 +100,7 @@ def _drawn(model: DynamicsModel) -> dict[str, Array]:
     sizes = Sizes(model.n, model.nq, model.nv, model.l, len(robot.frames))
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
     drawn = {q.name: q.largest * rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q))) for q in read.values()}
-    return drawn | {Q.name: on_joints(robot, drawn[Q.name])}
+    return drawn | {q.name: on_joints(robot, drawn[q.name]) for q in read.values() if q.axes == Q.axes}
 
 
 def _values(

@@ -8,6 +8,7 @@ from pkgutil import iter_modules
 from psdmc.errors import InternalError
 from psdmc.program.signature import in_order
 from psdmc.recipes.recipe import Recipe
+from psdmc.robot.mechanism import Mechanism
 
 
 def _recipe(file: str) -> Recipe:
@@ -26,3 +27,13 @@ RECIPES = {name: _FOUND[name] for name in SIGNATURES}
 
 DEFAULT = tuple(name for name, recipe in RECIPES.items() if recipe.default)
 """Names of the functions that are generated where none are named."""
+
+DEFAULT_WHERE_WIDE = tuple(
+    name for name, recipe in RECIPES.items() if recipe.default or recipe.default_where_wide
+)
+"""Likewise, of robots some of whose joints have several coordinates."""
+
+
+def default_of(robot: Mechanism) -> tuple[str, ...]:
+    """Names of the functions that are generated for a robot where none are named."""
+    return DEFAULT if all(joint.type.about_z for joint in robot.joints) else DEFAULT_WHERE_WIDE

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cache
 
 from psdmc.errors import InputError
-from psdmc.functions import DEFAULT, RECIPES
+from psdmc.functions import RECIPES, default_of
 from psdmc.lower.kernels import refuse_wide, wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix
@@ -22,7 +22,7 @@ REMEDY = {
 
 def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
     """InputError where a wanted function (None: the default ones) needs what the model has not."""
-    names = wanted(functions)
+    names = wanted(functions, model.mechanism)
     refuse_wide(model, names)
     lacking = _lacking(model, names)
     for name, reason in lacking.items():
@@ -36,8 +36,9 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names of all default functions that the model can have, and a sentence for each restriction."""
-    lacking = _lacking(model, DEFAULT)
-    names = tuple(name for name in DEFAULT if name not in lacking)
+    default = default_of(model.mechanism)
+    lacking = _lacking(model, default)
+    names = tuple(name for name in default if name not in lacking)
     left_out = (f"{name} is left out: {reason}" for name, reason in lacking.items())
     return names, (*left_out, *run_time_only(model, names))
 
@@ -45,7 +46,7 @@ def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
     """Sentences that name those of `functions` (None: the default ones) that only take theta_b at run time, because the
     model's is unknown. Empty where it is known or no function needs it."""
-    names = [name for name in wanted(functions) if RECIPES[name].signature.theta]
+    names = [name for name in wanted(functions, model.mechanism) if RECIPES[name].signature.theta]
     if model.theta_b is not None or not names:
         return ()
     return (f"the base parameters are unknown: {', '.join(names)} take them at run time only, as NAME_theta",)

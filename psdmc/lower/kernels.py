@@ -7,7 +7,7 @@ from typing import Literal
 
 from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.errors import InputError
-from psdmc.functions import DEFAULT, RECIPES
+from psdmc.functions import DEFAULT, RECIPES, default_of
 from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
@@ -21,6 +21,7 @@ from psdmc.program.program import Program
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Mechanism
 from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS
 
@@ -45,10 +46,10 @@ def lower(
     Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
     require_derivable(model.mechanism)
-    refuse_wide(model, wanted(functions))
+    refuse_wide(model, wanted(functions, model.mechanism))
     lowered = _Lowered(model, lowering, costs)
     kernels: dict[str, Kernel] = {}
-    for recipe in map(RECIPES.__getitem__, wanted(functions)):
+    for recipe in map(RECIPES.__getitem__, wanted(functions, model.mechanism)):
         takes_theta = recipe.signature.theta
         for theta in (False, True) if takes_theta and theta_variants else (False,):
             if not theta and model.theta_b is None and takes_theta:
@@ -76,12 +77,13 @@ def refuse_wide(model: DynamicsModel, names: Sequence[str]) -> None:
     )
 
 
-def wanted(functions: Sequence[str] | None) -> tuple[str, ...]:
-    """The names in the order of psdmc.functions; None and the word 'default': the default ones, 'all': all of them.
-    What a function calls comes along. InputError for one that is unknown."""
+def wanted(functions: Sequence[str] | None, robot: Mechanism | None = None) -> tuple[str, ...]:
+    """The names in the order of psdmc.functions; None and the word 'default': the default ones, of this robot where one is
+    given; 'all': all of them. What a function calls comes along. InputError for one that is unknown."""
+    default = DEFAULT if robot is None else default_of(robot)
     if functions is None:
-        return DEFAULT
-    groups = {"default": DEFAULT, "all": tuple(RECIPES)}
+        return default
+    groups = {"default": default, "all": tuple(RECIPES)}
     names = [name for word in functions for name in groups.get(word, (word,))]
     unknown = [name for name in names if name not in RECIPES]
     if unknown:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.model.expansion import Expansion, RowBlocks
 from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.unit_lengths import refuse_other_lengths, units_of
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -35,6 +36,9 @@ def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], lis
                 f"{name} has shape {array.shape}, expected (..., {n}) for {len(chain)} joints",
                 "the last axis runs over " + ", ".join(chain.joint_names),
             )
+    if "q" in arrays:
+        units = units_of(chain.joints[i].type for i in chain.own_joints)
+        refuse_other_lengths("q", arrays["q"], units)
     try:
         shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
     except ValueError as error:

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from psdmc.program.program import Op, Program
 
 _ADD, _SUB, _MUL, _DIV, _NEG, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SIN, Op.COS
+_SQRT = Op.SQRT
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
     """Operation counts. `add` includes subtractions; negations are free in most places and are counted apart.
 
+    div     divisions and square roots: both keep one unit of the processor busy for about as long
     fused   multiplications that a fused multiply-add can absorb: used once, by an addition or subtraction, each of which
             absorbs one
     sincos  distinct angles whose sine or cosine is taken
@@ -46,7 +48,7 @@ def cost(program: Program) -> Cost:
             add += 1
             a, b = args
             fused += (uses[a] == 1 and body[a][0] is _MUL) or (uses[b] == 1 and body[b][0] is _MUL)
-        elif op is _DIV:
+        elif op is _DIV or op is _SQRT:
             div += 1
         elif op is _NEG:
             neg += 1

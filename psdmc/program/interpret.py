@@ -19,6 +19,7 @@ _FUNCTIONS: dict[Op, Callable[..., Array]] = {
     Op.NEG: np.negative,
     Op.SIN: np.sin,
     Op.COS: np.cos,
+    Op.SQRT: np.sqrt,
 }
 
 

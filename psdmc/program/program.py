@@ -18,6 +18,7 @@ class Op(StrEnum):
     NEG = "neg"
     SIN = "sin"
     COS = "cos"
+    SQRT = "sqrt"
 
 
 ARITY = {
@@ -30,6 +31,7 @@ ARITY = {
     Op.NEG: 1,
     Op.SIN: 1,
     Op.COS: 1,
+    Op.SQRT: 1,
 }
 COMMUTATIVE = frozenset({Op.ADD, Op.MUL})
 

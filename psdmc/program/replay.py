@@ -43,6 +43,8 @@ def _value(instr: Instr, values: Sequence[Value]) -> Value:
         return _sincos(a)[0 if instr.op is Op.SIN else 1]
     if instr.op is Op.NEG:
         return -a
+    if instr.op is Op.SQRT:
+        return a.root() if isinstance(a, Symbol) else math.sqrt(a)
     b = values[instr.args[1]]
     if instr.op is Op.ADD:
         return a + b

@@ -90,6 +90,7 @@ class Signature:
     positive  computed beside the outputs and not put out: where an entry is not above zero the function fails, its outputs
               are NaN and it returns which; None: it cannot fail
     products  how outputs that a trace does not give follow from what it gives
+    normalizes  whether quaternions that it reads may have any length but zero
     calls     name of a function of states that its C calls stage by stage, instead of a body of its own
     """
 
@@ -102,13 +103,14 @@ class Signature:
     positive: Positive | None = None
     products: tuple[Product, ...] = ()
     calls: str | None = None
+    normalizes: bool = False
 
     def __post_init__(self) -> None:
         names = [q.name for q in (*self.inputs, *self.stored)] + [product.right for product in self.products]
         if len(set(names)) != len(names):
             raise ValueError(f"{self.name}: a name stands for two of {', '.join(names)}")
-        if not self.inputs or not self.outputs:
-            raise ValueError(f"{self.name}: a function has inputs and outputs")
+        if not self.outputs:
+            raise ValueError(f"{self.name}: a function has outputs")
 
     @property
     def stored(self) -> tuple[Quantity, ...]:

@@ -98,6 +98,8 @@ class _Sources:
             yield from ((a, reciprocal), (b, -(self._value(index) * reciprocal)))
         elif op is Op.NEG:
             yield a, -1.0
+        elif op is Op.SQRT:
+            yield a, 0.5 / self._value(index)
         elif op is Op.SIN:
             yield a, self._value(a).sincos()[1]
         elif op is Op.COS:

@@ -10,6 +10,7 @@ which become instructions only in `finish`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,7 +23,7 @@ Step = tuple[Op, Any, Any]
 """An instruction while it is recorded: its operation and two arguments; of a load the slot, of a constant the value."""
 
 _ADD, _SUB, _MUL, _DIV, _NEG, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SIN, Op.COS
-_LOAD, _CONST = Op.LOAD, Op.CONST
+_LOAD, _CONST, _SQRT = Op.LOAD, Op.CONST, Op.SQRT
 
 
 Outputs = Sequence[tuple[Slot, "Symbol | Number"]]
@@ -101,6 +102,8 @@ class Tracer:
             if b is None:
                 if op is _NEG:
                     neg += 1
+                elif op is _SQRT:
+                    div += 1
                 else:
                     angles.add(a)
                 continue
@@ -202,6 +205,14 @@ class Symbol:
         sine = self.tracer.record((_SIN, self.index, None))
         cosine = self.tracer.record((_COS, self.index, None))
         return Symbol(self.tracer, sine, self.negative), Symbol(self.tracer, cosine)
+
+    def root(self) -> Symbol:
+        """The square root; of a constant a constant."""
+        known = self.constant_value()
+        if known is not None:
+            return self.tracer.constant(math.sqrt(known))
+        index = self.tracer.record((_NEG, self.index, None)) if self.negative else self.index
+        return Symbol(self.tracer, self.tracer.record((_SQRT, index, None)))
 
     @property
     def slot(self) -> Slot | None:

@@ -126,7 +126,8 @@ class Recipe:
     needs        what the model must have; left out: a positive definite mass matrix where the signature has `positive`
     of_axes      whether it is of robots whose joints have one coordinate each: it differentiates by q, or adds rates to it
     accelerates  whether its accelerations come by the cheaper of two ways (Choices.articulated)
-    default      whether it is generated where no functions are named
+    default      whether it is generated where no functions are named, and
+    default_where_wide  whether it is then where some joint has several coordinates
     benched      whether `make bench` measures it
     """
 
@@ -147,6 +148,7 @@ class Recipe:
     of_axes: bool = False
     accelerates: bool = False
     default: bool = False
+    default_where_wide: bool = False
     benched: bool = False
 
     def __post_init__(self) -> None:

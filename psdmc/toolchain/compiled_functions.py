@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
-from psdmc.program.signature import Quantity, Signature
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.robot.unit_lengths import refuse_other_lengths
 from psdmc.toolchain.interface import Interface, batch_symbol
 from psdmc.toolchain.stubs import result_name
 
@@ -37,6 +38,7 @@ class CompiledFunctions:
         self._library = _opened(self._ffi, library, interface.robot)
         self._robot = interface.robot
         self._sizes = interface.sizes
+        self._units = interface.units
         self._dtype = np.dtype(interface.dtype)
         self._pointer = self._ffi.typeof(f"{interface.real} *")
         self._kernels = {name: _bound(interface, self._library, name) for name in interface.kernels}
@@ -51,6 +53,8 @@ class CompiledFunctions:
         name = function.name
         kernel = self._kernel(name if theta_b is None else f"{name}_theta")
         arrays = [self._states(name, q, x) for q, x in zip(function.inputs, inputs, strict=True)]
+        if self._units and not function.normalizes:
+            self._refuse_other_lengths(function, arrays)
         lead, rows = self._rows(function, arrays)
         if theta_b is not None:
             rows.append(self._parameters(name, theta_b))
@@ -81,6 +85,12 @@ class CompiledFunctions:
             )
         return array
 
+    def _refuse_other_lengths(self, function: Signature, arrays: Sequence[Array]) -> None:
+        """InputError where a quaternion, or a cosine with its sine, is not of length one."""
+        for quantity, array in zip(function.inputs, arrays, strict=True):
+            if quantity.axes == Q.axes:
+                refuse_other_lengths(f"{function.name}: {quantity.name}", array, self._units)
+
     def _hint(self, quantity: Quantity) -> str:
         if "frames" in quantity.axes:
             return f"the frames are {', '.join(self.frame_names)}"
@@ -91,7 +101,7 @@ class CompiledFunctions:
         leads = [
             array.shape[: array.ndim - len(q.axes)] for q, array in zip(function.inputs, arrays, strict=True)
         ]
-        lead = leads[0]
+        lead = leads[0] if leads else ()
         if any(other != lead for other in leads):
             lead = self._common_lead(function, arrays, leads)
             tails = [array.shape[len(own) :] for own, array in zip(leads, arrays, strict=True)]

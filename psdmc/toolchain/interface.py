@@ -16,7 +16,7 @@ from psdmc.emit.package import PackageView
 from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 
-FORMAT = 3
+FORMAT = 4
 """Version of the text's form."""
 
 
@@ -30,6 +30,7 @@ class Interface:
     nq, nv       lengths of q, and of rates and torques
     joint_names  n, from base to tip
     frame_names  the named frames
+    units        parts of q, from an entry to before another, whose length must be one
     kernels      name -> trailing axes of each of its results
     cdef         C declarations of the functions that are called
     """
@@ -43,6 +44,7 @@ class Interface:
     nv: int
     joint_names: tuple[str, ...]
     frame_names: tuple[str, ...]
+    units: tuple[tuple[int, int], ...]
     kernels: Mapping[str, tuple[tuple[int, ...], ...]]
     cdef: str
 
@@ -64,6 +66,7 @@ def interface_of(package: PackageView) -> Interface:
         nv=package.info.nv,
         joint_names=tuple(joint.name for joint in package.info.joints),
         frame_names=package.info.frames,
+        units=package.info.units,
         kernels={kernel.name: tuple(output.shape for output in kernel.outputs) for kernel in package.kernels},
         cdef="".join(
             f"{prototype.text};\n"
@@ -97,5 +100,6 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
 
 def _from_plain(plain: dict[str, Any]) -> Interface:
     joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
+    units = tuple((int(start), int(stop)) for start, stop in plain.pop("units"))
     kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
-    return Interface(joint_names=joints, frame_names=frames, kernels=kernels, **plain)
+    return Interface(joint_names=joints, frame_names=frames, units=units, kernels=kernels, **plain)

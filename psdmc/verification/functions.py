@@ -60,9 +60,16 @@ def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvabl
         return lack_of_standard_parameters(model)
     if recipe.needs is Needs.POSITIVE_MASS and not solvable:
         return "the mass matrix is singular"
+    if robot.follows and _is_of_positions(recipe):
+        return "Pinocchio's positions are of every joint, followers included"
     if recipe.needs is Needs.POSITIVE_MASS and robot.follows:
         return "Pinocchio solves no robots with mimic joints"
     return None
+
+
+def _is_of_positions(recipe: Recipe) -> bool:
+    """Whether it goes from positions to positions, or to the way between them."""
+    return not recipe.signature.theta and all(q.axes in (("nq",), ("nv",)) for q in recipe.signature.outputs)
 
 
 def _states(model: DynamicsModel, robot: OnCoordinates) -> dict[str, Array]:
@@ -75,7 +82,7 @@ def _states(model: DynamicsModel, robot: OnCoordinates) -> dict[str, Array]:
     given = {
         q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()
     }
-    given["q"] = on_joints(model.mechanism, given["q"])
+    given |= {q.name: on_joints(model.mechanism, given[q.name]) for q in read.values() if q.axes == Q.axes}
     return given | {TAU.name: robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
 
 

@@ -135,3 +135,19 @@ def test_numpys_numbers_keep_their_sign_in_sums_and_products(number):
     found = interpret(program, {"q": np.array([3.0])}, {"tau": len(values)})["tau"]
     x = float(number)
     assert found == pytest.approx([3 + x, 3 - x, x - 3, -3 - x, 3 * x, 3 / x])
+
+
+def test_roots_are_recorded_and_folded():
+    program = drop_unused(traced(lambda a, b: (a * a + b * b).root(), lambda a, b: (a * 0.0 + 4.0) * b))
+    assert "sqrt" in show(program)
+    found = interpret(program, {"q": np.array([3.0, 4.0])}, {"tau": 2})["tau"]
+    np.testing.assert_array_equal(found, [5.0, 16.0])
+    assert cost(program).div == 1
+    tracer = Tracer()
+    assert tracer.constant(9.0).root().constant_value() == 3.0
+
+
+def test_the_root_of_what_is_minus_another_value_is_of_that():
+    program = traced(lambda a, b: (b - a).root(), lambda a, b: (a - b) * 2.0)
+    found = interpret(program, {"q": np.array([1.0, 10.0])}, {"tau": 2})["tau"]
+    np.testing.assert_array_equal(found, [3.0, -18.0])

@@ -15,6 +15,7 @@ _FUNCTIONS: dict[Op, Callable[..., float]] = {
     Op.NEG: lambda a: -a,
     Op.SIN: math.sin,
     Op.COS: math.cos,
+    Op.SQRT: math.sqrt,
 }
 
 

@@ -23,6 +23,7 @@ def cycles(latency: Latency) -> dict[Op, int]:
         Op.SUB: latency.add,
         Op.MUL: latency.mul,
         Op.DIV: latency.div,
+        Op.SQRT: latency.div,
         Op.NEG: latency.neg,
         Op.SIN: latency.sincos,
         Op.COS: latency.sincos,

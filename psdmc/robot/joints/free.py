@@ -8,12 +8,18 @@ from typing import ClassVar
 import numpy as np
 
 from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
-from psdmc.robot.joints.quaternion import angles_between, of_length_one, rotation_of, turned_by
+from psdmc.robot.joints.quaternion import (
+    angles_between,
+    inverse,
+    of_length_one,
+    rates_of,
+    rotation_of,
+    turned_by,
+    unit,
+)
+from psdmc.robot.joints.scalars import TINY, sign
 from psdmc.robot.joints.wide_joint import WideJoint
 from psdmc.robot.placement import Array
-
-SMALL = 1e-2
-"""rad; below, the way that a turning frame goes comes from series, whose next term is below 1e-16."""
 
 
 class Free(WideJoint):
@@ -32,6 +38,7 @@ class Free(WideJoint):
         "; efforts: force (N) and moment (N m)"
     )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    unit: ClassVar[slice] = slice(3, 7)
     twists: ClassVar[tuple[Twist, ...]] = (*SLIDES, *TURNS)
     verb: ClassVar[str] = "moves freely"
     pinocchio: ClassVar[str] = "FreeFlyer"
@@ -46,46 +53,46 @@ class Free(WideJoint):
     def normalized(self, q: Array) -> Array:
         return np.concatenate([q[:3], of_length_one(q[3:])])
 
-    def integrated(self, q: Array, step: Array) -> Array:
-        moved = _rotated(q[..., 3:], _gone(step[..., :3], step[..., 3:]))
-        return np.concatenate([q[..., :3] + moved, turned_by(q[..., 3:], step[..., 3:])], axis=-1)
+    def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """With t the angle of w, the origin goes by v + (1 - cos t) / t^2 w x v + (t - sin t) / t^3 w x (w x v)."""
+        linear, angles, here = step[:3], step[3:], unit(q[3:])
+        turned, share, cosine = turned_by(here, angles)
+        across = _cross(angles, linear)
+        twice = _cross(angles, across)
+        first = 0.5 * share * share
+        second = (1.0 - share * cosine) / (_square(angles) + TINY)
+        gone = [v + (first * a + second * b) for v, a, b in zip(linear, across, twice, strict=True)]
+        moved = _inward(rotation_of(here), gone)
+        nearer = sign(cosine)  # of the two quaternions for one turn that to the one before, as Pinocchio's
+        return (*(p + way for p, way in zip(q[:3], moved, strict=True)), *(nearer * x for x in turned))
 
-    def difference(self, q: Array, other: Array) -> Array:
-        angles = angles_between(q[..., 3:], other[..., 3:])
-        back = q[..., 3:] * np.array([-1.0, -1.0, -1.0, 1.0])
-        return np.concatenate(
-            [_straight(_rotated(back, other[..., :3] - q[..., :3]), angles), angles], axis=-1
-        )
+    def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """With t the angle of w, the linear rates p - w x p / 2 + (1 - t/2 cot(t/2)) / t^2 w x (w x p) bring the origin to
+        p."""
+        angles, cotangent = angles_between(q[3:], other[3:])
+        apart = [there - here for here, there in zip(q[:3], other[:3], strict=True)]
+        moved = _inward(rotation_of(inverse(q[3:])), apart)
+        across = _cross(angles, moved)
+        twice = _cross(angles, across)
+        share = (1.0 - cotangent) / (_square(angles) + TINY)
+        linear = (p + (share * b - 0.5 * a) for p, a, b in zip(moved, across, twice, strict=True))
+        return (*linear, *angles)
 
-
-def _rotated(quaternion: Array, v: Array) -> Array:
-    rows = rotation_of(np.moveaxis(quaternion, -1, 0))  # type: ignore[arg-type]
-    return np.stack([(np.stack(row, axis=-1) * v).sum(axis=-1) for row in rows], axis=-1)
-
-
-def _gone(linear: Array, angles: Array) -> Array:
-    """Where a frame's origin comes that moves with constant rates of its own for one second, in the frame at the start:
-    v + (1 - cos t) / t^2 w x v + (t - sin t) / t^3 w x (w x v), t the angle of w."""
-    angle = np.linalg.norm(angles, axis=-1, keepdims=True)
-    wide = np.where(angle > SMALL, angle, 1.0)
-    square = angle**2
-    first = np.where(angle > SMALL, (1.0 - np.cos(wide)) / wide**2, 0.5 - square / 24.0 + square**2 / 720.0)
-    second = np.where(
-        angle > SMALL, (wide - np.sin(wide)) / wide**3, 1.0 / 6.0 - square / 120.0 + square**2 / 5040.0
-    )
-    across = np.cross(angles, linear)
-    return np.asarray(linear + first * across + second * np.cross(angles, across))
+    def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        return (*_inward(rotation_of(q[3:]), rates[:3]), *rates_of(q[3:], rates[3:]))
 
 
-def _straight(moved: Array, angles: Array) -> Array:
-    """The constant linear rates of a frame that comes to `moved` while it turns by `angles`; inverse of `_gone`:
-    p - w x p / 2 + (1 / t^2 - (1 + cos t) / (2 t sin t)) w x (w x p)."""
-    angle = np.linalg.norm(angles, axis=-1, keepdims=True)
-    wide = np.where(angle > SMALL, angle, 1.0)
-    tangent = (1.0 - wide / (2.0 * np.tan(0.5 * wide))) / wide**2
-    share = np.where(angle > SMALL, tangent, 1.0 / 12.0 + angle**2 / 720.0 + angle**4 / 30240.0)
-    across = np.cross(angles, moved)
-    return np.asarray(moved - 0.5 * across + share * np.cross(angles, across))
+def _square(v: Sequence[Scalar]) -> Scalar:
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+
+
+def _cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> Vector:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _inward(rows: Rows, v: Sequence[Scalar]) -> Vector:
+    x, y, z = (row[0] * v[0] + row[1] * v[1] + row[2] * v[2] for row in rows)
+    return (x, y, z)
 
 
 FREE = Free()

@@ -50,6 +50,7 @@ class JointType:
     nq, nv         numbers of coordinates and of rates
     coordinates    what q and its rates are, in words, where there are several
     neutral        nq coordinates at which the frame has not moved
+    unit           those of its coordinates whose length must be one: a quaternion's, or a cosine and a sine
     about_z        whether it is moved about and along z by one coordinate
     twists         nv of them, the motion subspace: the joint frame's velocity per unit rate, along its own axes
     basis          the factors in q that its transform is made of
@@ -73,6 +74,7 @@ class JointType:
     nv: ClassVar[int] = 1
     coordinates: ClassVar[str] = ""
     neutral: ClassVar[tuple[float, ...]] = (0.0,)
+    unit: ClassVar[slice] = slice(0, 0)
     about_z: ClassVar[bool] = True
     twists: ClassVar[tuple[Twist, ...]]
     basis: ClassVar[Basis]
@@ -121,13 +123,18 @@ class JointType:
         """(nq, ...) the coordinates nearest to q that are the joint's: quaternions of length one and so on."""
         return q
 
-    def integrated(self, q: Array, step: Array) -> Array:
-        """(..., nq) where a joint at q (..., nq) comes that moves at constant rates for one second by `step` (..., nv)."""
-        return q + step
+    def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """nq coordinates where a joint at q comes that moves at constant rates for one second by nv of `step`; what must be
+        of length one is made so."""
+        return tuple(here + way for here, way in zip(q, step, strict=True))
 
-    def difference(self, q: Array, other: Array) -> Array:
-        """(..., nv) the constant rates that bring a joint from q to `other`, (..., nq) each, in one second."""
-        return other - q
+    def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """The nv constant rates that bring a joint from q to `other` in one second, the short way round."""
+        return tuple(there - here for here, there in zip(q, other, strict=True))
+
+    def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """How the nq coordinates change per second at nv rates; linear in these."""
+        return tuple(rates)
 
     @property
     def hidden(self) -> int:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
-from psdmc.robot.joints.quaternion import of_length_one
+from psdmc.robot.joints.quaternion import arc, of_length_one, unit
+from psdmc.robot.joints.scalars import TINY, root, sign, sincos
 from psdmc.robot.joints.wide_joint import WideJoint
 from psdmc.robot.placement import Array
-
-SMALL = 1e-2
-"""rad; below, the way that a turning frame goes comes from series, whose next term is below 1e-16."""
 
 
 class Planar(WideJoint):
@@ -33,6 +32,7 @@ class Planar(WideJoint):
         "; efforts: force (N) and moment (N m)"
     )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 1.0, 0.0)
+    unit: ClassVar[slice] = slice(2, 4)
     twists: ClassVar[tuple[Twist, ...]] = (SLIDES[0], SLIDES[1], TURNS[2])
     verb: ClassVar[str] = "moves in a plane"
     pinocchio: ClassVar[str] = "Planar"
@@ -48,33 +48,41 @@ class Planar(WideJoint):
     def normalized(self, q: Array) -> Array:
         return np.concatenate([q[:2], of_length_one(q[2:])])
 
-    def integrated(self, q: Array, step: Array) -> Array:
-        (vx, vy, angle), (x, y, c, s) = np.moveaxis(step, -1, 0), np.moveaxis(q, -1, 0)
-        along, across = _shares(angle)
-        dx, dy = along * vx - across * vy, across * vx + along * vy
-        turned = of_length_one(
-            np.stack([c * np.cos(angle) - s * np.sin(angle), s * np.cos(angle) + c * np.sin(angle)])
-        )
-        return np.stack([x + c * dx - s * dy, y + s * dx + c * dy, *turned], axis=-1)
+    def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """The origin goes along the chord: sin(h)/h times the way, turned by half the angle, h."""
+        (x, y, *pair), (vx, vy, angle) = q, step
+        c, s = unit(pair)
+        half_s, half_c, share = _half(angle)
+        dx, dy = share * (half_c * vx - half_s * vy), share * (half_s * vx + half_c * vy)
+        turn_c, turn_s = half_c * half_c - half_s * half_s, 2.0 * half_s * half_c
+        cosine, sine = c * turn_c - s * turn_s, s * turn_c + c * turn_s
+        return (x + (c * dx - s * dy), y + (s * dx + c * dy), *unit((cosine, sine)))
 
-    def difference(self, q: Array, other: Array) -> Array:
-        (x, y, c, s), (x1, y1, c1, s1) = np.moveaxis(q, -1, 0), np.moveaxis(other, -1, 0)
-        angle = np.arctan2(c * s1 - s * c1, c * c1 + s * s1)
-        dx, dy = c * (x1 - x) + s * (y1 - y), c * (y1 - y) - s * (x1 - x)
-        along, across = _shares(angle)
-        square = along**2 + across**2
-        return np.stack(
-            [(along * dx + across * dy) / square, (along * dy - across * dx) / square, angle], axis=-1
-        )
+    def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        (x, y, c, s), (x1, y1, c1, s1) = q, other
+        angle = _angle(c * c1 + s * s1, c * s1 - s * c1)
+        half_s, half_c, share = _half(angle)
+        dx, dy = (c * (x1 - x) + s * (y1 - y)) / share, (c * (y1 - y) - s * (x1 - x)) / share
+        return (half_c * dx + half_s * dy, half_c * dy - half_s * dx, angle)
+
+    def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        (_, _, c, s), (vx, vy, w) = q, rates
+        return (c * vx - s * vy, s * vx + c * vy, -(s * w), c * w)
 
 
-def _shares(angle: Array) -> tuple[Array, Array]:
-    """sin t / t and (1 - cos t) / t"""
-    is_wide = np.abs(angle) > SMALL
-    wide, square = np.where(is_wide, angle, 1.0), angle**2
-    along = np.where(is_wide, np.sin(wide) / wide, 1.0 - square / 6.0 + square**2 / 120.0)
-    across = np.where(is_wide, (1.0 - np.cos(wide)) / wide, angle * (0.5 - square / 24.0 + square**2 / 720.0))
-    return along, across
+def _half(angle: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """sin(h), cos(h) and sin(h)/h of half the angle, h."""
+    half = 0.5 * angle
+    sine, cosine = sincos(half)
+    return sine, cosine, (sine * half + TINY) / (half * half + TINY)
+
+
+def _angle(cosine: Scalar, sine: Scalar) -> Scalar:
+    """rad, from -pi to pi. By the cosine's and the sine's sizes it is at most a quarter turn, which `arc` finds exactly."""
+    length = 1.0 / root(cosine * cosine + sine * sine)
+    ahead = sign(cosine)
+    near = ahead * length * sine * arc(sine * sine * length * length, ahead * length * cosine)
+    return near + (0.5 * math.pi) * (1.0 - ahead) * sign(sine)
 
 
 PLANAR = Planar()

@@ -1,20 +1,27 @@
-"""Unit quaternions (x, y, z, w) for joints that turn about every axis."""
+"""Unit quaternions (x, y, z, w) for joints that turn about every axis, over abstract scalars."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.robot.joints.joint_type import Rows, Scalar
+from psdmc.robot.joints.joint_type import Rows, Scalar, Vector
+from psdmc.robot.joints.scalars import TINY, root, sign, sincos
 from psdmc.robot.placement import Array
 
-SMALL = 1e-4
-"""rad; below, sines and cosines of half an angle come from the first terms of their series: the next is below 1e-17."""
+Quaternion = tuple[Scalar, Scalar, Scalar, Scalar]
+
+HALVINGS = 3
+"""Of the angle that a quaternion turns by: half of it, a quarter turn at most, becomes pi/16, whose sine is 0.195."""
+
+ARCSINE = tuple(math.comb(2 * k, k) / (4**k * (2 * k + 1)) for k in range(12))
+"""Series of asin(x)/x in x^2: beyond these terms less than 1e-18 for x <= 0.195."""
 
 
 def rotation_of(quaternion: Sequence[Scalar]) -> Rows:
-    """Rows of the rotation matrix, over abstract scalars; a rotation where the quaternion is of length one."""
+    """Rows of the rotation matrix; a rotation where the quaternion is of length one."""
     x, y, z, w = quaternion
     x2, y2, z2 = x + x, y + y, z + z
     xx, yy, zz, xy, xz, yz = x2 * x, y2 * y, z2 * z, y2 * x, z2 * x, z2 * y
@@ -26,33 +33,80 @@ def rotation_of(quaternion: Sequence[Scalar]) -> Rows:
     )
 
 
-def turned_by(quaternion: Array, angles: Array) -> Array:
-    """(..., 4) the quaternion (..., 4) after a turn about axes of its own frame by `angles` (..., 3) rad, of length one."""
-    half = 0.5 * np.linalg.norm(angles, axis=-1, keepdims=True)
-    wide = np.where(half > SMALL, half, 1.0)
-    share = np.where(half > SMALL, np.sin(wide) / wide, 1.0 - half**2 / 6.0)
-    step = np.concatenate([0.5 * share * angles, np.cos(half)], axis=-1)
-    moved = _product(quaternion, step)
-    return np.asarray(moved / np.linalg.norm(moved, axis=-1, keepdims=True))
+def turned_by(quaternion: Sequence[Scalar], angles: Sequence[Scalar]) -> tuple[Quaternion, Scalar, Scalar]:
+    """A unit quaternion after a turn about axes of its own frame by `angles` (rad, a rotation vector), of length one; and,
+    of half the angle h, sin(h)/h and cos(h)."""
+    half = root(0.25 * _square(angles) + TINY)
+    sine, cosine = sincos(half)
+    share = sine / half
+    x, y, z = (0.5 * share * angle for angle in angles)
+    moved = product(quaternion, (x, y, z, cosine))
+    i, j, k, w = unit(moved)
+    return (i, j, k, w), share, cosine
 
 
-def angles_between(quaternion: Array, other: Array) -> Array:
-    """(..., 3) rad: the turn about the first one's own axes that makes it the other, of half a turn at most."""
-    step = _product(quaternion * np.array([-1.0, -1.0, -1.0, 1.0]), other)
-    step = np.where(step[..., 3:] < 0.0, -step, step)
-    sine, cosine = np.linalg.norm(step[..., :3], axis=-1, keepdims=True), step[..., 3:]
-    wide = np.where(sine > SMALL, sine, 1.0)
-    share = np.where(
-        sine > SMALL, 2.0 * np.arctan2(wide, cosine) / wide, 2.0 / cosine * (1.0 - sine**2 / 3.0)
+def angles_between(quaternion: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Vector, Scalar]:
+    """rad: the turn about the first one's own axes that makes it the other, of half a turn at most; and h cot(h), of half
+    its angle h.
+
+    The angle is halved, by square roots of 1 + cos, until few terms of the arcsine are enough: exact near zero, where its
+    cosine says nothing, and near half a turn, where its sine does not.
+    """
+    x, y, z, w = product(inverse(quaternion), other)
+    shorter = sign(w) / root(x * x + y * y + z * z + w * w)
+    sine, cosine = (x * shorter, y * shorter, z * shorter), w * shorter
+    share = arc(_square(sine), cosine)
+    angles = (2.0 * share * sine[0], 2.0 * share * sine[1], 2.0 * share * sine[2])
+    return angles, share * cosine
+
+
+def arc(square: Scalar, cosine: Scalar) -> Scalar:
+    """h / sin(h), from sin(h)^2 and cos(h) >= 0."""
+    shrunk: Scalar = 1.0
+    for _ in range(HALVINGS):
+        cosine = root(0.5 + 0.5 * cosine)
+        shrunk = shrunk / (2.0 * cosine)
+    part = square * shrunk * shrunk
+    total: Scalar = ARCSINE[-1]
+    for term in reversed(ARCSINE[:-1]):
+        total = total * part + term
+    return 2.0**HALVINGS * shrunk * total
+
+
+def rates_of(quaternion: Sequence[Scalar], angular: Sequence[Scalar]) -> Quaternion:
+    """How the quaternion changes at an angular velocity along its own frame's axes."""
+    x, y, z = (0.5 * rate for rate in angular)
+    return product(quaternion, (x, y, z, 0.0))
+
+
+def product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Quaternion:
+    """First a, then b about the axes that a has turned."""
+    (x, y, z, w), (i, j, k, r) = a, b
+    return (
+        w * i + x * r + (y * k - z * j),
+        w * j + y * r + (z * i - x * k),
+        w * k + z * r + (x * j - y * i),
+        w * r - (x * i + y * j + z * k),
     )
-    return np.asarray(share * step[..., :3])
 
 
-def _product(a: Array, b: Array) -> Array:
-    u, v, s, t = a[..., :3], b[..., :3], a[..., 3:], b[..., 3:]
-    return np.concatenate(
-        [s * v + t * u + np.cross(u, v), s * t - (u * v).sum(axis=-1, keepdims=True)], axis=-1
-    )
+def inverse(quaternion: Sequence[Scalar]) -> Quaternion:
+    """Of a unit quaternion."""
+    x, y, z, w = quaternion
+    return (-x, -y, -z, w)
+
+
+def unit(values: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """The same, divided by its length."""
+    length = 1.0 / root(_square(values))
+    return tuple(value * length for value in values)
+
+
+def _square(values: Sequence[Scalar]) -> Scalar:
+    total = values[0] * values[0]
+    for value in values[1:]:
+        total = total + value * value
+    return total
 
 
 def of_length_one(q: Array) -> Array:

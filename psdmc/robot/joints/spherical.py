@@ -7,7 +7,14 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from psdmc.robot.joints.joint_type import TURNS, Rows, Scalar, Twist
-from psdmc.robot.joints.quaternion import angles_between, of_length_one, rotation_of, turned_by
+from psdmc.robot.joints.quaternion import (
+    angles_between,
+    of_length_one,
+    rates_of,
+    rotation_of,
+    turned_by,
+    unit,
+)
 from psdmc.robot.joints.wide_joint import WideJoint
 from psdmc.robot.placement import Array
 
@@ -27,6 +34,7 @@ class Spherical(WideJoint):
         "; efforts: moment (N m)"
     )
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 1.0)
+    unit: ClassVar[slice] = slice(0, 4)
     twists: ClassVar[tuple[Twist, ...]] = TURNS
     length_order: ClassVar[int] = 0
     position_unit: ClassVar[str] = "1"
@@ -42,11 +50,14 @@ class Spherical(WideJoint):
     def normalized(self, q: Array) -> Array:
         return of_length_one(q)
 
-    def integrated(self, q: Array, step: Array) -> Array:
-        return turned_by(q, step)
+    def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        return turned_by(unit(q), step)[0]
 
-    def difference(self, q: Array, other: Array) -> Array:
-        return angles_between(q, other)
+    def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        return angles_between(q, other)[0]
+
+    def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        return rates_of(q, rates)
 
 
 SPHERICAL = Spherical()

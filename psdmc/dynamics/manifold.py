@@ -1,0 +1,62 @@
+"""Where a robot comes from a position by its rates, and back: joint by joint, over abstract scalars.
+
+q ranges over a manifold where joints have several coordinates: a quaternion stays on its sphere. Tangents are rates, nv
+of them, along each moved frame's own axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.slices import leading
+from psdmc.robot.joints import JointType
+
+
+def integrated(frames: Sequence[Frame], q: Sequence[Scalar], step: Sequence[Scalar]) -> list[Scalar]:
+    """nq coordinates where constant rates lead from q in a second; `step` are nv of them."""
+    return [x for joint, here, way in _joints(frames, q, step) for x in joint.integrated(here, way)]
+
+
+def difference(frames: Sequence[Frame], q: Sequence[Scalar], other: Sequence[Scalar]) -> list[Scalar]:
+    """nv constant rates that lead from q to `other` in a second, the short way round."""
+    found: list[Scalar] = []
+    used = 0
+    for frame in leading(frames):
+        part = slice(used, used + frame.joint.nq)
+        found += frame.joint.difference(q[part], other[part])
+        used = part.stop
+    return found
+
+
+def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
+    """How the nq coordinates change per second at these nv rates."""
+    return [x for joint, here, own in _joints(frames, q, rates) for x in joint.coordinate_rates(here, own)]
+
+
+def pulled_back(frames: Sequence[Frame], q: Sequence[Scalar], gradient: Sequence[Scalar]) -> list[Scalar]:
+    """nv derivatives by the tangent at q of what has these nq derivatives by the coordinates."""
+    found: list[Scalar] = []
+    used = 0
+    for frame in leading(frames):
+        part, nv = slice(used, used + frame.joint.nq), frame.joint.nv
+        for k in range(nv):
+            moved = frame.joint.coordinate_rates(q[part], [1.0 if i == k else 0.0 for i in range(nv)])
+            total: Scalar = 0.0
+            for rate, own in zip(moved, gradient[part], strict=True):
+                total = total + rate * own
+            found.append(total)
+        used = part.stop
+    return found
+
+
+def _joints(
+    frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar]
+) -> Iterator[tuple[JointType, Sequence[Scalar], Sequence[Scalar]]]:
+    """Each joint that has coordinates of its own, with these and its rates."""
+    at, way = 0, 0
+    for frame in leading(frames):
+        joint = frame.joint
+        yield joint, q[at : at + joint.nq], rates[way : way + joint.nv]
+        at, way = at + joint.nq, way + joint.nv

@@ -1,0 +1,58 @@
+"""The constant rates that lead from one position to another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.manifold import difference
+from psdmc.program.signature import Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, columns
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+FROM, TO = Quantity("q0", ("nq",), np.pi), Quantity("q1", ("nq",), np.pi)
+WAY = Quantity("v", ("nv",))
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"v": difference(g.frames, g.inputs[FROM.name], g.inputs[TO.name])}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    start, end = given[FROM.name], given[TO.name]
+    return {"v": columns(difference(robot.frames, list(start.T), list(end.T)), len(start))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def between(model: pin.Model, data: pin.Data, start: Array, end: Array) -> Array:
+        return np.asarray(pin.difference(model, start, end))
+
+    return {"v": robot.each(between, given[FROM.name], given[TO.name])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "difference",
+        224,
+        "v with integrate(q0, v) = q1: q1 - q0 where joints have one coordinate; turns the short way round, about the axes "
+        "of q0's own frames",
+        (FROM, TO),
+        (WAY,),
+        theta=False,
+    ),
+    "way between two positions",
+    trace,
+    reference,
+    "difference",
+    pinocchio,
+    matters=(),
+    default_where_wide=True,
+)

@@ -1,0 +1,60 @@
+"""Where a robot comes from a position by constant rates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.manifold import integrated
+from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, columns
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.recipes.steps import Q_NEXT
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+WAY = Quantity("v", ("nv",), 3.0)
+"""Rates times seconds: rad or m."""
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"q_next": integrated(g.frames, g.inputs["q"], g.inputs[WAY.name])}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    q, way = given["q"], given[WAY.name]
+    return {"q_next": columns(integrated(robot.frames, list(q.T), list(way.T)), len(q))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    def moved(model: pin.Model, data: pin.Data, q: Array, way: Array) -> Array:
+        return np.asarray(pin.integrate(model, q, way))
+
+    return {"q_next": robot.each(moved, given["q"], given[WAY.name])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "integrate",
+        222,
+        "q after v, which are rates times seconds: q + v where joints have one coordinate; quaternions turned by v about "
+        "their own axes and made unit ones, also where those of q are not",
+        (Q, WAY),
+        (Q_NEXT,),
+        theta=False,
+        normalizes=True,
+    ),
+    "position after constant rates",
+    trace,
+    reference,
+    "integrate",
+    pinocchio,
+    matters=(),
+    default_where_wide=True,
+)

@@ -1,0 +1,50 @@
+"""The position at which no joint has moved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from psdmc.dynamics.slices import neutral
+from psdmc.program.signature import Q, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays, columns
+from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.robot.mechanism import Array
+
+if TYPE_CHECKING:
+    from psdmc.robot.reference import Reference
+
+
+def trace(g: Ingredients) -> Outputs:
+    return {"q": neutral(g.frames)}
+
+
+def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+    return {"q": columns(neutral(robot.frames), len(given["q"]))}
+
+
+def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
+    import pinocchio as pin
+
+    return {"q": robot.each(lambda model, data, q: np.asarray(pin.neutral(model)), given["q"])}
+
+
+RECIPE = Recipe(
+    Signature(
+        "neutral",
+        220,
+        "q at which no joint has moved: zeros, and unit quaternions (cosines) of no turn",
+        (),
+        (Q,),
+        theta=False,
+    ),
+    "neutral position",
+    trace,
+    reference,
+    "neutral",
+    pinocchio,
+    matters=(),
+    default_where_wide=True,
+)
