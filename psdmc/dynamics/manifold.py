@@ -35,6 +35,11 @@ def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequen
     return [x for joint, here, own in _joints(frames, q, rates) for x in joint.coordinate_rates(here, own)]
 
 
+def restored(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
+    """The nearest positions that the joints can have: quaternions of length one and so on."""
+    return [x for joint, here, _ in _joints(frames, q, ()) for x in joint.restored(here)]
+
+
 def pulled_back(frames: Sequence[Frame], q: Sequence[Scalar], gradient: Sequence[Scalar]) -> list[Scalar]:
     """nv derivatives by the tangent at q of what has these nq derivatives by the coordinates."""
     found: list[Scalar] = []

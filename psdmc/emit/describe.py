@@ -55,8 +55,9 @@ def _arrays(info: PackageInfo) -> tuple[str, ...]:
         )
     return (
         f"Arrays: q has NQ = {info.nq} reals, rates and torques have NV = {info.nv} each; matrices row-major. Quaternions,",
-        "and cosine and sine of an angle, are of length one: functions do not see to it, and one off by more than 1e-6",
-        "gives results that are off, too. Inputs may overlap each other. An output may overlap any",
+        "and cosine and sine of an angle, are of length one: only integrate sees to it, in others one that is off by more",
+        "than 1e-6 gives results that are off, too. Where something is added to q it is integrate that adds. Inputs may",
+        "overlap each other. An output may overlap any",
     )
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from psdmc.dynamics.manifold import integrated
 from psdmc.program.signature import Q, Quantity, Signature
-from psdmc.recipes.on_arrays import RobotOnArrays, columns
+from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.recipes.steps import Q_NEXT
+from psdmc.recipes.steps import Q_NEXT, turned
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -26,17 +24,11 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    q, way = given["q"], given[WAY.name]
-    return {"q_next": columns(integrated(robot.frames, list(q.T), list(way.T)), len(q))}
+    return {"q_next": turned(robot.frames, given["q"], given[WAY.name])}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    import pinocchio as pin
-
-    def moved(model: pin.Model, data: pin.Data, q: Array, way: Array) -> Array:
-        return np.asarray(pin.integrate(model, q, way))
-
-    return {"q_next": robot.each(moved, given["q"], given[WAY.name])}
+    return {"q_next": robot.integrated(given["q"], given[WAY.name])}
 
 
 RECIPE = Recipe(

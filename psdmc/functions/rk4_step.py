@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.manifold import coordinate_rates, restored
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import QD, TAU, Positive, Q, Quantity, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations
-from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.accelerations import PIVOTS, accelerations_and_pivots
+from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
 from psdmc.robot.mechanism import Array
@@ -31,30 +32,37 @@ State = tuple[Sequence[Scalar], Sequence[Scalar]]
 def trace(g: Ingredients) -> Outputs:
     (dt,), pivots = g.inputs[DT.name], []
 
-    def rates(q: Sequence[Scalar], qd: Sequence[Scalar]) -> Sequence[Scalar]:
+    def rates(q: Sequence[Scalar], qd: Sequence[Scalar]) -> State:
         there = replace(g, inputs={"q": list(q), "qd": list(qd)})
-        qdd, factors = accelerations(there, g.inputs["tau"])
-        pivots.append(factors.pivots)
-        return qdd
+        qdd, found = accelerations_and_pivots(there, g.inputs["tau"])
+        pivots.append(found)
+        return coordinate_rates(g.frames, q, qd), qdd
 
-    q_next, qd_next = _step((g.inputs["q"], g.inputs["qd"]), rates, dt)
+    q_next, qd_next = _step((g.inputs["q"], g.inputs["qd"]), rates, lambda q: restored(g.frames, q), dt)
     return {"q_next": q_next, "qd_next": qd_next, "pivot": pivots}
 
 
 def _step(
-    start: State, rates: Callable[[Sequence[Scalar], Sequence[Scalar]], Sequence[Scalar]], dt: Scalar
+    start: State,
+    rates: Callable[[Sequence[Scalar], Sequence[Scalar]], State],
+    unit: Callable[[Sequence[Scalar]], Sequence[Scalar]],
+    dt: Scalar,
 ) -> State:
-    """The state after dt: the slopes at the start, twice in the middle and at the end have the weights 1/6, 2/6, 2/6,
-    1/6."""
+    """The state after dt: the slopes at the start, twice in the middle and at the end have the weights 1/6, 2/6, 2/6, 1/6.
+
+    `rates` are those of q's coordinates and of qd, `unit` makes quaternions of length one. The slopes are of the
+    coordinates, and quaternions leave their sphere by the second order of dt between stages: taken back to it at each,
+    the method keeps its order, as it is the classical one for rates that are constant across the sphere.
+    """
     q, qd = start
     half = 0.5 * dt
-    velocities, slopes = [qd], [rates(q, qd)]
+    slopes = [rates(q, qd)]
     for part in (half, half, dt):
-        there = stepped(q, velocities[-1], part)
-        velocities.append(stepped(qd, slopes[-1], part))
-        slopes.append(rates(there, velocities[-1]))
+        moved, pushed = slopes[-1]
+        slopes.append(rates(unit(stepped(q, moved, part)), stepped(qd, pushed, part)))
     sixth = (1.0 / 6.0) * dt
-    return stepped(q, _total(velocities), sixth), stepped(qd, _total(slopes), sixth)
+    ways, kicks = zip(*slopes, strict=True)
+    return unit(stepped(q, _total(ways), sixth)), stepped(qd, _total(kicks), sixth)
 
 
 def _total(slopes: Sequence[Sequence[Scalar]]) -> list[Scalar]:
@@ -62,23 +70,34 @@ def _total(slopes: Sequence[Sequence[Scalar]]) -> list[Scalar]:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    return _on_arrays(given, lambda q, qd: robot.accelerations(q, qd, given["tau"]))
+    def rates(q: Array, qd: Array) -> tuple[Array, Array]:
+        moved = coordinate_rates(robot.frames, list(q.T), list(qd.T))
+        return columns(moved, len(q)), robot.accelerations(q, qd, given["tau"])
+
+    return _on_arrays(given, rates, lambda q: columns(restored(robot.frames, list(q.T)), len(q)))
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    return _on_arrays(given, lambda q, qd: robot.forward_dynamics(q, qd, given["tau"]))
+    def rates(q: Array, qd: Array) -> tuple[Array, Array]:
+        return robot.coordinate_rates(q, qd), robot.forward_dynamics(q, qd, given["tau"])
+
+    return _on_arrays(given, rates, robot.restored)
 
 
-def _on_arrays(given: Mapping[str, Array], rates: Callable[[Array, Array], Array]) -> Arrays:
-    """The same step on vectors of joints, (k, n), in place of lists of numbers."""
+def _on_arrays(
+    given: Mapping[str, Array],
+    rates: Callable[[Array, Array], tuple[Array, Array]],
+    unit: Callable[[Array], Array],
+) -> Arrays:
+    """The same step on vectors of joints, (k, nq) and (k, nv), in place of lists of numbers."""
     dt = step_on_arrays(given)
     q, qd = given["q"], given["qd"]
     first = rates(q, qd)
-    second = rates(q + dt / 2 * qd, qd + dt / 2 * first)
-    third = rates(q + dt / 2 * (qd + dt / 2 * first), qd + dt / 2 * second)
-    fourth = rates(q + dt * (qd + dt / 2 * second), qd + dt * third)
-    q_next = q + dt * qd + dt**2 / 6 * (first + second + third)
-    return {"q_next": q_next, "qd_next": qd + dt / 6 * (first + 2 * second + 2 * third + fourth)}
+    second = rates(unit(q + dt / 2 * first[0]), qd + dt / 2 * first[1])
+    third = rates(unit(q + dt / 2 * second[0]), qd + dt / 2 * second[1])
+    fourth = rates(unit(q + dt * third[0]), qd + dt * third[1])
+    way, kick = (a + 2 * b + 2 * c + d for a, b, c, d in zip(first, second, third, fourth, strict=True))
+    return {"q_next": unit(q + dt / 6 * way), "qd_next": qd + dt / 6 * kick}
 
 
 RECIPE = Recipe(
@@ -97,5 +116,5 @@ RECIPE = Recipe(
     "aba",
     pinocchio,
     shares="inverse_dynamics",
-    of_axes=True,
+    accelerates=True,
 )

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.manifold import integrated
 from psdmc.program.signature import QD, TAU, Q, Signature
-from psdmc.recipes.accelerations import PIVOTS, accelerations
+from psdmc.recipes.accelerations import PIVOTS, accelerations_and_pivots
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped
+from psdmc.recipes.steps import DT, Q_NEXT, QD_NEXT, step_on_arrays, stepped, turned
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -18,23 +19,24 @@ if TYPE_CHECKING:
 
 def trace(g: Ingredients) -> Outputs:
     (dt,) = g.inputs[DT.name]
-    qdd, factors = accelerations(g, g.inputs["tau"])
+    qdd, pivots = accelerations_and_pivots(g, g.inputs["tau"])
     rates = stepped(g.inputs["qd"], qdd, dt)
-    return {"q_next": stepped(g.inputs["q"], rates, dt), "qd_next": rates, "pivot": factors.pivots}
+    q_next = integrated(g.frames, g.inputs["q"], [dt * rate for rate in rates])
+    return {"q_next": q_next, "qd_next": rates, "pivot": pivots}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    return _next(given, given["qdd"])
+    return _next(given, given["qdd"], lambda q, way: turned(robot.frames, q, way))
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    return _next(given, robot.forward_dynamics(given["q"], given["qd"], given["tau"]))
+    return _next(given, robot.forward_dynamics(given["q"], given["qd"], given["tau"]), robot.integrated)
 
 
-def _next(given: Mapping[str, Array], qdd: Array) -> Arrays:
+def _next(given: Mapping[str, Array], qdd: Array, moved: Callable[[Array, Array], Array]) -> Arrays:
     dt = step_on_arrays(given)
     rates = given["qd"] + dt * qdd
-    return {"q_next": given["q"] + dt * rates, "qd_next": rates}
+    return {"q_next": moved(given["q"], dt * rates), "qd_next": rates}
 
 
 RECIPE = Recipe(
@@ -53,5 +55,5 @@ RECIPE = Recipe(
     "aba",
     pinocchio,
     starts="inverse_dynamics",
-    of_axes=True,
+    accelerates=True,
 )

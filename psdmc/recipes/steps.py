@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.manifold import integrated
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.signature import Quantity
+from psdmc.recipes.on_arrays import columns
 from psdmc.robot.mechanism import Array
 
 DT = Quantity("dt", (), 0.01)
@@ -24,6 +27,11 @@ Rows = Sequence[Sequence[Scalar]]
 def stepped(values: Sequence[Scalar], rates: Sequence[Scalar], dt: Scalar) -> list[Scalar]:
     """values + dt rates"""
     return [value + dt * rate for value, rate in zip(values, rates, strict=True)]
+
+
+def turned(frames: Sequence[Frame], q: Array, way: Array) -> Array:
+    """(k, nq) positions where constant rates lead from q (k, nq); `way` (k, nv) are these times seconds."""
+    return columns(integrated(frames, list(q.T), list(way.T)), len(q))
 
 
 def step_on_arrays(given: Mapping[str, Array]) -> Array:

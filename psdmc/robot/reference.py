@@ -28,6 +28,12 @@ from psdmc.robot.tool import TOOL
 from psdmc.robot.urdf import read_urdf
 from psdmc.robot.urdf_floating import ROOT_JOINT
 
+CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+"""Weights of a central difference of eighth order."""
+
+DIFFERENCE = 0.02
+"""rad or m: its step. The ninth derivative leaves 1e-16, rounding 1e-14."""
+
 
 def reference_model(
     loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None
@@ -133,6 +139,31 @@ class Reference:
 
         by_q, by_qd, by_tau = np.moveaxis(self.each(derivatives, q, qd, tau), -3, 0)
         return self.forward_dynamics(q, qd, tau), by_q, by_qd, by_tau
+
+    def integrated(self, q: Array, way: Array) -> Array:
+        """(..., nq) positions where constant rates lead from q; `way` are these times seconds."""
+
+        def moved(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
+            return np.asarray(pinocchio.integrate(model, *state))
+
+        return self.each(moved, q, way)
+
+    def coordinate_rates(self, q: Array, qd: Array) -> Array:
+        """(..., nq) how the coordinates change at these rates: the central difference of eighth order of `integrate`, which
+        is wrong by 1e-12 of the rates."""
+        step = DIFFERENCE / max(1.0, float(np.abs(qd).max()))
+        total = np.zeros_like(q)
+        for k, weight in enumerate(CENTRAL, start=1):
+            total += weight * (self.integrated(q, k * step * qd) - self.integrated(q, -k * step * qd))
+        return total / step
+
+    def restored(self, q: Array) -> Array:
+        """(..., nq) with quaternions of length one."""
+
+        def unit(model: pinocchio.Model, data: pinocchio.Data, q: Array) -> Array:
+            return np.asarray(pinocchio.normalize(model, q))
+
+        return self.each(unit, q)
 
     def jacobian(self, q: Array) -> Array:
         """(..., 6, n) of the tip frame: linear then angular, along the base frame's axes."""

@@ -29,6 +29,12 @@ TREE = TREES["a trunk with two arms"]
 KINDS = {"free": "FRSRLP", "standing": "RSTLRF", "spherical": "SRRSRR", "planar": "LRPLRR"}
 """Types of the joints of trees of six bodies: on a free root, and with wide joints inside, at ends and in a row."""
 
+SMALL = {
+    "small": (TREES["a wrist with two fingers"], "FRSL"),
+    "hand": (TREES["a wrist with two fingers"], "LSRT"),
+}
+"""Of four, for functions that take long to lower and to compile."""
+
 EXACT = 1e-12
 """Of each output's largest entry."""
 
@@ -72,7 +78,8 @@ class WideRobot:
 
 @cache
 def wide_robot(name: str) -> WideRobot:
-    tree = RandomTree(4, TREE, KINDS[name])
+    parents, kinds = SMALL[name] if name in SMALL else (TREE, KINDS[name])
+    tree = RandomTree(4, parents, kinds)
     model = derive_model(tree.mechanism(), expand=False)
     return WideRobot(tree, model, Reference(tree.model, "tip"))
 

@@ -5,21 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-import numpy as np
-
 from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
 from psdmc.robot.joints.quaternion import (
     angles_between,
     inverse,
-    of_length_one,
     rates_of,
     rotation_of,
     turned_by,
-    unit,
 )
-from psdmc.robot.joints.scalars import TINY, sign
+from psdmc.robot.joints.scalars import TINY, sign, square_of, unit
 from psdmc.robot.joints.wide_joint import WideJoint
-from psdmc.robot.placement import Array
 
 
 class Free(WideJoint):
@@ -50,9 +45,6 @@ class Free(WideJoint):
     def way(self, q: Sequence[Scalar]) -> Vector:
         return (q[0], q[1], q[2])
 
-    def normalized(self, q: Array) -> Array:
-        return np.concatenate([q[:3], of_length_one(q[3:])])
-
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """With t the angle of w, the origin goes by v + (1 - cos t) / t^2 w x v + (t - sin t) / t^3 w x (w x v)."""
         linear, angles, here = step[:3], step[3:], unit(q[3:])
@@ -60,7 +52,7 @@ class Free(WideJoint):
         across = _cross(angles, linear)
         twice = _cross(angles, across)
         first = 0.5 * share * share
-        second = (1.0 - share * cosine) / (_square(angles) + TINY)
+        second = (1.0 - share * cosine) / (square_of(angles) + TINY)
         gone = [v + (first * a + second * b) for v, a, b in zip(linear, across, twice, strict=True)]
         moved = _inward(rotation_of(here), gone)
         nearer = sign(cosine)  # of the two quaternions for one turn that to the one before, as Pinocchio's
@@ -74,16 +66,12 @@ class Free(WideJoint):
         moved = _inward(rotation_of(inverse(q[3:])), apart)
         across = _cross(angles, moved)
         twice = _cross(angles, across)
-        share = (1.0 - cotangent) / (_square(angles) + TINY)
+        share = (1.0 - cotangent) / (square_of(angles) + TINY)
         linear = (p + (share * b - 0.5 * a) for p, a, b in zip(moved, across, twice, strict=True))
         return (*linear, *angles)
 
     def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
         return (*_inward(rotation_of(q[3:]), rates[:3]), *rates_of(q[3:], rates[3:]))
-
-
-def _square(v: Sequence[Scalar]) -> Scalar:
-    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
 
 
 def _cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> Vector:

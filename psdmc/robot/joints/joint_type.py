@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from psdmc.robot.joints.basis import Basis
+from psdmc.robot.joints.scalars import Scalar as Scalar
+from psdmc.robot.joints.scalars import unit
 from psdmc.robot.placement import Array, Placement
-
-Scalar = Any
-"""A float, an array of states, or a symbol."""
 
 Twist = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Linear velocity of a frame's origin and angular velocity, along the frame's own axes."""
@@ -119,9 +118,14 @@ class JointType:
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return Placement(rotation, np.array([0.0, 0.0, 0.0 if way is None else way]))
 
+    def restored(self, q: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """The coordinates nearest to q that are the joint's: quaternions of length one and so on."""
+        part = self.unit
+        return (*q[: part.start], *unit(q[part]), *q[part.stop :]) if part.stop else tuple(q)
+
     def normalized(self, q: Array) -> Array:
-        """(nq, ...) the coordinates nearest to q that are the joint's: quaternions of length one and so on."""
-        return q
+        """The same of an array (nq, ...), in its precision."""
+        return np.stack(self.restored(list(q)))
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """nq coordinates where a joint at q comes that moves at constant rates for one second by nv of `step`; what must be

@@ -6,13 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
-import numpy as np
-
 from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
-from psdmc.robot.joints.quaternion import arc, of_length_one, unit
-from psdmc.robot.joints.scalars import TINY, root, sign, sincos
+from psdmc.robot.joints.quaternion import arc
+from psdmc.robot.joints.scalars import TINY, root, sign, sincos, unit
 from psdmc.robot.joints.wide_joint import WideJoint
-from psdmc.robot.placement import Array
 
 
 class Planar(WideJoint):
@@ -44,9 +41,6 @@ class Planar(WideJoint):
 
     def way(self, q: Sequence[Scalar]) -> Vector:
         return (q[0], q[1], 0.0)
-
-    def normalized(self, q: Array) -> Array:
-        return np.concatenate([q[:2], of_length_one(q[2:])])
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """The origin goes along the chord: sin(h)/h times the way, turned by half the angle, h."""

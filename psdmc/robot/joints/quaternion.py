@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from psdmc.robot.joints.joint_type import Rows, Scalar, Vector
-from psdmc.robot.joints.scalars import TINY, root, sign, sincos
-from psdmc.robot.placement import Array
+from psdmc.robot.joints.scalars import TINY, root, sign, sincos, square_of, unit
 
 Quaternion = tuple[Scalar, Scalar, Scalar, Scalar]
 
@@ -36,7 +33,7 @@ def rotation_of(quaternion: Sequence[Scalar]) -> Rows:
 def turned_by(quaternion: Sequence[Scalar], angles: Sequence[Scalar]) -> tuple[Quaternion, Scalar, Scalar]:
     """A unit quaternion after a turn about axes of its own frame by `angles` (rad, a rotation vector), of length one; and,
     of half the angle h, sin(h)/h and cos(h)."""
-    half = root(0.25 * _square(angles) + TINY)
+    half = root(0.25 * square_of(angles) + TINY)
     sine, cosine = sincos(half)
     share = sine / half
     x, y, z = (0.5 * share * angle for angle in angles)
@@ -55,7 +52,7 @@ def angles_between(quaternion: Sequence[Scalar], other: Sequence[Scalar]) -> tup
     x, y, z, w = product(inverse(quaternion), other)
     shorter = sign(w) / root(x * x + y * y + z * z + w * w)
     sine, cosine = (x * shorter, y * shorter, z * shorter), w * shorter
-    share = arc(_square(sine), cosine)
+    share = arc(square_of(sine), cosine)
     angles = (2.0 * share * sine[0], 2.0 * share * sine[1], 2.0 * share * sine[2])
     return angles, share * cosine
 
@@ -94,21 +91,3 @@ def inverse(quaternion: Sequence[Scalar]) -> Quaternion:
     """Of a unit quaternion."""
     x, y, z, w = quaternion
     return (-x, -y, -z, w)
-
-
-def unit(values: Sequence[Scalar]) -> tuple[Scalar, ...]:
-    """The same, divided by its length."""
-    length = 1.0 / root(_square(values))
-    return tuple(value * length for value in values)
-
-
-def _square(values: Sequence[Scalar]) -> Scalar:
-    total = values[0] * values[0]
-    for value in values[1:]:
-        total = total + value * value
-    return total
-
-
-def of_length_one(q: Array) -> Array:
-    """(k, ...) divided by its length along the first axis, in the array's precision."""
-    return np.asarray(q / np.sqrt((q * q).sum(axis=0)))

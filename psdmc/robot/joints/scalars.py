@@ -7,6 +7,7 @@ lost beside any other value.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -42,3 +43,17 @@ def sign(value: Scalar) -> Scalar:
     """1 or -1; of zero 1."""
     moved = value + FAINT
     return moved / root(moved * moved + FAINTER)
+
+
+def square_of(values: Sequence[Scalar]) -> Scalar:
+    """The sum of their squares."""
+    total = values[0] * values[0]
+    for value in values[1:]:
+        total = total + value * value
+    return total
+
+
+def unit(values: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """The same, divided by its length."""
+    length = 1.0 / root(square_of(values))
+    return tuple(value * length for value in values)

@@ -9,14 +9,12 @@ from typing import ClassVar
 from psdmc.robot.joints.joint_type import TURNS, Rows, Scalar, Twist
 from psdmc.robot.joints.quaternion import (
     angles_between,
-    of_length_one,
     rates_of,
     rotation_of,
     turned_by,
-    unit,
 )
+from psdmc.robot.joints.scalars import unit
 from psdmc.robot.joints.wide_joint import WideJoint
-from psdmc.robot.placement import Array
 
 
 class Spherical(WideJoint):
@@ -46,9 +44,6 @@ class Spherical(WideJoint):
 
     def rotation(self, q: Sequence[Scalar]) -> Rows:
         return rotation_of(q)
-
-    def normalized(self, q: Array) -> Array:
-        return of_length_one(q)
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
         return turned_by(unit(q), step)[0]

@@ -1,0 +1,121 @@
+"""Steps of integrators where q is no vector: against Pinocchio, and what ten seconds of free flight conserve."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from unoptimised import without_optimisation
+from wide_robots import is_pinocchios
+
+import psdmc
+from psdmc.derivation.derive import derive_model
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.load import load_robot_text
+from psdmc.toolchain.call import CompiledRobot
+
+BODY = (
+    '<link name="{name}"><inertial><origin xyz="{at}"/><mass value="{mass}"/>'
+    '<inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+)
+HINGE = (
+    '<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{at}"/>'
+    '<axis xyz="{axis}"/><limit lower="-9" upper="9" effort="1" velocity="1"/></joint>'
+)
+SATELLITE = "".join(
+    [
+        '<robot name="satellite">',
+        BODY.format(name="bus", at="0.05 0 0.02", mass=12, ixx=0.9, iyy=0.7, izz=1.1),
+        BODY.format(name="panel", at="0 0.6 0", mass=2, ixx=0.25, iyy=0.02, izz=0.26),
+        BODY.format(name="flap", at="0 0.4 0.1", mass=1, ixx=0.06, iyy=0.01, izz=0.06),
+        BODY.format(name="boom", at="0.5 0 0", mass=1.5, ixx=0.01, iyy=0.14, izz=0.14),
+        HINGE.format(name="wing", kind="revolute", parent="bus", child="panel", at="0 0.5 0", axis="0 1 0"),
+        HINGE.format(name="fold", kind="revolute", parent="panel", child="flap", at="0 1.2 0", axis="1 0 0"),
+        HINGE.format(name="ball", kind="floating", parent="bus", child="boom", at="0.5 0 0", axis="0 0 1"),
+        "</robot>",
+    ]
+)
+"""A body with a panel of two parts, and a loose boom that flies beside it."""
+
+SECONDS = 10.0
+COUNT = 8
+
+
+@pytest.mark.parametrize("name", ["small", "hand"])
+@pytest.mark.parametrize("function", ["semi_implicit_euler", "rk4_step"])
+def test_a_step_is_pinocchios(function: str, name: str) -> None:
+    """Random trees' mass matrices are conditioned badly: relative to the accelerations' largest entry."""
+    is_pinocchios(function, name, exact=1e-9, in_c=False)
+
+
+@cache
+def satellite() -> tuple[DynamicsModel, CompiledRobot]:
+    loaded = load_robot_text(SATELLITE, "urdf", floating=True, gravity=(0.0, 0.0, 0.0))
+    model = derive_model(loaded.mechanism, expand=False)
+    functions = [
+        "rk4_step",
+        "semi_implicit_euler",
+        "kinetic_energy",
+        "momentum",
+        "neutral",
+        "integrate",
+        "difference",
+    ]
+    with without_optimisation():
+        return model, psdmc.compile(model, functions=functions)
+
+
+def start() -> tuple[np.ndarray, np.ndarray]:
+    """Tumbling at up to 1 rad/s while its panels swing."""
+    model, robot = satellite()
+    rng = np.random.default_rng(8)
+    q = np.tile(robot.neutral(), (COUNT, 1))
+    return robot.integrate(q, rng.uniform(-1, 1, (COUNT, model.nv))), rng.uniform(-1, 1, (COUNT, model.nv))
+
+
+def flown(step: str, dt: float, seconds: float = SECONDS) -> tuple[np.ndarray, np.ndarray]:
+    """So long without torques, by emitted C."""
+    _, robot = satellite()
+    (q, qd), take = start(), getattr(robot, step)
+    for _ in range(round(seconds / dt)):
+        q, qd = take(q, qd, 0.0 * qd, dt)
+    return q, qd
+
+
+def drift(step: str, dt: float) -> tuple[float, float]:
+    """Largest changes of momentum, about the world's origin, and of energy, relative to their sizes at the start."""
+    _, robot = satellite()
+    (q, qd), (q1, qd1) = start(), flown(step, dt)
+    momentum, energy = robot.momentum(q, qd), robot.kinetic_energy(q, qd)
+    lost = np.abs(robot.momentum(q1, qd1) - momentum).max() / np.abs(momentum).max()
+    return float(lost), float((np.abs(robot.kinetic_energy(q1, qd1) - energy) / energy).max())
+
+
+def test_ten_seconds_of_free_flight_conserve_momentum_and_energy() -> None:
+    lost, changed = drift("rk4_step", 2e-3)
+    assert lost < 1e-10
+    assert changed < 1e-10
+
+
+def test_the_step_is_of_fourth_order() -> None:
+    """A step of half the length leaves a sixteenth of the change, of momentum and of energy."""
+    coarse, fine = drift("rk4_step", 0.02), drift("rk4_step", 0.01)
+    for one, other in zip(coarse, fine, strict=True):
+        assert 10.0 < one / other < 40.0
+
+
+def test_both_methods_come_to_the_same_place() -> None:
+    """Positions of both methods meet as steps shrink: of first order, against the fourth's."""
+    _, robot = satellite()
+    exact, _ = flown("rk4_step", 2e-3, 1.0)
+    errors = [
+        np.abs(robot.difference(exact, flown("semi_implicit_euler", dt, 1.0)[0])).max() for dt in (2e-3, 1e-3)
+    ]
+    assert 1.8 < errors[0] / errors[1] < 2.2
+
+
+def test_quaternions_stay_on_their_sphere() -> None:
+    for step in ("rk4_step", "semi_implicit_euler"):
+        q, _ = flown(step, 0.01)
+        np.testing.assert_allclose(np.linalg.norm(q[:, 3:7], axis=1), 1.0, rtol=0.0, atol=4e-16)
