@@ -24,8 +24,8 @@ from psdmc.dynamics.torque_rows import echelon_rows
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 from psdmc.robot.small import times
 
-STATES = 64
-"""Sampled motions; a joint's own link has eleven columns to tell apart."""
+STATES = 32
+"""Sampled motions: three for each of the eleven columns that a joint's own link has to tell apart."""
 
 
 def reduction_for(scaled: Scaled) -> Reduction:

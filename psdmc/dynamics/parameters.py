@@ -19,27 +19,32 @@ _INERTIA_ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 def second_moments(inertia: Array) -> Array:
-    """The integral of r r^T over the mass, from the inertia matrix about the same point: tr(I) / 2 - I."""
-    moments: Array = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    """The integral of r r^T over the mass, from the inertia matrix about the same point: tr(I) / 2 - I. (3, 3, ...)"""
+    moments: Array = _on_diagonal(0.5 * np.trace(inertia)) - inertia
     return moments
 
 
 def inertia_of(second: Array) -> Array:
-    """The inertia matrix from the integral of r r^T over the mass: tr(S) - S."""
-    matrix: Array = np.trace(second) * np.eye(3) - second
+    """The inertia matrix from the integral of r r^T over the mass: tr(S) - S. (3, 3, ...)"""
+    matrix: Array = _on_diagonal(np.trace(second)) - second
     return matrix
 
 
+def _on_diagonal(value: Array) -> Array:
+    """(3, 3, ...)"""
+    return np.multiply.outer(np.eye(3), value)
+
+
 def inertia_matrix(x: Array) -> Array:
-    """3 x 3 inertia matrix, kg m^2, from standard parameters of one link."""
-    matrix = np.zeros((3, 3), np.asarray(x).dtype)
+    """(3, 3, ...) inertia matrix, kg m^2, from standard parameters of one link (10 or 11, ...)."""
+    matrix = np.zeros((3, 3, *np.shape(x)[1:]), np.asarray(x).dtype)
     for (row, column), value in zip(_INERTIA_ENTRIES, x[4:BODY_PARAMETERS], strict=True):
         matrix[row, column] = matrix[column, row] = value
     return matrix
 
 
 def standard_parameters(mass: float, moment: Array, inertia: Array) -> Array:
-    """(10,) standard parameters of a body; moment and inertia about the same frame."""
+    """(10, ...) standard parameters of a body; moment and inertia about the same frame."""
     return np.array([mass, *moment, *(inertia[entry] for entry in _INERTIA_ENTRIES)])
 
 
@@ -49,11 +54,23 @@ def moved(x: Array, frame: Placement) -> Array:
 
 
 def _moved(x: Array, r: Array, p: Array) -> Array:
+    """(10, ...)"""
     moment = times(r, x[1:4])
-    crossed = np.outer(moment, p)
-    turned = times(times(r, second_moments(inertia_matrix(x))), r.T)
-    second = turned + crossed + crossed.T + x[0] * np.outer(p, p)
-    return standard_parameters(x[0], moment + x[0] * p, inertia_of(second))
+    crossed = _transposed(np.multiply.outer(p, moment))
+    turned = _turned(r, _transposed(_turned(r, second_moments(inertia_matrix(x)))))
+    second = _transposed(turned) + crossed + _transposed(crossed) + np.multiply.outer(np.outer(p, p), x[0])
+    return standard_parameters(x[0], moment + np.multiply.outer(p, x[0]), inertia_of(second))
+
+
+def _transposed(matrix: Array) -> Array:
+    """(3, 3, ...)"""
+    return np.swapaxes(matrix, 0, 1)
+
+
+def _turned(r: Array, matrix: Array) -> Array:
+    """r @ matrix for a matrix (3, 3, ...)."""
+    product: Array = times(r, matrix.reshape(3, -1)).reshape(matrix.shape)
+    return product
 
 
 def joint_frame_map(link_frame: Placement) -> Array:
@@ -64,8 +81,7 @@ def joint_frame_map(link_frame: Placement) -> Array:
 def moving_map(rotation: NDArray[Any], translation: NDArray[Any]) -> NDArray[Any]:
     """(10, 10) map of ten standard parameters about a frame to those about the frame it is placed in, in the arrays'
     precision."""
-    units = np.eye(BODY_PARAMETERS, dtype=rotation.dtype)
-    return np.column_stack([_moved(unit, rotation, translation) for unit in units])
+    return _moved(np.eye(BODY_PARAMETERS, dtype=rotation.dtype), rotation, translation)
 
 
 def bodies_of(chain: Mechanism, x: Array) -> tuple[Body, ...]:

@@ -36,18 +36,21 @@ def graded_pivots(
     taken = 1.0
     others = np.ones(work.shape[1], dtype=bool)
     group = np.zeros(work.shape[1], dtype=np.int64) if groups is None else groups
-    for share, current in ((share, own) for own in np.unique(group) for share in shares):
-        rest = work[len(pivots) :]
-        hopeful = others & (group == current) & (lengths(rest) > 0.5 * share * norms)
-        for column in np.flatnonzero(hopeful).tolist():
-            residual = np.linalg.norm(work[len(pivots) :, column])
-            if residual > share * norms[column]:
-                _reflect(work[len(pivots) :], column, residual)
-                pivots.append(column)
-                others[column] = False
-                taken = share
-        if len(pivots) == len(work):
-            break
+    for own in np.unique(group):
+        columns, measured = np.flatnonzero(group == own), -1
+        for share in shares:
+            if len(pivots) == len(work):
+                break
+            if measured != len(pivots):
+                columns, measured = columns[others[columns]], len(pivots)
+                residuals = lengths(work[measured:, columns])
+            for column in columns[residuals > 0.5 * share * norms[columns]].tolist():
+                residual = np.linalg.norm(work[len(pivots) :, column])
+                if residual > share * norms[column]:
+                    _reflect(work[len(pivots) :], column, residual)
+                    pivots.append(column)
+                    others[column] = False
+                    taken = share
     left = lengths(work[len(pivots) :]) / np.where(norms > 0, norms, 1.0)
     return pivots, taken, float(left[others].max(initial=0.0))
 
@@ -59,7 +62,8 @@ def lengths(rows: NDArray[Any]) -> NDArray[Any]:
 
 def _reflect(rows: NDArray[Any], column: int, length: Any) -> None:
     """Reflect the rows, in place, so that the column keeps its first entry only (Householder). Rows in which the column
-    is zero stay as they are: a long chain's rows are zero for all links before their own.
+    is zero stay as they are: a long chain's rows are zero for all links before their own. So do columns at right angles
+    to the mirror: other branches'.
 
     einsum instead of BLAS: its sums do not depend on the number of threads.
     """
@@ -72,5 +76,7 @@ def _reflect(rows: NDArray[Any], column: int, length: Any) -> None:
         return
     part, mirror = rows[used], mirror[used]
     first = int(np.argmax(part.any(axis=0)))
-    part = part[:, first:]
-    rows[used, first:] = part - np.outer(mirror, 2.0 * np.einsum("i,ij->j", mirror, part))
+    weights = 2.0 * np.einsum("i,ij->j", mirror, part[:, first:])
+    turned = np.flatnonzero(weights)
+    columns = first + turned
+    rows[np.ix_(used, columns)] = part[:, columns] - np.outer(mirror, weights[turned])
