@@ -38,7 +38,7 @@ MAY_IMPORT |= {
 OUTSIDE = {
     "robot": {"numpy", "pinocchio", "defusedxml", "mujoco"},
     "dynamics": {"numpy"},
-    "model": {"numpy", "scipy"},
+    "model": {"numpy", "scipy", "pandas", "sympy"},
     "derivation": {"numpy", "scipy"},
     "verification": {"numpy"},
     "program": {"numpy"},

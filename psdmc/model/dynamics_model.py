@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.model import equations, evaluate, payload, recursive, store
 from psdmc.model.expansion import Expansion
+from psdmc.model.parameter_table import BaseParameters
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array
 from psdmc.robot.zeros import leading_rows
 
@@ -193,9 +194,14 @@ class DynamicsModel:
         return self.inverse_dynamics(q, np.zeros(self.nv), np.zeros(self.nv))
 
     @property
-    def base_parameters(self) -> tuple[equations.BaseParameter, ...]:
-        """Equation, unit and value of each entry of theta_b."""
-        return equations.base_parameters(self.mechanism, self.B, self.pivots, self.theta_b)
+    def base_parameters(self) -> BaseParameters:
+        """Equation, unit and value of each entry of theta_b: a tuple, and `to_frame()` for pandas, `to_latex()`."""
+        return BaseParameters(equations.base_parameters(self.mechanism, self.B, self.pivots, self.theta_b))
+
+    def to_latex(self) -> str:
+        """The base parameters' equations with values and units, as an `aligned` environment of amsmath: entries of theta_b
+        are numbered from 0, joints from 1."""
+        return self.base_parameters.to_latex()
 
     @property
     def content_hash(self) -> str:

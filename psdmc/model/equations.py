@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.model.terms import Power, Symbol, Term, equation
 from psdmc.robot.inertia import LENGTH_ORDER
 from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Joint, Mechanism
 
@@ -37,21 +38,24 @@ class BaseParameter:
     equation   in standard parameters about the link frames
     unit       kg, kg m or kg m^2
     value      SI; None while unknown
+    terms      those of the equation, as data
     """
 
     equation: str
     unit: str
     value: float | None
+    terms: tuple[Term, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """A number with a name; `order` is its exponent of the metre."""
+    """A number with a name, as a term writes it; `order` is its exponent of the metre."""
 
     value: float
     order: int
-    before: str
-    after: str
+    times: tuple[Power, ...] = ()
+    over: tuple[Power, ...] = ()
+    number: str | None = None
 
 
 def base_parameters(
@@ -63,28 +67,40 @@ def base_parameters(
     pivots   l, the standard parameter (index into x) that stands first in each equation
     theta_b  (l,) or None while unknown
     """
-    known = list(_known_numbers(dh_lengths(chain)))
+    known = list(_known_numbers(_lengths(chain)))
     values = [None] * len(B) if theta_b is None else theta_b.tolist()
     return tuple(
-        BaseParameter(_equation(row, pivot, chain, known), _unit(pivot, chain), value)
+        _base_parameter(_terms(row, pivot, chain, known), _unit(pivot, chain), value)
         for row, pivot, value in zip(B, pivots, values, strict=True)
     )
 
 
+def _base_parameter(terms: tuple[Term, ...], unit: str, value: float | None) -> BaseParameter:
+    return BaseParameter(equation(terms), unit, value, terms)
+
+
 def standard_name(index: int) -> str:
     """Name of entry `index` of x, by joint number: m2, Ixx3, Im1."""
+    return str(_standard_symbol(index))
+
+
+def _standard_symbol(index: int) -> Symbol:
     joint, parameter = divmod(index, PARAMETERS_PER_LINK)
-    return f"{PARAMETER_NAMES[parameter]}{joint + 1}"
+    return Symbol(PARAMETER_NAMES[parameter], joint + 1)
 
 
 def dh_lengths(chain: Mechanism) -> dict[str, float]:
     """a and d of a DH table by name, zeros left out; empty for a URDF."""
-    lengths: dict[str, float] = {}
-    for number, joint in enumerate(chain.joints, start=1):
-        for name, value in _row_lengths(joint, chain.convention):
-            if value != 0.0:
-                lengths[f"{name}{number}"] = value
-    return lengths
+    return {str(symbol): value for symbol, value in _lengths(chain).items()}
+
+
+def _lengths(chain: Mechanism) -> dict[Symbol, float]:
+    return {
+        Symbol(letters, number): value
+        for number, joint in enumerate(chain.joints, start=1)
+        for letters, value in _row_lengths(joint, chain.convention)
+        if value != 0.0
+    }
 
 
 def _row_lengths(joint: Joint, convention: str) -> list[tuple[str, float]]:
@@ -108,44 +124,46 @@ def _unit(index: int, chain: Mechanism) -> str:
     return _UNITS[_order(index, chain)]
 
 
-def _known_numbers(lengths: dict[str, float]) -> Iterator[_Known]:
-    """Named coefficients, simplest first; `before` and `after` go around the parameter's name."""
+def _known_numbers(lengths: dict[Symbol, float]) -> Iterator[_Known]:
+    """Named coefficients, simplest first."""
     items = [(name, value) for name, value in lengths.items() if abs(value) > SHORTEST]
     for name, value in items:
-        yield _Known(value, 1, f"{name} ", "")
-        yield _Known(1.0 / value, -1, "", f"/{name}")
-        yield _Known(2.0 * value, 1, f"2 {name} ", "")
-        yield _Known(2.0 / value, -1, "2 ", f"/{name}")
-        yield _Known(value**2, 2, f"{name}^2 ", "")
-        yield _Known(value**-2, -2, "", f"/{name}^2")
+        once, squared = (Power(name),), (Power(name, 2),)
+        yield _Known(value, 1, once)
+        yield _Known(1.0 / value, -1, over=once)
+        yield _Known(2.0 * value, 1, once, number="2")
+        yield _Known(2.0 / value, -1, over=once, number="2")
+        yield _Known(value**2, 2, squared)
+        yield _Known(value**-2, -2, over=squared)
     for number, (name, value) in enumerate(items):
         for other, length in items[:number] + items[number + 1 :]:
-            yield _Known(value / length, 0, f"{name} ", f"/{other}")
+            yield _Known(value / length, 0, (Power(name),), (Power(other),))
         for other, length in items[number + 1 :]:
-            yield _Known(value * length, 2, f"{name} {other} ", "")
-            yield _Known(1.0 / (value * length), -2, "", f"/({name} {other})")
+            both = (Power(name), Power(other))
+            yield _Known(value * length, 2, both)
+            yield _Known(1.0 / (value * length), -2, over=both)
 
 
-def _equation(row: Array, pivot: int, chain: Mechanism, known: list[_Known]) -> str:
+def _terms(row: Array, pivot: int, chain: Mechanism, known: list[_Known]) -> tuple[Term, ...]:
+    """The pivot, then the others in the order of x."""
     others = [int(index) for index in np.flatnonzero(row) if index != pivot]
-    text = standard_name(pivot)
-    for index in others:
-        order = _order(pivot, chain) - _order(index, chain)
-        sign, term = _term(float(row[index]), order, standard_name(index), known)
-        text += f" {sign} {term}"
-    return text
+    pivots_order = _order(pivot, chain)
+    found = (
+        _term(float(row[index]), pivots_order - _order(index, chain), _standard_symbol(index), known)
+        for index in others
+    )
+    return (Term(_standard_symbol(pivot)), *found)
 
 
-def _term(value: float, order: int, name: str, known: list[_Known]) -> tuple[str, str]:
-    """Sign and text of value * name, the value's unit being m^order."""
+def _term(value: float, order: int, of: Symbol, known: list[_Known]) -> Term:
+    """value * of, the value's unit being m^order."""
     plain = [number for number in (1.0, 2.0, 0.5) if order == 0 and _close(abs(value), number)]
     if plain:
-        return "-" if value < 0 else "+", name if plain[0] == 1.0 else f"{plain[0]:g} {name}"
-    for number in known:
-        if number.order == order and _close(abs(value), abs(number.value)):
-            sign = "+" if value * number.value > 0 else "-"
-            return sign, f"{number.before}{name}{number.after}"
-    return "-" if value < 0 else "+", f"{abs(value):.{DIGITS}g} {name}"
+        return Term(of, value < 0, None if plain[0] == 1.0 else f"{plain[0]:g}")
+    for named in known:
+        if named.order == order and _close(abs(value), abs(named.value)):
+            return Term(of, value * named.value < 0, named.number, named.times, named.over)
+    return Term(of, value < 0, f"{abs(value):.{DIGITS}g}")
 
 
 def _close(a: float, b: float) -> bool:

@@ -1,0 +1,74 @@
+"""Base parameters as a table: for the terminal, a notebook, pandas."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from psdmc.errors import ToolchainError
+from psdmc.model.equations import BaseParameter
+from psdmc.model.latex import equations_latex
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LINES = 12
+"""Most lines of a repr."""
+
+
+class BaseParameters(tuple[BaseParameter, ...]):
+    """The entries of theta_b in order: a tuple that shows itself as a table."""
+
+    __slots__ = ()
+
+    def to_frame(self) -> pd.DataFrame:
+        """A pandas data frame: index theta_b (0 to l - 1), columns equation, value (NaN while unknown), unit.
+
+        ToolchainError where pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError as error:
+            raise ToolchainError("to_frame() needs pandas", "pip install 'psdmc[notebook]'") from error
+        columns = {
+            "equation": [parameter.equation for parameter in self],
+            "value": [float("nan") if parameter.value is None else parameter.value for parameter in self],
+            "unit": [parameter.unit for parameter in self],
+        }
+        return pd.DataFrame(columns, index=pd.RangeIndex(len(self), name="theta_b"))
+
+    def to_latex(self) -> str:
+        """All equations with values and units, as an `aligned` environment of amsmath."""
+        return equations_latex(self)
+
+    def __repr__(self) -> str:
+        head = f"{len(self)} base parameters"
+        lines = [f"  {k}: {_shown(parameter)}" for k, parameter in enumerate(self[: LINES - 1])]
+        if len(self) > len(lines):
+            lines[-1] = f"  ... and {len(self) - len(lines) + 1} more"
+        return "\n".join([head, *lines])
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{k}</td><td>{escape(parameter.equation)}</td><td>{value_text(parameter)}</td>"
+            f"<td>{escape(parameter.unit)}</td></tr>"
+            for k, parameter in enumerate(self)
+        )
+        head = "<tr><th>theta_b</th><th>equation</th><th>value</th><th>unit</th></tr>"
+        return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
+
+    def _repr_latex_(self) -> str:
+        return f"$$\n{self.to_latex()}\n$$"
+
+
+def value_text(parameter: BaseParameter) -> str:
+    """The value with six digits, or 'unknown'."""
+    return "unknown" if parameter.value is None else f"{parameter.value:.6g}"
+
+
+def _shown(parameter: BaseParameter) -> str:
+    equation = parameter.equation
+    short = equation if len(equation) <= 80 else f"{equation[:76]} ..."
+    return (
+        f"{short} = {value_text(parameter)} {parameter.unit if parameter.value is not None else ''}".rstrip()
+    )
