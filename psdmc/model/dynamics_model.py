@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError
-from psdmc.model import equations, evaluate, payload, recursive, store
+from psdmc.model import equations, evaluate, glance, payload, recursive, store, symbolic
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array
 from psdmc.robot.zeros import leading_rows
 
 if TYPE_CHECKING:
+    import sympy
     from scipy import sparse
 
 Array = NDArray[np.float64]
@@ -56,6 +57,15 @@ class DynamicsModel:
                 f"E and P are for {self.expansion.n} joints and {self.expansion.l} base parameters, "
                 f"expected {n} and {l}"
             )
+
+    def __repr__(self) -> str:
+        return glance.text(self)
+
+    def _repr_html_(self) -> str:
+        return glance.html(self)
+
+    def _repr_latex_(self) -> str:
+        return self.base_parameters._repr_latex_()
 
     @property
     def chain(self) -> Mechanism:
@@ -202,6 +212,18 @@ class DynamicsModel:
         """The base parameters' equations with values and units, as an `aligned` environment of amsmath: entries of theta_b
         are numbered from 0, joints from 1."""
         return self.base_parameters.to_latex()
+
+    def torque_expression(self, joint: int | str, numbers: bool = False) -> sympy.Expr:
+        """The torque of one joint as a SymPy expression, for robots of few joints; its `args` are the terms.
+
+            joint    its number, 0 being the first, or its name
+            numbers  whether theta_b's values stand in it; otherwise symbols theta_b0, theta_b1 and so on
+
+        Symbols q1, qd1, qdd1 and so on are of joints numbered from 1, as in the base parameters' equations. InputError for
+        an unknown joint, a model without E and P, or a torque of too many monomials; ToolchainError without SymPy.
+        """
+        values = self.known_theta_b() if numbers else None
+        return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)
 
     @property
     def content_hash(self) -> str:

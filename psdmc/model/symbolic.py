@@ -1,0 +1,99 @@
+"""Torques of small robots as SymPy expressions, term by term from E and P."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.errors import InputError, ToolchainError
+from psdmc.model.expansion import Expansion, RowBlocks
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    import sympy
+
+Array = NDArray[np.float64]
+
+MOST_MONOMIALS = 2000
+"""Of one torque. SymPy takes about a millisecond for each, and nobody reads more."""
+
+
+def torque_expression(
+    robot: Mechanism, expansion: Expansion, joint: int | str, theta_b: Array | None
+) -> sympy.Expr:
+    """tau of one joint (its number, 0 being the first, or its name) as a SymPy expression: the sum of its monomials times
+    combinations of theta_b.
+
+    Symbols, real: q1, qd1, qdd1 and so on, joints numbered from 1 as in the base parameters' equations; theta_b0 and so on,
+    as the entries of theta_b. With theta_b (l,) numbers stand for the latter.
+
+    InputError where there is no such joint or the torque has more than MOST_MONOMIALS monomials, ToolchainError where
+    SymPy is not installed.
+    """
+    sp, number = _sympy(), _joint_number(robot, joint)
+    entries = expansion.entries
+    own = np.flatnonzero(entries.joint == number)
+    used, place = np.unique(entries.row[own], return_inverse=True)
+    if len(used) > MOST_MONOMIALS:
+        raise InputError(
+            f"the torque of joint {shown(robot.joints[number].name)} has {len(used)} monomials, "
+            f"expressions are made of up to {MOST_MONOMIALS}",
+            "lock joints or cut the chain; model.E, model.P and psdmc show --terms have all of them",
+        )
+    thetas = _parameters(sp, expansion.l, theta_b)
+    weights: list[list[Any]] = [[] for _ in used]
+    for k, entry in zip(place.tolist(), own.tolist(), strict=True):
+        weights[k].append(_number(sp, float(entries.value[entry])) * thetas[entries.column[entry]])
+    factors = _factors(sp, len(robot))
+    strength = _number(sp, float(np.linalg.norm(robot.gravity)))
+    terms = (
+        sp.Add(*weight) * _monomial(sp, expansion, int(column), factors, strength)
+        for column, weight in zip(used, weights, strict=True)
+    )
+    found: sympy.Expr = sp.Add(*terms)
+    return found
+
+
+def _joint_number(robot: Mechanism, joint: int | str) -> int:
+    numbers = {name: i for i, name in enumerate(robot.joint_names)} | {i: i for i in range(len(robot))}
+    if joint not in numbers:
+        raise InputError(
+            f"no joint {shown(joint)}",
+            f"the joints are 0 to {len(robot) - 1}: {', '.join(robot.joint_names)}",
+        )
+    return numbers[joint]
+
+
+def _sympy() -> Any:
+    try:
+        import sympy
+    except ImportError as error:
+        raise ToolchainError("torque expressions need SymPy", "pip install 'psdmc[notebook]'") from error
+    return sympy
+
+
+def _parameters(sp: Any, l: int, theta_b: Array | None) -> list[Any]:
+    if theta_b is not None:
+        return [sp.Float(value) for value in theta_b.tolist()]
+    return list(sp.symbols(f"theta_b:{l}", real=True))
+
+
+def _factors(sp: Any, n: int) -> list[Any]:
+    """The quantities that the rows of E are exponents of."""
+    q, qd, qdd = (sp.symbols(f"{letters}1:{n + 1}", real=True) for letters in ("q", "qd", "qdd"))
+    return [*q, *map(sp.sin, q), *map(sp.cos, q), *qd, *qdd]
+
+
+def _monomial(sp: Any, expansion: Expansion, column: int, factors: list[Any], strength: Any) -> Any:
+    """A column of E as a product; one without rates times |g|."""
+    exponents = expansion.E[:, column]
+    product = sp.Mul(*(factors[row] ** int(exponents[row]) for row in np.flatnonzero(exponents)))
+    return product if exponents[RowBlocks.of(expansion.n).rates].any() else strength * product
+
+
+def _number(sp: Any, value: float) -> Any:
+    """A whole number as such, any other one as SymPy's float."""
+    return sp.Integer(int(value)) if value.is_integer() else sp.Float(value)
