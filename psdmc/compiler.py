@@ -25,6 +25,7 @@ from psdmc.errors import InputError
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.load import model_of
 from psdmc.progress import Progress, silent
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.target.native import NATIVE
@@ -44,11 +45,11 @@ def derive(
     tip: str | None = None,
     gravity: Sequence[float] | None = None,
     drive_inertia: bool | Sequence[float] = False,
-    assume_zero: Sequence[str] = (),
+    assume_zero: Sequence[str] | str = (),
     snap: float = DEFAULT_SNAP,
     expand: bool | None = None,
     progress: Progress = silent,
-    frames: Sequence[str] = (),
+    frames: Sequence[str] | str = (),
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
@@ -58,11 +59,12 @@ def derive(
     base, tip      links that a chain starts and ends at; None: the whole tree
     gravity        m/s^2 in the file's root frame; None: the file's own, or (0, 0, -9.81)
     drive_inertia  the joints' drive inertias are parameters: True, or one value a joint, kg m^2 (kg)
-    assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com"
+    assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com", or a single one
     snap           rad; constant rotations this near to one with exact zeros become it; 0 turns it off
     expand         False leaves E and P out, for robots with too many monomials; None: for robots that branch
     progress       called with the name of each step as it begins
-    frames         links that kinematic functions are about, in this order; none: the tip, or all ends of a tree
+    frames         links that kinematic functions are about, in this order, or a single one; none: the tip, or all
+                   ends of a tree
     tool           x y z (m), roll pitch yaw (rad) of one more frame, 'tool', in the tip's
     lock           joints that are held: their positions by name, rad or m
     floating       the root link of a URDF is on a free joint: q = position, quaternion xyzw, then the joints; rates are
@@ -74,6 +76,11 @@ def derive(
     from psdmc.derivation.derive import derive_model
     from psdmc.robot.load import load_robot
 
+    if not isinstance(robot, str | Path):
+        raise InputError(
+            f"a {type(robot).__name__} was given where a robot file's path is expected",
+            "give the path of a URDF or a DH .toml file",
+        )
     progress("reading the robot")
     loaded = load_robot(
         robot,
@@ -81,9 +88,9 @@ def derive(
         tip=tip,
         gravity=gravity,
         drive_inertia=drive_inertia,
-        assume_zero=assume_zero,
+        assume_zero=_names(assume_zero),
         snap=snap,
-        frames=frames,
+        frames=_names(frames),
         tool=tool,
         lock=lock,
         floating=floating,
@@ -108,25 +115,26 @@ def provenance(loaded: LoadedRobot) -> dict[str, Any]:
 
 
 def emit_c(
-    model: DynamicsModel,
+    model: DynamicsModel | str | Path,
     directory: str | Path,
     lowering: Lowering = "auto",
-    functions: Sequence[str] | None = None,
+    functions: Sequence[str] | str | None = None,
     real: Real | None = None,
     trig: Trig | None = None,
     name: str | None = None,
     force: bool = False,
     progress: Progress = silent,
     payload: bool = False,
-    adapters: Sequence[str] = (),
+    adapters: Sequence[str] | str = (),
     target: str | Target = NATIVE,
 ) -> list[str]:
     """Write the model's C package; returns the paths of the files that changed.
 
+    model      or the path of a model file
     lowering   which arithmetic: "auto" takes the cheaper per function
-    functions  names of functions to generate; None: psdmc.functions.default_of the robot. InputError where theta_b is
-               known and the mass matrix is not positive definite within the joint limits, unless forward_dynamics is left
-               out
+    functions  names of functions to generate, or one name; None: psdmc.functions.default_of the robot. InputError where
+               theta_b is known and the mass matrix is not positive definite within the joint limits, unless
+               forward_dynamics is left out
     real       precision of the package, "float64" or "float32"; None: the target's
     trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"; None: the
                target's
@@ -135,11 +143,13 @@ def emit_c(
     progress   called with the name of each step as it begins
     payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
                do not admit every load
-    adapters   names in psdmc.emit.adapters.ADAPTERS: other programs that the package is also for; functions that they
-               need are generated besides `functions`
+    adapters   names in psdmc.emit.adapters.ADAPTERS, or one name: other programs that the package is also for;
+               functions that they need are generated besides `functions`
     target     the machine that the package is for, by its name in psdmc.target.presets
     """
+    model = model_of(model)
     options = _options(lowering, real, trig, target)
+    adapters = _names(adapters)
     if adapters and not options.target.hosted:
         raise InputError(
             f"target {options.target.name} has no shared libraries, which {adapters[0]} loads",
@@ -151,9 +161,9 @@ def emit_c(
 
 
 def compile(
-    model: DynamicsModel,
+    model: DynamicsModel | str | Path,
     lowering: Lowering = "auto",
-    functions: Sequence[str] | None = None,
+    functions: Sequence[str] | str | None = None,
     real: Real | None = None,
     trig: Trig | None = None,
     progress: Progress = silent,
@@ -161,11 +171,14 @@ def compile(
 ) -> CompiledRobot:
     """The model's functions, compiled for this machine and callable on NumPy arrays; cached by content.
 
-    functions  by name, and no others; None: the default set at once, any other when it is first called
+    model      or the path of a model file
+    functions  by name, and no others, a text being one name; None: the default set at once, any other when it is first
+               called
 
     Other options as of `emit_c`. Raises InputError for a target without functions for many states, which Python calls;
     ToolchainError for a target that the compiler does not know or this machine's CPU cannot run.
     """
+    model = model_of(model)
     options = _options(lowering, real, trig, target)
     machine = options.target
     if not machine.has_batches:
@@ -190,7 +203,7 @@ def compile(
 def _package(
     model: DynamicsModel,
     lowering: Lowering,
-    functions: Sequence[str] | None,
+    functions: Sequence[str] | str | None,
     options: EmitOptions,
     name: str | None,
     progress: Progress,
@@ -219,6 +232,11 @@ def _options(
     _choose("real", real, ("float64", "float32"))
     _choose("trig", trig, ("inline", "libm", "freestanding"))
     return EmitOptions(real, trig, machine)
+
+
+def _names(given: Sequence[str] | str) -> Sequence[str]:
+    """Names where one may be given alone."""
+    return (given,) if isinstance(given, str) else given
 
 
 def _choose(option: str, value: str, allowed: Sequence[str]) -> None:

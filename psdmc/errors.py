@@ -16,7 +16,8 @@ INTERRUPTED_STATUS = 130
 
 
 class PsdmcError(Exception):
-    """Base class of errors with a cause outside psdmc; `hint` is the remedy."""
+    """Base class of errors with a cause outside psdmc; `hint` is the remedy. Tracebacks show it below the message, as a
+    note (`__notes__`)."""
 
     exit_status = 1
 
@@ -24,6 +25,8 @@ class PsdmcError(Exception):
         super().__init__(message)
         self.message = message
         self.hint = hint
+        if hint is not None:
+            self.add_note(f"hint: {hint}")
 
 
 class InputError(PsdmcError):

@@ -36,6 +36,7 @@ MAY_IMPORT |= {
 }
 
 OUTSIDE = {
+    "real_arrays": {"numpy"},
     "robot": {"numpy", "pinocchio", "defusedxml", "mujoco"},
     "dynamics": {"numpy"},
     "model": {"numpy", "scipy", "pandas", "sympy"},
@@ -89,7 +90,7 @@ ROOMS = {
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
-SHARED = {"errors", "version", "atomic", "processes", "progress"}
+SHARED = {"errors", "version", "atomic", "processes", "progress", "real_arrays"}
 ENTRY_POINTS = {"__init__", "__main__"}
 
 

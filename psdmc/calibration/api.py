@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.load import model_of
 
 if TYPE_CHECKING:
     from psdmc.calibration.calibrate import CalibrateOptions
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def calibrate(
-    model: DynamicsModel,
+    model: DynamicsModel | str | Path,
     logs: str | Path | Sequence[str | Path],
     options: CalibrateOptions | None = None,
     torque_constants: Mapping[str, float] | None = None,
@@ -24,10 +25,11 @@ def calibrate(
     The result's `verdict.word` is "usable", "usable, with doubts" or "not usable"; `verdict.reasons`, `.suspects` and
     `.doubts` say why, `.model` is the calibrated model whatever the verdict.
 
+    model              or the path of a model file
     torque_constants   N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
 
     Raises InputError where a file is missing or a log cannot be read.
     """
     from psdmc.calibration.calibrate import calibrate as run
 
-    return run(model, logs, options, torque_constants=torque_constants)
+    return run(model_of(model), logs, options, torque_constants=torque_constants)

@@ -77,12 +77,14 @@ def refuse_wide(model: DynamicsModel, names: Sequence[str]) -> None:
     )
 
 
-def wanted(functions: Sequence[str] | None, robot: Mechanism | None = None) -> tuple[str, ...]:
+def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:
     """The names in the order of psdmc.functions; None and the word 'default': the default ones, of this robot where one is
-    given; 'all': all of them. What a function calls comes along. InputError for one that is unknown."""
+    given; 'all': all of them; a text is one name. What a function calls comes along. InputError for one that is unknown."""
     default = DEFAULT if robot is None else default_of(robot)
     if functions is None:
         return default
+    if isinstance(functions, str):
+        functions = (functions,)
     groups = {"default": default, "all": tuple(RECIPES)}
     names = [name for word in functions for name in groups.get(word, (word,))]
     unknown = [name for name in names if name not in RECIPES]

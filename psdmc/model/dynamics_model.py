@@ -14,6 +14,7 @@ from psdmc.errors import InputError
 from psdmc.model import equations, evaluate, glance, payload, recursive, store, symbolic
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
+from psdmc.real_arrays import real_array
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array
 from psdmc.robot.zeros import leading_rows
 
@@ -167,13 +168,18 @@ class DynamicsModel:
         and P, by Newton-Euler on the same base parameters."""
         return self.torques_for(self.known_theta_b(), q, qd, qdd)
 
-    def torques_for(self, theta_b: Array, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    def torques_for(self, theta_b: ArrayLike, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Inverse dynamics with base parameters (l,) that are not the model's own."""
+        theta = real_array("theta_b", theta_b)
+        if theta.shape != (self.l,):
+            raise InputError(
+                f"theta_b has shape {theta.shape}, expected ({self.l},)", "give one value per base parameter"
+            )
         shape, arrays = evaluate.states(self.mechanism, q=q, qd=qd, qdd=qdd)
         if self.expansion is None:
-            found = recursive.torques(self.mechanism, self.representative @ theta_b, arrays)
+            found = recursive.torques(self.mechanism, self.representative @ theta, arrays)
         else:
-            found = evaluate.torques(self.expansion, self.mechanism, theta_b, arrays)
+            found = evaluate.torques(self.expansion, self.mechanism, theta, arrays)
         return found.reshape(*shape, self.nv)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:

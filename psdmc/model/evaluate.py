@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError
 from psdmc.model.expansion import Expansion, RowBlocks
+from psdmc.real_arrays import real_array
 from psdmc.robot.mechanism import Mechanism
 from psdmc.robot.unit_lengths import refuse_other_lengths, units_of
 
@@ -26,8 +27,8 @@ BLOCK_BYTES = 2**18
 
 def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
     """The broadcast leading shape, and each vector as (states, nv) float64, q as (states, nq); InputError where a shape
-    does not fit."""
-    arrays = {name: np.asarray(value, dtype=np.float64) for name, value in vectors.items()}
+    does not fit or values are no real numbers."""
+    arrays = {name: real_array(name, value) for name, value in vectors.items()}
     lengths = {name: chain.nq if name == "q" else chain.nv for name in vectors}
     for name, array in arrays.items():
         n = lengths[name]

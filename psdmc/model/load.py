@@ -27,6 +27,28 @@ LARGEST_MANIFEST = 64 << 20
 source."""
 
 
+ROBOT_FILES = (".urdf", ".toml", ".xml", ".xacro", ".mjcf", ".sdf")
+"""Endings of files that hold robots, not models."""
+
+
+def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
+    """The model itself, or the one in the model file of that path. InputError for a robot's file, as for anything else that
+    is no model."""
+    if isinstance(given, DynamicsModel):
+        return given
+    if not isinstance(given, str | Path):
+        raise InputError(
+            f"a {type(given).__name__} was given where a model is expected",
+            "psdmc.derive(robot_file) or psdmc.load(model_file) gives one",
+        )
+    if Path(given).suffix.lower() in ROBOT_FILES:
+        raise InputError(
+            f"{given}: a robot's file was given where a model is expected",
+            f"derive it first: psdmc.derive({str(given)!r})",
+        )
+    return load(given)
+
+
 def load(path: str | Path) -> DynamicsModel:
     """The model in a file; InputError where it is missing, damaged, forged, foreign or of a newer psdmc."""
     source = Path(path)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
 from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.real_arrays import real_array
 from psdmc.robot.unit_lengths import refuse_other_lengths
 from psdmc.toolchain.interface import Interface, batch_symbol
 from psdmc.toolchain.stubs import result_name
@@ -75,7 +76,7 @@ class CompiledFunctions:
         return found
 
     def _states(self, name: str, quantity: Quantity, values: ArrayLike) -> Array:
-        array = np.asarray(values, self._dtype)
+        array = real_array(f"{name}: {quantity.name}", values, self._dtype)
         tail = self._sizes.shape(quantity.axes)
         if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:
             expected = ", ".join(("...", *map(str, tail)))
@@ -122,7 +123,7 @@ class CompiledFunctions:
             ) from None
 
     def _parameters(self, name: str, theta_b: ArrayLike) -> Array:
-        array = np.ascontiguousarray(theta_b, self._dtype)
+        array = np.ascontiguousarray(real_array(f"{name}: theta_b", theta_b, self._dtype))
         if array.shape != (self._sizes.l,):
             raise InputError(
                 f"{name}: theta_b has shape {array.shape}, expected ({self._sizes.l},)",
