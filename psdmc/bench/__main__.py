@@ -9,8 +9,9 @@ from pathlib import Path
 
 from psdmc.atomic import write_whole
 from psdmc.bench.cases import standard_cases
+from psdmc.bench.defaults import ROUNDS
 from psdmc.bench.rivals import EVERYONE
-from psdmc.bench.run import ROUNDS, Settings, run
+from psdmc.bench.run import Settings, run
 from psdmc.bench.scaling import scaling_cases
 from psdmc.bench.table import as_text
 from psdmc.errors import exit_status_of

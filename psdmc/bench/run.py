@@ -9,6 +9,7 @@ from psdmc.bench.agree import CHECKED, disagreement, tolerance
 from psdmc.bench.assemble import Assembled, assemble
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Runner, Unavailable
+from psdmc.bench.defaults import ROUNDS, SEED
 from psdmc.bench.machine import this_machine
 from psdmc.bench.measure import measure
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
@@ -17,10 +18,6 @@ from psdmc.bench.states import COUNT, States
 from psdmc.bench.threads import measure_threads
 from psdmc.bench.versions import versions
 from psdmc.progress import Progress, silent
-
-SEED = 20_260
-ROUNDS = 10
-"""Trials that count; with 1,024 blocks each, the 99.99th percentile is taken from more than 10,000 blocks."""
 
 SCALED = psdmc_c.EXPANDED
 SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")

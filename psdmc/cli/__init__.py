@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import sys
+
 from psdmc.cli.interrupt import as_error, at_once
+from psdmc.errors import exit_status_of
+from psdmc.version import psdmc_version
 
 __all__ = ["main"]
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; Ctrl-C ends it without a traceback, from here on."""
+    """Run the command line; Ctrl-C ends it without a traceback, from here on. The option --version loads nothing."""
+    if (sys.argv[1:] if arguments is None else arguments) == ["--version"]:
+        sys.exit(exit_status_of(_print_version))
     with at_once():
         from psdmc.cli.boundary import run
     with as_error():
         run(arguments)
+
+
+def _print_version() -> None:
+    print(f"psdmc {psdmc_version()}")

@@ -8,7 +8,8 @@ import os
 import sys
 
 from psdmc.cli import interrupt
-from psdmc.cli.commands import app, needs_measuring
+from psdmc.cli.commands import app
+from psdmc.cli.lists import with_numbers_joined
 from psdmc.cli.one_line import one_line
 from psdmc.errors import INTERRUPTED_STATUS, InternalError, PsdmcError, ToolchainError
 
@@ -42,12 +43,8 @@ def run(arguments: list[str] | None = None) -> None:
 
 def _run(words: list[str]) -> None:
     """Run the command and flush its output: a full disk behind standard output raises here."""
-    if needs_measuring(words):
-        with interrupt.at_once():
-            from psdmc.cli.measuring import add_commands
-        add_commands(app)
     try:
-        app(words)
+        app(with_numbers_joined(words), prog_name="psdmc")
     except SystemExit as left:
         with contextlib.suppress(BrokenPipeError) if left.code else contextlib.nullcontext():
             sys.stdout.flush()

@@ -3,52 +3,43 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.atomic import write_whole
-from psdmc.bench.case import Case
-from psdmc.bench.run import Settings, run
-from psdmc.bench.table import as_text
-from psdmc.calibration.calibrate import CalibrateOptions
-from psdmc.calibration.campaign import CampaignOptions
-from psdmc.calibration.campaign_file import is_campaign
-from psdmc.calibration.identify.linear_fit import LinearOptions
-from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.motions.excite import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
-from psdmc.calibration.simulate_campaign import SimulateOptions
-from psdmc.calibration.verdict.record import verdict_of
-from psdmc.calibration.verdict.said_once import unsaid_warnings
+from psdmc.bench.defaults import ROUNDS
+from psdmc.calibration.motions.excite_options import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
+from psdmc.cli import interrupt
+from psdmc.cli.lists import assignments
+from psdmc.cli.next_step import quoted, say_next, say_next_line
 from psdmc.cli.one_line import one_line
 from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
-from psdmc.cli.show import print_accuracy, print_verdict
 from psdmc.errors import InputError
-from psdmc.model.load import load
-from psdmc.report.bench_page import write_page
-from psdmc.report.calibrate_commands import calibrate_command, excite_command, simulate_command
+
+if TYPE_CHECKING:
+    from psdmc.calibration.identify.linear_fit import LinearOptions
 
 WRONG_STATUS = 5
 """A contestant's results disagreed with the others'."""
-
-
-def add_commands(app: typer.Typer) -> None:
-    """Add the commands of this module to the command line, once."""
-    if any(known.callback is bench for known in app.registered_commands):
-        return
-    for command in (bench, excite, simulate, calibrate):
-        app.command()(command)
 
 
 def bench(
     models: Annotated[list[Path], typer.Argument(metavar="MODEL...", help="model files")],
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="write a page")] = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE.json", help="write every figure")] = None,
-    rounds: Annotated[int, typer.Option(min=1, help="trials that count")] = Settings().rounds,
+    rounds: Annotated[int, typer.Option(min=1, help="trials that count")] = ROUNDS,
     counts: Annotated[bool, typer.Option("--counts", help="count instructions too (valgrind)")] = False,
 ) -> None:
     """Time generated code against Pinocchio, CasADi and MuJoCo in the same run."""
+    with interrupt.at_once():
+        from psdmc.atomic import write_whole
+        from psdmc.bench.case import Case
+        from psdmc.bench.run import Settings, run
+        from psdmc.bench.table import as_text
+        from psdmc.model.load import load
+        from psdmc.report.bench_page import write_page
+
     check_output(report, *models)
     check_output(json, *models, *([report] if report else []))
     cases = [Case(path.stem, load(path)) for path in models]
@@ -57,10 +48,16 @@ def bench(
     print(as_text(result))
     if report is not None:
         write_page(result, report, "psdmc bench " + " ".join(path.name for path in models))
+        print(f"{report}: page written")
     if json is not None:
         write_whole(json, result.to_json())
+        print(f"{json}: figures written")
     if result.wrong:
         raise typer.Exit(WRONG_STATUS)
+    if report is None:
+        say_next("bench", *models, "--report", f"{models[0].stem}.html")
+    else:
+        say_next("emit-c", models[0], "-o", models[0].stem)
 
 
 def excite(
@@ -83,6 +80,10 @@ def excite(
     ] = False,
 ) -> None:
     """Plan a calibration campaign: gravity sweeps, friction sines, and an exciting motion within the limits."""
+    with interrupt.at_once():
+        from psdmc.calibration.campaign import CampaignOptions
+        from psdmc.report.calibrate_commands import excite_command
+
     search = ExciteOptions(
         duration=duration,
         harmonics=tuple(range(1, harmonics + 1)),
@@ -98,6 +99,11 @@ def excite(
     print(
         f"{output}: condition number {found.condition:.3g}, {found.gain:.2f} times below the best random {best:.3g}"
     )
+    calibrated = f"{model.stem}_calibrated.npz"
+    words = " ".join(
+        quoted(word) for word in (model, output, "-o", calibrated, "--report", f"{model.stem}.html")
+    )
+    say_next_line(f"record the runs that {output / 'campaign.toml'} lists, then: psdmc calibrate {words}")
 
 
 def simulate(
@@ -111,9 +117,14 @@ def simulate(
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 1,
 ) -> None:
     """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
+    with interrupt.at_once():
+        from psdmc.calibration.simulate_campaign import SimulateOptions
+        from psdmc.report.calibrate_commands import simulate_command
+
     with steps() as progress:
         count = simulate_command(plant, campaign, SimulateOptions(ideal, harness, seed, workers), progress)
     print(f"{campaign}: {count} runs simulated, the others were up to date")
+    say_next_line(f"psdmc calibrate MODEL.npz {quoted(campaign)} -o calibrated.npz --report calibrated.html")
 
 
 def calibrate(
@@ -134,8 +145,9 @@ def calibrate(
         ),
     ] = None,
     torque_constants: Annotated[
-        str, typer.Option(metavar="JOINT=KT,...", help="N m/A, for plain logs that hold currents")
-    ] = "",
+        list[str] | None,
+        typer.Option(metavar="JOINT=KT,...", help="N m/A, for plain logs that hold currents"),
+    ] = None,
     cutoff: Annotated[
         float | None, typer.Option(metavar="HZ", help="of the filter of plain logs; 8, or less for slow logs")
     ] = None,
@@ -144,6 +156,13 @@ def calibrate(
     ] = False,
 ) -> None:
     """Identify base parameters, friction and motor constants from logs; the verdict comes first, exit 6: not usable."""
+    with interrupt.at_once():
+        from psdmc.calibration.calibrate import CalibrateOptions
+        from psdmc.calibration.verdict.record import verdict_of
+        from psdmc.calibration.verdict.said_once import unsaid_warnings
+        from psdmc.cli.show_checks import print_accuracy, print_verdict
+        from psdmc.report.calibrate_commands import calibrate_command
+
     check_output(output, model, *logs)
     check_report(report, model, output, *logs)
     with steps() as progress:
@@ -171,12 +190,20 @@ def calibrate(
         print(f"note: {one_line(note)}")
     for warning in unsaid_warnings(record):
         print(f"warning: {one_line(warning)}")
+    for written, what in ((report, "page"), (actuators, "friction and motors in C")):
+        if written is not None and written.exists():
+            print(f"{written}: {what}")
     if not verdict.usable:
         raise typer.Exit(verdict.exit_status)
+    say_next("emit-c", output, "-o", output.stem)
 
 
 def _linear(cutoff: float | None, logs: list[Path]) -> LinearOptions:
     """Options of the linear fit; a campaign's steps have cut-offs of their own."""
+    from psdmc.calibration.campaign_file import is_campaign
+    from psdmc.calibration.identify.linear_fit import LinearOptions
+    from psdmc.calibration.logs.low_pass import FilterOptions
+
     if cutoff is None:
         return LinearOptions()
     campaigns = [path for path in logs if is_campaign(path)]
@@ -185,12 +212,10 @@ def _linear(cutoff: float | None, logs: list[Path]) -> LinearOptions:
     return LinearOptions(filter=FilterOptions(cutoff=cutoff))
 
 
-def _torque_constants(text: str) -> dict[str, float] | None:
+def _torque_constants(given: list[str] | None) -> dict[str, float] | None:
     """'joint=36.1,...' as a dict; None where nothing is given."""
-    if not text:
-        return None
     found: dict[str, float] = {}
-    for word in text.split(","):
+    for word in assignments(given):
         name, _, value = word.rpartition("=")
         try:
             constant = float(value)
@@ -201,4 +226,4 @@ def _torque_constants(text: str) -> dict[str, float] | None:
             what = f"joint {name!r} twice" if name else f"{word!r} names no joint"
             raise InputError(f"--torque-constants: {what}", "write JOINT=NUMBER,JOINT=NUMBER")
         found[name] = constant
-    return found
+    return found or None

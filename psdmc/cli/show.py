@@ -1,116 +1,106 @@
-"""Tables that commands print."""
+"""What `psdmc show` prints of a model."""
 
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-
-from psdmc.cli.one_line import one_line
 from psdmc.cli.show_calibration import print_calibration, standard_deviations
-from psdmc.errors import InputError
+from psdmc.cli.tables import TERMS, Table, print_line, print_table
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.mass_check import MassCheck
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
-from psdmc.robot.coordinates import leaders
-from psdmc.robot.derivable import require_derivable
 from psdmc.robot.mechanism import Mechanism
-
-if TYPE_CHECKING:
-    from psdmc.calibration.verdict.record import Calibration
-    from psdmc.calibration.verdict.verdict import Verdict
-    from psdmc.verification.check import CheckRow
-
-WIDTH = 160
-"""Columns of a table where the output is no terminal, so that nothing is cut."""
-
-
-def console() -> Console:
-    terminal = Console()
-    return terminal if terminal.is_terminal else Console(width=WIDTH)
 
 
 def print_model(model: DynamicsModel) -> None:
     """The model at a glance: robot, joints, sizes, base parameters, certificate, notes."""
     found = summary(model)
-    out = console()
     calibrated = model.provenance.get("calibration")
     if calibrated is not None:
-        print_calibration(out, calibrated)
-    out.print(
-        f"[bold]{escape(found.name)}[/bold]  {escape(found.base)} to {escape(found.ends)}, {found.convention} frames"
-    )
-    out.print(f"gravity {_numbers(found.gravity)} m/s^2 in the base frame")
-    out.print(_sizes(found))
-    out.print(_joints(model.mechanism, found.certificate))
-    out.print(_parameters(found, calibrated or {}))
-    out.print(f"largest torque error against Newton-Euler, relative: {max(found.certificate):.1e}")
+        print_calibration(calibrated)
+    print_line(f"{found.name}: {found.base} to {found.ends}, {found.convention} frames")
+    print_line(f"gravity {_numbers(found.gravity)} m/s^2 in the base frame")
+    print("\n".join(_sizes(found)))
+    print()
+    print_table(_joints(model.mechanism, joint_errors(model.mechanism, found.certificate)))
+    print()
+    print_table(_parameters(found, calibrated or {}))
+    print()
+    print_line(f"largest torque error against Newton-Euler, relative: {max(found.certificate):.1e}")
     for note in found.notes:
-        out.print(f"note: {escape(note)}")
+        print_line(f"note: {note}")
     for line in _snapping(model):
-        out.print(line)
-    source = f"{found.source_name} (sha256 {found.source_sha256})" if found.source_name else "not kept"
-    out.print(f"source {escape(source)}")
-    out.print(f"model hash {found.content_hash}")
+        print_line(line)
+    print_line(f"source: {found.source_name or 'not kept'}")
+    if found.source_name:
+        print_line(f"source's sha256: {found.source_sha256}")
+    print_line(f"model hash: {found.content_hash}")
 
 
-def _sizes(found: Summary) -> str:
+def _sizes(found: Summary) -> list[str]:
     if found.sizes is None or found.p is None:
         why = "--no-expand" if found.is_serial else "a tree's are only with --expand"
         if not all(joint.type.about_z for joint in found.joints):
             why = "they are of joints of one coordinate"
-        return f"l = {found.l} base parameters; monomials not expanded ({why})"
+        return [f"l = {found.l} base parameters; monomials not expanded ({why})"]
     parts = ", ".join(f"{count} {kind}" for kind, count in found.sizes._asdict().items())
-    return f"p = {found.p} monomials ({parts}), l = {found.l} base parameters, {found.entries} entries of P"
+    return [
+        f"p = {found.p} monomials ({parts})",
+        f"l = {found.l} base parameters, {found.entries} entries of P",
+    ]
 
 
-def _joints(robot: Mechanism, errors: Sequence[float]) -> Table:
-    """What each joint is; of a tree also the link that it hangs on, and where joints follow others what their q is. `errors`
-    nv, of which a joint's largest is shown."""
-    heads = ("type", "position", "speed", "acceleration", "effort", "error")
-    table = Table(
-        "joint",
-        "link",
+def joint_errors(robot: Mechanism, certificate: Sequence[float]) -> list[float | None]:
+    """Each joint's largest entry of the certificate (nv,); None of a joint that has no rate of its own."""
+    of_joint = [
+        [error for k, error in zip(robot.rate_joints, certificate, strict=True) if k == i]
+        for i in range(len(robot))
+    ]
+    return [max(own, default=None) for own in of_joint]
+
+
+def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
+    """What each joint is; of a tree also the link that it hangs on, and where joints follow others what their q is."""
+    heads = (
+        *("joint", "link"),
         *(() if robot.is_serial else ("hangs on",)),
         *(("q",) if robot.has_followers else ()),
-        *heads,
+        *("type", "position", "speed", "acceleration", "effort", "error"),
     )
-    for i, joint in enumerate(robot.joints):
-        own = [error for k, error in zip(robot.rate_joints, errors, strict=True) if k == i]
-        unit = joint.type.position_unit
-        limits = joint.limits
-        table.add_row(
-            escape(joint.name),
-            escape(joint.link_name),
-            *(() if robot.is_serial else (escape(robot.parent_link(i)),)),
-            *((escape(_followed(robot, i)),) if robot.has_followers else ()),
-            joint.type.word,
-            _range(limits.lower, limits.upper, unit),
-            _limit(limits.speed, f"{unit}/s"),
-            _limit(limits.acceleration, f"{unit}/s^2"),
-            _limit(limits.effort, joint.type.effort_unit),
-            f"{max(own):.1e}" if own else "",
+    rows = []
+    for i, (joint, error) in enumerate(zip(robot.joints, errors, strict=True)):
+        unit, limits = joint.type.position_unit, joint.limits
+        rows.append(
+            (
+                joint.name,
+                joint.link_name,
+                *(() if robot.is_serial else (robot.parent_link(i),)),
+                *((followed(robot, i),) if robot.has_followers else ()),
+                joint.type.word,
+                position_range(limits.lower, limits.upper, unit),
+                _limit(limits.speed, f"{unit}/s"),
+                _limit(limits.acceleration, f"{unit}/s^2"),
+                _limit(limits.effort, joint.type.effort_unit),
+                "" if error is None else f"{error:.1e}",
+            )
         )
-    return table
+    return Table(heads, rows)
 
 
 def _parameters(found: Summary, calibrated: Mapping[str, Any]) -> Table:
+    """theta_b, numbered from 0 as in the generated header and in Python."""
     stds = standard_deviations(calibrated, len(found.base_parameters))
-    heads = ["theta_b", "value", *(["+-"] if calibrated else []), "unit", "equation, about the link frames"]
-    table = Table(*heads)
-    for index, (parameter, std) in enumerate(zip(found.base_parameters, stds, strict=True), start=1):
+    heads = ("theta_b", "value", *(["+-"] if calibrated else []), "unit", "equation, about the link frames")
+    rows = []
+    for index, (parameter, std) in enumerate(zip(found.base_parameters, stds, strict=True)):
         value = "unknown" if parameter.value is None else f"{parameter.value:.6g}"
         given = [std] if calibrated else []
-        table.add_row(str(index), value, *given, parameter.unit, escape(parameter.equation))
-    return table
+        rows.append((str(index), value, *given, parameter.unit, parameter.equation))
+    return Table(heads, rows, prose=True, breaks=TERMS)
 
 
 def _snapping(model: DynamicsModel) -> list[str]:
@@ -126,10 +116,24 @@ def _limit(value: float, unit: str) -> str:
     return "none" if math.isinf(value) else f"{value:.4g} {unit}"
 
 
-def _range(lower: float, upper: float, unit: str) -> str:
+def position_range(lower: float, upper: float, unit: str) -> str:
+    """A joint's range in words."""
     if math.isinf(lower) and math.isinf(upper):
         return "none"
     return f"{lower:.4g} .. {upper:.4g} {unit}"
+
+
+def followed(found: Mechanism, i: int) -> str:
+    """What a joint's q is: its own, that of the joint it follows, or a number."""
+    coordinate = found.coordinates[i]
+    if coordinate.leader is None:
+        return f"{coordinate.offset:g}"
+    if coordinate.leader == i:
+        return "its own"
+    offset = (
+        f" {'-' if coordinate.offset < 0 else '+'} {abs(coordinate.offset):g}" if coordinate.offset else ""
+    )
+    return f"{coordinate.ratio:g} q of {found.joints[coordinate.leader].name}{offset}"
 
 
 def _numbers(values: Iterable[float]) -> str:
@@ -142,106 +146,39 @@ def print_terms(model: DynamicsModel) -> None:
         print(f"y{index} = {text}")
 
 
-def print_cost(model: DynamicsModel, lowerings: Sequence[Lowering]) -> None:
-    """Operations of each function per lowering; for one state, and where they differ for one state per lane."""
-    table = Table("function", "lowering", "mul", "add", "mul + add", "div", "sincos", "fused", "in lanes")
+COSTS = ("mul", "add", "total", "div", "sincos", "fused")
+"""Counts of psdmc.program.cost.Cost that are shown."""
+
+
+def cost_rows(
+    model: DynamicsModel, lowerings: Sequence[Lowering]
+) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
+    """Operations of each function per lowering, for one state and for one state per lane; and what is left out and why."""
+    rows = []
     functions, notes = admitted(model)
-    for note in notes:
-        print(f"note: {note}")
     for lowering in lowerings:
         for name, kernel in lower(model, lowering, functions).items():
             if kernel.lowering == lowering:
                 one, lanes = cost(kernel.single), cost(kernel.batch)
-                figures = (one.mul, one.add, one.total, one.div, one.sincos, one.fused)
-                table.add_row(name, lowering, *map(str, figures), f"{lanes.total} + {lanes.sincos} sincos")
-    console().print(table)
+                counts = {key: getattr(one, key) for key in COSTS}
+                in_lanes = {"total": lanes.total, "sincos": lanes.sincos}
+                rows.append({"function": name, "lowering": lowering, **counts, "lanes": in_lanes})
+    return rows, tuple(notes)
 
 
-def megabytes(size: int) -> str:
-    return f"{size / 2**20:.1f} MiB"
-
-
-def print_check(rows: Sequence[CheckRow]) -> None:
-    """Print each comparison, whether it passed, and the readers of the source."""
-    from psdmc.verification.check import readers
-
-    table = Table("quantity", "against", "relative error", "limit", "", "")
-    for row in rows:
-        limit = "" if row.limit is None else f"{row.limit:.0e}"
-        error = "" if math.isnan(row.error) and row.limit is None else f"{row.error:.1e}"
-        verdict = "" if row.limit is None else "pass" if row.passed else "FAIL"
-        table.add_row(row.name, row.against, error, limit, verdict, escape(row.remark))
-    out = console()
-    out.print(table)
-    out.print(readers(rows))
-
-
-def print_mass_check(mass: MassCheck | None) -> None:
-    """Whether the mass matrix is positive definite over the joint limits, or why that was not tested."""
-    if mass is None:
-        print("mass matrix: not tested, for the base parameters are unknown")
-        return
-    print(f"{'pass' if mass.passed else 'FAIL'}: {mass.reason}")
-
-
-def print_verdict(verdict: Verdict) -> None:
-    """Print whether a calibration can be used, with reasons and doubts."""
-    for line in verdict.lines():
-        print(one_line(line))
-
-
-def print_accuracy(record: Calibration) -> None:
-    """R^2 on held-out data per joint and step."""
-    table = Table("joint", *(f"{step.step} R^2" for step in record.steps))
-    for joint in record.joint_names:
-        both = [step.joints.get(joint) for step in record.steps]
-        table.add_row(escape(joint), *("" if b is None else f"{b.held_out.r2:.4f}" for b in both))
-    console().print(table)
-
-
-def print_mechanism(found: Mechanism) -> None:
-    """What a robot file holds: its bodies, what each hangs on and follows, and whether psdmc derives it."""
-    out = console()
-    count, own = len(found), len(leaders(found.coordinates))
-    shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
-    name, base = escape(found.name), escape(found.base_name)
-    out.print(f"[bold]{name}[/bold]  {shape} of {count} joints with {own} coordinates, from {base}")
-    out.print(_bodies(found))
-    for note in found.notes:
-        out.print(f"note: {escape(note)}")
-    try:
-        require_derivable(found)
-    except InputError as refused:
-        out.print(f"not derived as a whole: {escape(str(refused))}")
-        out.print(f"hint: {escape(str(refused.hint))}")
-    for leaf in found.leaves if len(found.leaves) > 1 else ():
-        moving = len(found.path_to(leaf))
-        out.print(f"--tip {escape(shlex.quote(found.joints[leaf].link_name))}: {moving} joints")
-
-
-def _bodies(found: Mechanism) -> Table:
-    table = Table("joint", "link", "hangs on", "type", "q", "position", "mass")
-    for i, joint in enumerate(found.joints):
-        unit, limits = joint.type.position_unit, joint.limits
-        table.add_row(
-            escape(joint.name),
-            escape(joint.link_name),
-            escape(found.parent_link(i)),
-            joint.type.word,
-            escape(_followed(found, i)),
-            _range(limits.lower, limits.upper, unit),
-            f"{found.parameters[i, 0]:.6g} kg",
+def print_cost(model: DynamicsModel, lowerings: Sequence[Lowering]) -> None:
+    """Print the operations of each function per lowering."""
+    rows, notes = cost_rows(model, lowerings)
+    for note in notes:
+        print_line(f"note: {note}")
+    texts = [
+        (
+            row["function"],
+            row["lowering"],
+            *(str(row[key]) for key in COSTS),
+            f"{row['lanes']['total']} + {row['lanes']['sincos']} sincos",
         )
-    return table
-
-
-def _followed(found: Mechanism, i: int) -> str:
-    coordinate = found.coordinates[i]
-    if coordinate.leader is None:
-        return f"{coordinate.offset:g}"
-    if coordinate.leader == i:
-        return "its own"
-    offset = (
-        f" {'-' if coordinate.offset < 0 else '+'} {abs(coordinate.offset):g}" if coordinate.offset else ""
-    )
-    return f"{coordinate.ratio:g} q of {found.joints[coordinate.leader].name}{offset}"
+        for row in rows
+    ]
+    heads = ("function", "lowering", "mul", "add", "mul + add", "div", "sincos", "fused", "in lanes")
+    print_table(Table(heads, texts, keys=2))

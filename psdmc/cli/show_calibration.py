@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-
 from psdmc.cli.one_line import one_line
+from psdmc.cli.tables import Table, print_table
 
 MOST_LOGS = 8
 """Logs that are listed; a campaign has thirty."""
 
 
-def print_calibration(out: Console, kept: Mapping[str, Any]) -> None:
+def print_calibration(kept: Mapping[str, Any]) -> None:
     """Verdict, logs and their dates, held-out R^2 and residual of every joint, and its friction.
 
     kept  the `calibration` of a model's provenance; what an older psdmc did not write is left out
@@ -29,7 +26,8 @@ def print_calibration(out: Console, kept: Mapping[str, Any]) -> None:
         print(f"log: {one_line(row['log'])}, {row['rows']:,} rows, {row['seconds']:.4g} s{date}")
     if len(logs) > MOST_LOGS:
         print(f"and {len(logs) - MOST_LOGS} more logs")
-    out.print(_joints(kept))
+    print_table(_joints(kept))
+    print()
 
 
 def _verdict(verdict: Mapping[str, Any] | None) -> list[str]:
@@ -42,17 +40,17 @@ def _verdict(verdict: Mapping[str, Any] | None) -> list[str]:
 
 def _joints(kept: Mapping[str, Any]) -> Table:
     """R^2 and RMSE of the whole torque, torque constant and friction, joint by joint."""
-    rows = [*kept.get("motors", []), *kept.get("friction", [])]
-    names = list(dict.fromkeys((row["name"], row["unit"]) for row in rows))
-    by_joint = {(row["joint"], row["name"]): row for row in rows}
+    constants = [*kept.get("motors", []), *kept.get("friction", [])]
+    names = list(dict.fromkeys((row["name"], row["unit"]) for row in constants))
+    by_joint = {(row["joint"], row["name"]): row for row in constants}
     quality = kept.get("quality", {}).get("All", {})
     heads = [f"{name.replace('_', ' ')} [{unit}]" for name, unit in names]
-    table = Table("joint", "R^2 held out", "RMSE held out", *(escape(head) for head in heads))
+    rows = []
     for joint in kept.get("joints", []):
         held_out = quality.get(joint, {}).get("held_out", {})
         figures = [_number(held_out.get("r2"), ".4f"), _number(held_out.get("rmse"), ".3g")]
-        table.add_row(escape(joint), *figures, *(_row(by_joint.get((joint, name))) for name, _ in names))
-    return table
+        rows.append((joint, *figures, *(_row(by_joint.get((joint, name))) for name, _ in names)))
+    return Table(("joint", "R^2 held out", "RMSE held out", *heads), rows)
 
 
 def _row(row: Mapping[str, Any] | None) -> str:

@@ -11,9 +11,6 @@ import pytest
 import typer
 
 from psdmc.cli.commands import app
-from psdmc.cli.measuring import add_commands
-
-add_commands(app)
 
 PACKAGE = Path(__file__).resolve().parents[2] / "psdmc"
 ERRORS = ("InputError", "DerivationError", "ToolchainError", "Fault")

@@ -10,9 +10,6 @@ from blocks import ROOT, blocks, documents, run
 from unoptimised import wrapper
 
 from psdmc.cli.commands import app
-from psdmc.cli.measuring import add_commands
-
-add_commands(app)
 
 LINK = re.compile(r"\[[^\]]*\]\(([^)#\s]+)(?:#[^)]*)?\)")
 RUNNABLE = [path for path in documents() if any(b.language in ("pycon", "console") for b in blocks(path))]

@@ -196,7 +196,7 @@ def test_derive_writes_nothing_to_a_home_and_says_nothing_of_it(tmp_path: Path):
     done = typed("derive", SCARA, "-o", tmp_path / "m.npz", **surroundings)
 
     assert done.returncode == 0
-    assert done.stderr == ""
+    assert done.stderr == f"next: psdmc check {tmp_path / 'm.npz'}\n"
 
 
 def test_pictures_are_drawn_without_a_home_and_without_a_word(tmp_path: Path):
@@ -221,8 +221,14 @@ def test_pictures_are_drawn_without_a_home_and_without_a_word(tmp_path: Path):
     assert (done.stdout, done.stderr) == ("<svg\n", "")
 
 
-BESIDE = ("matplotlib", "psdmc.calibration", "psdmc.bench", "psdmc.report")
+BESIDE = ("matplotlib", "psdmc.calibration.calibrate", "psdmc.bench.run", "psdmc.report")
 """What commands beside the pipeline are made of."""
+
+DEFAULTS = {
+    *("psdmc.bench", "psdmc.bench.defaults"),
+    *("psdmc.calibration", "psdmc.calibration.motions", "psdmc.calibration.motions.excite_options"),
+}
+"""Of which the command line loads what its help says."""
 
 
 @pytest.mark.parametrize(
@@ -247,6 +253,8 @@ def test_a_command_loads_what_it_needs(words: list[str], absent: tuple[str, ...]
     )
     loaded = done.stderr.split("loaded:")[1].split()
     assert not set(absent) & set(loaded)
+    beside = [name for name in loaded if name.startswith(("psdmc.bench", "psdmc.calibration"))]
+    assert set(beside) <= DEFAULTS
 
 
 def test_names_of_the_package_are_loaded_when_used():

@@ -28,7 +28,7 @@ from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.cli import main
-from psdmc.cli.show import print_accuracy
+from psdmc.cli.show_checks import print_accuracy
 from psdmc.compiler import emit_c
 from psdmc.errors import InputError
 from psdmc.model.load import load

@@ -1,0 +1,129 @@
+"""What `psdmc doctor` finds: packages, programs and folders, what each is needed for, and how to get what is missing."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+import re
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from psdmc.errors import PsdmcError
+from psdmc.version import psdmc_version
+
+NEEDED = (
+    ("numpy", "arrays"),
+    ("scipy", "derivation, calibration"),
+    ("pin", "Pinocchio: reading robot files, checking models"),
+    ("jinja2", "templates of C and of pages"),
+    ("cffi", "calling compiled code"),
+    ("setuptools", "building what cffi calls"),
+    ("typer", "the command line"),
+    ("rich", "progress on a terminal"),
+    ("matplotlib", "plots of reports"),
+    ("defusedxml", "reading XML safely"),
+)
+"""Packages that psdmc cannot do without, as pyproject.toml names them, and what each is for."""
+
+OPTIONAL = (
+    ("mujoco", "mjcf", "MJCF files; a second reader in psdmc check; a rival in psdmc bench"),
+    ("xacro", "xacro", "xacro files"),
+    ("casadi", "bench", "emit-c --with casadi, in your own program; a rival in psdmc bench"),
+    ("cmeel-cppadcodegen", "bench", "a rival in psdmc bench"),
+    ("cmeel-eigen", "bench", "headers for the rival Pinocchio in psdmc bench"),
+    ("crocoddyl", "examples", "the example of trajectory optimisation"),
+    ("cvxpy", "calibrate", "psdmc calibrate: physical consistency"),
+    ("clarabel", "calibrate", "psdmc calibrate: its solver"),
+    ("cma", "calibrate", "psdmc excite, and friction in psdmc calibrate"),
+    ("rosbags", "calibrate", "logs in ROS bags"),
+    ("lz4", "calibrate", "compressed ROS bags"),
+    ("backports.zstd", "calibrate", "compressed ROS bags, before Python 3.14"),
+    ("pyarrow", "calibrate", "logs in Parquet files"),
+)
+"""Packages, the extra of psdmc that brings each, and the commands or files that need it."""
+
+PROGRAMS = (
+    ("cmake", "psdmc build", "apt install cmake"),
+    ("make", "psdmc build without CMake", "apt install make"),
+    ("g++", "the rival Pinocchio in psdmc bench", "apt install g++"),
+    ("valgrind", "psdmc bench --counts", "apt install valgrind"),
+)
+"""Programs besides the C compiler, what needs each, and how Debian installs it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One part.
+
+    found    its version or place; '' where it is missing
+    needed   whether psdmc cannot do without it
+    purpose  what needs it
+    remedy   how to get it where it is missing
+    """
+
+    part: str
+    found: str
+    needed: bool
+    purpose: str
+    remedy: str
+
+
+def findings() -> tuple[Finding, ...]:
+    """All parts, what psdmc cannot do without first."""
+    return (
+        Finding("psdmc", psdmc_version(), True, "", ""),
+        Finding(
+            "python", f"{platform.python_version()}, {platform.system()} {platform.machine()}", True, "", ""
+        ),
+        _compiler(),
+        _cache(),
+        *(_package(name, "", purpose) for name, purpose in NEEDED),
+        *(_program(*row) for row in PROGRAMS),
+        *(_package(name, extra, purpose) for name, extra, purpose in OPTIONAL),
+    )
+
+
+def missing(parts: Sequence[Finding]) -> tuple[Finding, ...]:
+    """The parts that psdmc cannot do without and that are not there."""
+    return tuple(part for part in parts if part.needed and not part.found)
+
+
+def _package(name: str, extra: str, purpose: str) -> Finding:
+    try:
+        found = importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        found = ""
+    remedy = f"pip install 'psdmc[{extra}]'" if extra else f"pip install {name}"
+    return Finding(name, found, not extra, purpose, remedy)
+
+
+def _program(name: str, purpose: str, remedy: str) -> Finding:
+    return Finding(name, shutil.which(name) or "", False, purpose, remedy)
+
+
+def _compiler() -> Finding:
+    """The C compiler that psdmc takes, tried on a file, or why it takes none."""
+    from psdmc.toolchain.compiler_command import find_compiler
+
+    purpose = "psdmc.compile, psdmc build, psdmc bench"
+    try:
+        compiler = find_compiler()
+    except PsdmcError as error:
+        return Finding("C compiler", "", True, f"{purpose}: {error.message}", error.hint or "install gcc")
+    number = re.search(r"\d+(\.\d+)+", compiler.version)
+    return Finding(
+        "C compiler", " ".join([*compiler.command, number[0] if number else ""]), True, purpose, ""
+    )
+
+
+def _cache() -> Finding:
+    """The folder of the compile cache, or why it cannot be used."""
+    from psdmc.toolchain.cache_room import cache_contents
+
+    purpose = "keeping compiled libraries"
+    try:
+        kept = cache_contents()
+    except PsdmcError as error:
+        return Finding("cache", "", True, f"{purpose}: {error.message}", error.hint or "set PSDMC_CACHE_DIR")
+    return Finding("cache", f"{kept.place}", True, purpose, "")

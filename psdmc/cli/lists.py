@@ -1,0 +1,70 @@
+"""Options that take a list: separated by commas, by repeating the option, and numbers also as several words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from psdmc.errors import InputError
+
+SEVERAL_WORDS: Mapping[str, int] = {"--gravity": 3, "--tool": 6}
+"""Options of as many numbers, which may stand side by side: `--gravity 0 0 -9.81`."""
+
+
+def names(given: Sequence[str] | None) -> tuple[str, ...]:
+    """The names in all values of an option, in order."""
+    return tuple(name for value in given or () for word in value.split(",") if (name := word.strip()))
+
+
+def numbers(given: Sequence[str] | None, option: str, hint: str) -> tuple[float, ...] | None:
+    """The numbers in all values of an option, in order; None where it is not given, InputError where one is no number."""
+    if not given:
+        return None
+    text = ",".join(given)
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise InputError(f"{option} is {text!r}", hint) from None
+
+
+def assignments(given: Sequence[str] | None) -> tuple[str, ...]:
+    """The texts NAME=VALUE in all values of an option, in order. A comma ends one only where another one follows: names of
+    robot files may have commas."""
+    found: list[str] = []
+    for value in given or ():
+        pending: list[str] = []
+        for word in value.split(","):
+            pending.append(word)
+            if "=" in word:
+                found.append(",".join(pending).strip())
+                pending = []
+        if pending:
+            found.append(",".join(pending).strip())
+    return tuple(word for word in found if word)
+
+
+def with_numbers_joined(words: Sequence[str]) -> list[str]:
+    """A command line whose SEVERAL_WORDS have one word each: `--gravity 0 0 -9.81` becomes `--gravity 0,0,-9.81`."""
+    joined: list[str] = []
+    rest = list(words)
+    while rest:
+        word = rest.pop(0)
+        joined.append(word)
+        most = SEVERAL_WORDS.get(word, 0)
+        taken: list[str] = []
+        while rest and sum(map(_count, taken)) < most and _is_numeric(rest[0]):
+            taken.append(rest.pop(0))
+        if taken:
+            joined.append(",".join(part.strip(",") for part in taken))
+    return joined
+
+
+def _count(word: str) -> int:
+    return len(word.strip(",").split(","))
+
+
+def _is_numeric(word: str) -> bool:
+    try:
+        [float(part) for part in word.strip(",").split(",")]
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,26 @@
+"""The line that a command ends with: what to type next."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import sys
+
+from psdmc.cli.one_line import one_line
+
+
+def say_next(*words: object) -> None:
+    """Print `next: psdmc WORDS`, quoted for a shell, to standard error: standard output holds results alone."""
+    say_next_line(shlex.join(["psdmc", *map(str, words)]))
+
+
+def quoted(word: object) -> str:
+    """A word as a shell takes it."""
+    return shlex.quote(str(word))
+
+
+def say_next_line(line: str) -> None:
+    """Print `next: LINE` likewise."""
+    with contextlib.suppress(OSError):  # whoever closed it does not want to know
+        if sys.stderr is not None:
+            print(f"next: {one_line(line)}", file=sys.stderr)

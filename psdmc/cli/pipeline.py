@@ -1,0 +1,265 @@
+"""The commands of the pipeline: derive, check, emit-c, build, cache. Modules of a command are imported when it runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from psdmc.cli.lists import assignments, names, numbers
+from psdmc.cli.next_step import quoted, say_next, say_next_line
+from psdmc.cli.output import check_output
+from psdmc.cli.progress import steps
+from psdmc.robot.load_options import DEFAULT_SNAP
+from psdmc.target.native import NATIVE
+from psdmc.target.presets import PRESETS
+
+if TYPE_CHECKING:
+    from psdmc.model.dynamics_model import DynamicsModel
+
+CHECK_FAILED_STATUS = 5
+
+RobotFile = Annotated[
+    Path, typer.Argument(metavar="ROBOT", help="URDF, xacro, MJCF (.xml), or DH table (.toml)")
+]
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="model file made by psdmc derive (.npz)")]
+
+
+def derive(
+    robot: RobotFile,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="MODEL.npz")] = None,
+    base: Annotated[
+        str | None, typer.Option(metavar="LINK", help="link that a chain starts at; default: the whole tree")
+    ] = None,
+    tip: Annotated[str | None, typer.Option(metavar="LINK", help="link that it ends at")] = None,
+    gravity: Annotated[
+        list[str] | None,
+        typer.Option(metavar="GX,GY,GZ", help="m/s^2 in the file's root frame; or GX GY GZ"),
+    ] = None,
+    drive_inertia: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="I1,I2,...", help="joints' drive inertias as parameters, kg m^2; 'all': values zero"
+        ),
+    ] = None,
+    assume_zero: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME,...", help="parameters assumed zero, such as link5:mx,link5:Ixz@com"),
+    ] = None,
+    snap: Annotated[
+        float, typer.Option(metavar="RAD", help="make rotations exact that are this near to exact; 0: off")
+    ] = DEFAULT_SNAP,
+    expand: Annotated[
+        bool | None,
+        typer.Option(
+            "--expand/--no-expand", help="derive E and P beside theta_b", show_default="for serial chains"
+        ),
+    ] = None,
+    frames: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LINK,...", help="links that kinematic functions are about; default: the tip, or all ends"
+        ),
+    ] = None,
+    tool: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,Z,R,P,Y",
+            help="one more such frame, 'tool', in the tip's: m, rad as in URDF; or X Y Z R P Y",
+        ),
+    ] = None,
+    lock: Annotated[
+        list[str] | None, typer.Option(metavar="JOINT=VALUE,...", help="hold joints there, rad or m")
+    ] = None,
+    floating: Annotated[
+        bool,
+        typer.Option(
+            "--floating", help="put the root link on a free joint, as of a robot that walks or flies"
+        ),
+    ] = False,
+) -> None:
+    """Derive a robot's model (E, P, theta_b) and save it."""
+    from psdmc import compiler
+    from psdmc.robot.lock import parsed as parsed_lock
+
+    target = output or Path(robot.stem + ".npz")
+    check_output(target, robot)
+    with steps() as progress:
+        model = compiler.derive(
+            robot,
+            base,
+            tip,
+            numbers(gravity, "--gravity", "three numbers, such as --gravity 0,0,-9.81"),
+            _drive_inertia(drive_inertia),
+            names(assume_zero),
+            snap,
+            expand,
+            progress,
+            names(frames),
+            numbers(tool, "--tool", "six numbers: x,y,z in m, roll,pitch,yaw in rad"),
+            parsed_lock(assignments(lock)),
+            floating,
+        )
+    model.save(target)
+    sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"
+    own = f" with {model.nv} coordinates" if model.mechanism.has_followers else ""
+    print(f"{target}: {model.n} joints{own}, {sizes}, largest torque error {model.certificate.max():.1e}")
+    for note in model.mechanism.notes:
+        print(f"note: {note}")
+    say_next("check", target)
+
+
+def _drive_inertia(given: list[str] | None) -> bool | tuple[float, ...]:
+    if given == ["all"]:
+        return True
+    return (
+        numbers(given, "--drive-inertia", "give numbers separated by commas, one a joint, or 'all'") or False
+    )
+
+
+def say_what_a_model_is_for(path: Path, model: DynamicsModel) -> None:
+    """The command that a model is made for: C where its parameters are known, else the campaign that finds them."""
+    unknown = model.theta_b is None
+    if unknown and all(joint.type.about_z for joint in model.mechanism.joints):
+        say_next("excite", path, "-o", f"{path.stem}_campaign")
+    else:
+        say_next("emit-c", path, "-o", path.stem)
+
+
+def check(
+    model: ModelFile,
+    robot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="robot file to check against instead of the embedded source"),
+    ] = None,
+) -> None:
+    """Check a model again, independently, against Pinocchio's (and MuJoCo's) own reading of its source, and its mass
+    matrix."""
+    from psdmc.cli.show_checks import print_check, print_mass_check
+    from psdmc.model.load import load
+    from psdmc.model.mass_check import check_mass_matrix
+    from psdmc.robot.load import load_robot
+    from psdmc.verification.check import check_model
+
+    found = load(model)
+    source = None
+    if robot is not None:
+        source = load_robot(robot, **found.provenance.get("options", {}))
+    with steps() as progress:
+        progress("checking against other readers")
+        rows = check_model(found, source)
+        progress("checking the mass matrix")
+        mass = check_mass_matrix(found)
+    print_check(rows)
+    print_mass_check(mass)
+    if not all(row.passed for row in rows) or (mass is not None and not mass.passed):
+        raise typer.Exit(CHECK_FAILED_STATUS)
+    say_what_a_model_is_for(model, found)
+
+
+def emit_c(
+    model: ModelFile,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR")],
+    lowering: Annotated[
+        str,
+        typer.Option(
+            help="auto, expanded or factored", autocompletion=lambda: ["auto", "expanded", "factored"]
+        ),
+    ] = "auto",
+    functions: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME,...", help="generate these functions; 'default', 'all'"),
+    ] = None,
+    real: Annotated[
+        str | None,
+        typer.Option(
+            help="float64 or float32; default: the target's", autocompletion=lambda: ["float64", "float32"]
+        ),
+    ] = None,
+    trig: Annotated[
+        str | None,
+        typer.Option(
+            help="inline, freestanding (no libm, NaN beyond 1e5 rad) or libm; default: the target's",
+            autocompletion=lambda: ["inline", "freestanding", "libm"],
+        ),
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
+    force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
+    payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
+    adapters: Annotated[
+        list[str] | None,
+        typer.Option("--with", metavar="NAME,...", help="also a library for another program: casadi"),
+    ] = None,
+    target: Annotated[
+        str,
+        typer.Option(
+            metavar="MACHINE",
+            help=f"{', '.join(PRESETS)}: which machine, see docs/shipping.md",
+            autocompletion=lambda: list(PRESETS),
+        ),
+    ] = NATIVE.name,
+) -> None:
+    """Write a model's C package: header, sources, build files, self-test."""
+    from psdmc import compiler
+    from psdmc.lower.admitted import run_time_only
+    from psdmc.model.load import load
+
+    found = load(model)
+    wanted = names(functions) or None
+    with steps() as progress:
+        changed = compiler.emit_c(
+            found,
+            output,
+            lowering,  # type: ignore[arg-type]
+            wanted,
+            real,  # type: ignore[arg-type]
+            trig,  # type: ignore[arg-type]
+            name,
+            force,
+            progress,
+            payload,
+            names(adapters),
+            target,
+        )
+    print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
+    for note in run_time_only(found, wanted):
+        print(f"note: {note}")
+    say_next("build", output)
+
+
+def build(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="folder made by emit-c")],
+    edited: Annotated[
+        bool, typer.Option("--edited", help="build although files are not as emit-c wrote them")
+    ] = False,
+) -> None:
+    """Build an emitted package through its own build files and run its self-test."""
+    from psdmc.toolchain.build_package import build_package
+
+    with steps() as progress:
+        progress("building")
+        build_package(directory, edited)
+    print(f"{directory}: built, self-test passed")
+    for library in sorted((directory / "build").glob("lib*.*")):
+        if library.suffix in (".a", ".so", ".dylib"):
+            print(f"{library}: written")
+    install = f"cmake --install {quoted(directory / 'build')}"
+    if not (directory / "build" / "CMakeCache.txt").exists():
+        install = f"make -C {quoted(directory)} install"
+    say_next_line(install)
+
+
+def cache(
+    clear: Annotated[bool, typer.Option("--clear", help="remove every entry")] = False,
+) -> None:
+    """Show where compiled libraries are kept and how many, or remove them."""
+    from psdmc.cli.show_checks import megabytes
+    from psdmc.toolchain.cache_room import cache_contents, clear_cache
+
+    if clear:
+        print(f"{clear_cache()} entries removed")
+    found = cache_contents()
+    print(f"{found.place}: {found.entries} entries, {megabytes(found.size)} of {megabytes(found.limit)}")
+    if found.entries:
+        say_next("cache", "--clear")

@@ -1,0 +1,60 @@
+"""What `check` and `calibrate` print: comparisons, the mass matrix, the verdict, the accuracy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from psdmc.cli.one_line import one_line
+from psdmc.cli.tables import Table, print_line, print_table
+
+if TYPE_CHECKING:
+    from psdmc.calibration.verdict.record import Calibration
+    from psdmc.calibration.verdict.verdict import Verdict
+    from psdmc.model.mass_check import MassCheck
+    from psdmc.verification.check import CheckRow
+
+
+def megabytes(size: int) -> str:
+    return f"{size / 2**20:.1f} MiB"
+
+
+def print_check(rows: Sequence[CheckRow]) -> None:
+    """Print each comparison, whether it passed, and the readers of the source."""
+    from psdmc.verification.check import readers
+
+    texts = []
+    for row in rows:
+        limit = "" if row.limit is None else f"{row.limit:.0e}"
+        error = "" if math.isnan(row.error) and row.limit is None else f"{row.error:.1e}"
+        verdict = "" if row.limit is None else "pass" if row.passed else "FAIL"
+        remark = f" ({row.remark})" if row.remark else ""
+        texts.append((verdict, error, limit, f"{row.name}: {row.against}{remark}"))
+    print_table(
+        Table(("result", "error", "limit", "relative error of what, against what"), texts, prose=True)
+    )
+    print_line(readers(rows))
+
+
+def print_mass_check(mass: MassCheck | None) -> None:
+    """Whether the mass matrix is positive definite over the joint limits, or why that was not tested."""
+    if mass is None:
+        print("mass matrix: not tested, for the base parameters are unknown")
+        return
+    print(f"{'pass' if mass.passed else 'FAIL'}: {mass.reason}")
+
+
+def print_verdict(verdict: Verdict) -> None:
+    """Print whether a calibration can be used, with reasons and doubts."""
+    for line in verdict.lines():
+        print(one_line(line))
+
+
+def print_accuracy(record: Calibration) -> None:
+    """R^2 on held-out data per joint and step."""
+    rows = []
+    for joint in record.joint_names:
+        both = [step.joints.get(joint) for step in record.steps]
+        rows.append((joint, *("" if b is None else f"{b.held_out.r2:.4f}" for b in both)))
+    print_table(Table(("joint", *(f"{step.step} R^2" for step in record.steps)), rows))

@@ -1,0 +1,130 @@
+"""What `psdmc show --json` prints: one JSON document, all numbers with all digits, null where nothing is known."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from psdmc.cli.show import cost_rows, joint_errors
+from psdmc.cli.show_robot import why_not_derived
+from psdmc.lower.kernels import Lowering
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.summary import summary, term_texts
+from psdmc.robot.mechanism import Joint, Mechanism
+
+SCHEMA = 1
+"""Of the documents: it grows where a key goes or means something else; further keys may come."""
+
+
+def print_json(kind: str, content: dict[str, Any]) -> None:
+    """Print one document: what it is about (`kind`), then its content; ASCII, and nothing else on standard output."""
+    document = {"schema": SCHEMA, "kind": kind, **content}
+    print(json.dumps(document, indent=2, ensure_ascii=True, allow_nan=False))
+
+
+def model_json(model: DynamicsModel) -> dict[str, Any]:
+    """All that `psdmc show` says of a model."""
+    found, robot = summary(model), model.mechanism
+    errors = joint_errors(robot, found.certificate)
+    joints = [{**joint, "error": error} for joint, error in zip(_joints(robot), errors, strict=True)]
+    return {
+        "name": found.name,
+        "base": found.base,
+        "tip": found.tip,
+        "convention": found.convention,
+        "gravity_m_s2": list(found.gravity),
+        "joints": joints,
+        "frames": [frame.name for frame in robot.frames],
+        "p": found.p,
+        "l": found.l,
+        "monomials": None if found.sizes is None else found.sizes._asdict(),
+        "entries_of_P": found.entries,
+        "base_parameters": [
+            {"index": k, "equation": each.equation, "unit": each.unit, "value": _finite(each.value)}
+            for k, each in enumerate(found.base_parameters)
+        ],
+        "largest_torque_error": max(found.certificate),
+        "snap_torque_change": _numbers(model.provenance.get("snap_torque_change")),
+        "notes": list(found.notes),
+        "calibration": _plain(model.provenance.get("calibration")),
+        "source": {"name": found.source_name, "sha256": found.source_sha256},
+        "options": _plain(model.provenance.get("options")),
+        "model_hash": found.content_hash,
+    }
+
+
+def mechanism_json(robot: Mechanism) -> dict[str, Any]:
+    """All that `psdmc show` says of a robot file."""
+    refused = why_not_derived(robot)
+    joints = [
+        {**joint, "mass_kg": _finite(float(row[0]))}
+        for joint, row in zip(_joints(robot), robot.parameters, strict=True)
+    ]
+    return {
+        "name": robot.name,
+        "base": robot.base_name,
+        "tip": robot.tip_name,
+        "ends": [robot.joints[leaf].link_name for leaf in robot.leaves],
+        "gravity_m_s2": robot.gravity.tolist(),
+        "joints": joints,
+        "notes": list(robot.notes),
+        "not_derived_because": None if refused is None else refused.message,
+    }
+
+
+def terms_json(model: DynamicsModel) -> dict[str, Any]:
+    """The monomials y, in the order of E."""
+    return {"terms": list(term_texts(model))}
+
+
+def cost_json(model: DynamicsModel, lowerings: Sequence[Lowering]) -> dict[str, Any]:
+    """Operations of each function per lowering."""
+    rows, notes = cost_rows(model, lowerings)
+    return {"functions": rows, "notes": list(notes)}
+
+
+def _joints(robot: Mechanism) -> list[dict[str, Any]]:
+    return [_joint(robot, i, joint) for i, joint in enumerate(robot.joints)]
+
+
+def _joint(robot: Mechanism, i: int, joint: Joint) -> dict[str, Any]:
+    coordinate, limits = robot.coordinates[i], joint.limits
+    leader = None if coordinate.leader in (None, i) else robot.joints[coordinate.leader].name
+    follows = (
+        None
+        if coordinate.leader == i
+        else {"joint": leader, "ratio": coordinate.ratio, "offset": coordinate.offset}
+    )
+    return {
+        "name": joint.name,
+        "link": joint.link_name,
+        "parent_link": robot.parent_link(i),
+        "type": joint.type.word,
+        "position_unit": joint.type.position_unit,
+        "effort_unit": joint.type.effort_unit,
+        "follows": follows,
+        "limits": {
+            name: _finite(getattr(limits, name))
+            for name in ("lower", "upper", "speed", "acceleration", "effort")
+        },
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    """The number, or None where it is unknown (NaN) or no limit (infinite)."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def _numbers(values: Iterable[float] | None) -> list[float | None] | None:
+    return None if values is None else [_finite(float(value)) for value in values]
+
+
+def _plain(value: Any) -> Any:
+    """JSON's own types, numbers that JSON lacks as null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return _finite(value) if isinstance(value, float) else value

@@ -1,0 +1,92 @@
+"""The command show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from psdmc.cli.next_step import say_next
+from psdmc.cli.pipeline import say_what_a_model_is_for
+from psdmc.cli.progress import steps
+from psdmc.errors import InputError
+from psdmc.robot.file_kinds import ROBOT_SUFFIXES
+
+if TYPE_CHECKING:
+    from psdmc.lower.kernels import Lowering
+    from psdmc.model.dynamics_model import DynamicsModel
+
+LARGEST_EXPANDED = 2000
+"""`show --cost` prints the expanded lowering too up to this many monomials; beyond, it takes minutes."""
+
+
+def show(
+    model: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MODEL", help="model file (.npz), or a robot file (.urdf, .xacro, .xml, .toml)"
+        ),
+    ],
+    terms: Annotated[bool, typer.Option("--terms", help="list the monomials y")] = False,
+    cost: Annotated[bool, typer.Option("--cost", help="operations per function and lowering")] = False,
+    json: Annotated[bool, typer.Option("--json", help="one JSON document instead, all digits")] = False,
+) -> None:
+    """Print a model: joints, sizes, base parameters with equations, values and units, certificate. Of a robot file: all of
+    its joints, what each hangs on and follows."""
+    if terms and cost:
+        raise InputError("--terms and --cost are two questions", "ask one at a time")
+    if model.suffix.lower() in ROBOT_SUFFIXES:
+        if terms or cost:
+            raise InputError(f"{model}: --terms and --cost are of models", "derive one first: psdmc derive")
+        _show_robot(model, json)
+    else:
+        _show_model(model, terms, cost, json)
+
+
+def _show_robot(path: Path, json: bool) -> None:
+    from psdmc.robot.load import load_robot
+
+    found = load_robot(path).mechanism
+    if json:
+        from psdmc.cli.show_json import mechanism_json, print_json
+
+        print_json("robot", mechanism_json(found))
+        return
+    from psdmc.cli.show_robot import print_mechanism
+
+    print_mechanism(found)
+    say_next("derive", path)
+
+
+def _show_model(path: Path, terms: bool, cost: bool, json: bool) -> None:
+    from psdmc.cli.show import print_model, print_terms
+    from psdmc.model.load import load
+
+    found = load(path)
+    if cost:
+        _show_cost(found, json)
+    elif json:
+        from psdmc.cli.show_json import model_json, print_json, terms_json
+
+        print_json(*(("terms", terms_json(found)) if terms else ("model", model_json(found))))
+    elif terms:
+        print_terms(found)
+    else:
+        print_model(found)
+    if not json:
+        say_what_a_model_is_for(path, found)
+
+
+def _show_cost(found: DynamicsModel, json: bool) -> None:
+    from psdmc.cli.show import print_cost
+    from psdmc.cli.show_json import cost_json, print_json
+
+    small = found.p is not None and found.p <= LARGEST_EXPANDED
+    both: tuple[Lowering, ...] = ("factored", "expanded") if small else ("factored",)
+    with steps() as progress:
+        progress("lowering")
+        if json:
+            print_json("cost", cost_json(found, both))
+        else:
+            print_cost(found, both)

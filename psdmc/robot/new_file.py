@@ -1,0 +1,32 @@
+"""A robot file to begin with: a commented DH table that can be derived as it is."""
+
+from __future__ import annotations
+
+import json
+import os
+from importlib import resources
+from pathlib import Path
+
+from psdmc.atomic import write_whole
+from psdmc.errors import InputError
+
+TEMPLATE = "template.toml"
+
+
+def write_new_robot(path: Path) -> None:
+    """Write a commented DH table, whose robot is called as the file.
+
+    InputError where something is at the path already, or its name does not end as that of a DH table.
+    """
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{path}: a DH table's name ends with .toml", f"such as psdmc new {path.stem}.toml")
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists already, and is left as it is", "give another name")
+    write_whole(path, robot_text_for(path))
+
+
+def robot_text_for(path: Path) -> str:
+    """The template with the name of a file in it."""
+    text = resources.files("psdmc.robot").joinpath(TEMPLATE).read_text(encoding="utf-8")
+    safe = path.name if path.name.isprintable() and path.name.isascii() else "ROBOT.toml"
+    return text.replace("@FILE@", safe).replace("@NAME@", json.dumps(path.stem))
