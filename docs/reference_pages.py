@@ -10,7 +10,6 @@ import typer.main
 
 import psdmc
 from psdmc.cli.commands import app
-from psdmc.cli.measuring import add_commands
 
 ROOT = Path(__file__).parents[1]
 HEADER = "generated/two_link/include/two_link/two_link.h"
@@ -19,7 +18,6 @@ METHODS = "psdmc/toolchain/call.pyi"
 
 def command_line() -> str:
     """Every command with its arguments and options, as the command itself describes them."""
-    add_commands(app)
     group = typer.main.get_group(app)
     parts = [
         "# Command line",

@@ -41,7 +41,9 @@ MENU = {
         "how-to/extending",
     ),
     "Reference": (
+        "command_line",
         "reference/cli",
+        "python",
         "reference/python",
         "reference/c",
         "shipping",
