@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-lowest audit fuzz mutate test-sanitize
+.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-lowest test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -73,6 +73,11 @@ $(LOWEST)/ready: pyproject.toml constraints/lowest.txt
 
 test-lowest: $(LOWEST)/ready ## run the fast tests with the oldest dependencies that pyproject.toml admits
 	$(LOWEST)/bin/python -m pytest -q -m 'not slow' $(LOWEST_TESTS)
+
+test-pages: $(READY) ## bench, calibration and site pages in Chromium at three widths, light and dark; screenshots in generated/pages
+	@$(RUN)/python -c 'import playwright, axe_playwright_python' 2>/dev/null || $(RUN)/python -m pip install --quiet '.[pages]'
+	@mkdir -p $(GENERATED)/pages
+	PSDMC_SCREENSHOTS=$(abspath $(GENERATED)/pages) $(RUN)/python -m pytest -q -rs tests/pages
 
 audit: $(READY) ## ask the advisory databases about every installed dependency (pip-audit; needs the network)
 	@test -x $(AUDIT)/bin/pip-audit || { $(PYTHON) -m venv $(AUDIT) && $(AUDIT)/bin/python -m pip install --quiet --disable-pip-version-check pip-audit; }

@@ -9,6 +9,7 @@ html_title = f"psdmc {VERSION}"
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 html_show_copyright = False
 extensions = ["myst_parser", "sphinx_copybutton"]
 myst_heading_anchors = 3

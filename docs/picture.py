@@ -13,7 +13,7 @@ ROBOT = "KR6"
 FUNCTIONS = ("inverse dynamics", "forward dynamics", "mass matrix", "regressor")
 CELL = re.compile(r"([\d.]+) \(([\d.]+)× / ([\d.]+)×\)")
 
-WIDTH, LEFT, BAR, GAP, TOP = 640, 150, 16, 22, 52
+WIDTH, LEFT, BAR, GAP, TOP = 440, 122, 16, 18, 56
 STYLE = """text { font: 14px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 12px; fill: #57606a }
 .psdmc { fill: #3949ab } .CasADi { fill: #8d99ae } .Pinocchio { fill: #c3c9d4 }
 @media (prefers-color-scheme: dark) {
@@ -69,7 +69,7 @@ def draw(bars: list[Bars]) -> str:
             parts.append(f'<text class="small" x="{LEFT + length + 6:.1f}" y="{y + 12}">{label}</text>')
             y += BAR + 1
         y += GAP
-    title = f"{ROBOT}, one state, one thread: nanoseconds a call (less is better)"
+    title = f"{ROBOT}: nanoseconds a call, less is better"
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {y}" role="img" aria-label="{title}">'
         f"<style>{STYLE}</style>"

@@ -3,37 +3,17 @@ theme."""
 
 from __future__ import annotations
 
-import io
-import re
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import SCALED
 from psdmc.report.bench_view import FUNCTION_TITLES, OURS, PINOCCHIO
-from psdmc.report.drawing import Figure, new_figure, style
-
-INK = "#010203"
-"""Placeholder for the page's own text colour, which replaces it after drawing."""
+from psdmc.report.drawing import Figure, svg
 
 WIDTH = 5.2
 """inches: narrow, so that labels stay readable on a phone."""
 
 COLOURS = {"psdmc": "#2a9d8f", "Pinocchio": "#e07a3f", "CasADi": "#5b7db1", "MuJoCo": "#9a78b0"}
-
-STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "psdmc",
-    "font.family": "sans-serif",
-    "font.size": 10.0,
-    "text.color": INK,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-}
 
 
 def bars(case: CaseResult, function: str) -> str:
@@ -53,7 +33,7 @@ def bars(case: CaseResult, function: str) -> str:
         axes.set_title(f"{FUNCTION_TITLES[function]}, {case.name}", loc="left", fontsize=11)
         axes.set_xlabel("ns per call")
 
-    return svg(draw, (WIDTH, 0.8 + 0.3 * len(shown)))
+    return svg(draw, (WIDTH, 0.8 + 0.3 * len(shown)), f"times of {FUNCTION_TITLES[function]}, {case.name}")
 
 
 def scaling(result: BenchResult, function: str) -> str:
@@ -72,26 +52,7 @@ def scaling(result: BenchResult, function: str) -> str:
         axes.set_title(f"{FUNCTION_TITLES[function]} of the LBR7, cut to n joints", loc="left", fontsize=11)
         axes.legend(frameon=False)
 
-    return svg(draw, (WIDTH, 3.2))
-
-
-def svg(draw: Callable[[Figure], None], size: tuple[float, float]) -> str:
-    """The drawing by `draw` on a figure of `size` (inches), as an <svg> element that scales with the page."""
-    with style(STYLE):
-        figure = new_figure(figsize=size)
-        draw(figure)
-        text = io.StringIO()
-        metadata: dict[str, Any] = {"Date": None, "Creator": None}
-        figure.savefig(text, format="svg", transparent=True, metadata=metadata)
-    return _inline(text.getvalue())
-
-
-def _inline(document: str) -> str:
-    """The element alone, without fixed size, in the page's ink."""
-    element = document[document.index("<svg") :]
-    element = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", element, count=1)
-    element = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", element, count=1)
-    return element.replace(INK, "currentColor")
+    return svg(draw, (WIDTH, 3.2), f"times of {FUNCTION_TITLES[function]} by number of joints")
 
 
 def _colour(measurement: Measurement) -> str:

@@ -2,33 +2,42 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from psdmc.calibration.identify.steps import Sample, StepQuality
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite import Excitation
-from psdmc.report.drawing import Axes, Figure, new_figure, style
+from psdmc.report.drawing import Axes, Figure, svg
 
 POINTS = 600
 """Points drawn per curve; more would only make the file larger."""
 
-MEASURED, PREDICTED, RESIDUAL, HELD_OUT = "#4878a8", "#d95f02", "#888888", "#f3ead9"
+MEASURED, PREDICTED, RESIDUAL, HELD_OUT = "#4878a8", "#d95f02", "#888888", "#c9a227"
+SHADE = 0.2
+"""Opacity of held-out stretches, on light and dark pages."""
+
+PANEL = (5.2, 2.6)
+"""inches: narrow, so that labels stay readable on a phone."""
+
+WHAT = "observed and predicted torque of joint"
+
+FILE = (11, 6)
+"""inches, of a picture that is a file."""
 
 
-def step_figure(step: StepQuality) -> str:
-    """Observed and predicted torque of every joint, the residual below zero's line, held-out stretches shaded."""
-    rows = (len(step.samples) + 1) // 2
-    figure = new_figure(figsize=(11, 2.3 * rows))
-    axes = figure.subplots(rows, 2, squeeze=False)
-    for axis, sample in zip(axes.flat, step.samples, strict=False):
-        _sample(axis, sample)
-    for axis in axes.flat[len(step.samples) :]:
-        axis.set_visible(False)
-    axes.flat[0].legend(loc="upper right", fontsize=7, framealpha=0.8)
-    return svg_text(figure)
+def step_panels(step: StepQuality) -> tuple[str, ...]:
+    """A picture a joint: observed and predicted torque, the residual, held-out stretches shaded."""
+    return tuple(
+        svg(partial(_alone, partial(_sample, sample=sample)), PANEL, f"{step.step}: {WHAT} {sample.joint}")
+        for sample in step.samples
+    )
+
+
+def _alone(draw: Callable[[Axes], None], figure: Figure) -> None:
+    draw(figure.subplots())
 
 
 def _sample(axis: Axes, sample: Sample) -> None:
@@ -44,10 +53,10 @@ def _sample(axis: Axes, sample: Sample) -> None:
     axis.plot(x, sample.predicted[kept], color=PREDICTED, linewidth=0.8, linestyle="--", label="predicted")
     residual = sample.measured[kept] - sample.predicted[kept]
     axis.plot(x, residual, color=RESIDUAL, linewidth=0.6, label="residual")
-    axis.set_title(sample.joint, fontsize=9, loc="left")
-    axis.set_xlabel(sample.abscissa, fontsize=8)
-    axis.set_ylabel("torque [Nm]", fontsize=8)
-    axis.tick_params(labelsize=7)
+    axis.set_title(sample.joint, fontsize=11, loc="left")
+    axis.set_xlabel(sample.abscissa)
+    axis.set_ylabel("torque [N m]")
+    axis.legend(loc="upper right", fontsize=8, framealpha=0.8)
 
 
 def _thin(count: int) -> Array:
@@ -58,35 +67,49 @@ def _thin(count: int) -> Array:
 def _shade(axis: Axes, x: Array, held_out: Array) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], held_out.astype(int), [0]])))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
-        axis.axvspan(x[first], x[min(last, len(x) - 1)], color=HELD_OUT, linewidth=0)
+        axis.axvspan(x[first], x[min(last, len(x) - 1)], color=HELD_OUT, alpha=SHADE, linewidth=0)
+
+
+def excitation_panels(found: Excitation, joint_names: Sequence[str]) -> tuple[str, ...]:
+    """The exciting motion's positions, speeds and accelerations, and its condition during the search, a picture each."""
+    return tuple(
+        svg(partial(_alone, draw), PANEL, f"exciting motion: {says}")
+        for says, draw in _excitation(found, joint_names)
+    )
 
 
 def excitation_figure(found: Excitation, joint_names: Sequence[str]) -> str:
-    """The exciting motion's positions, speeds and accelerations, and its condition during the search."""
+    """The same four in one picture."""
+
+    def draw(figure: Figure) -> None:
+        for axis, (_, panel) in zip(figure.subplots(2, 2).flat, _excitation(found, joint_names), strict=True):
+            panel(axis)
+
+    return svg(draw, FILE, "exciting motion")
+
+
+def _excitation(found: Excitation, joint_names: Sequence[str]) -> list[tuple[str, Callable[[Axes], None]]]:
+    """What each picture says and how it is drawn."""
     motion = found.motion.sampled(tuple(joint_names), found.motion.duration / 400)
-    figure = new_figure(figsize=(11, 6))
-    axes = figure.subplots(2, 2)
-    series = (
-        ("position [rad]", motion.q),
-        ("speed [rad/s]", motion.qd),
-        ("acceleration [rad/s²]", motion.qdd),
-    )
-    for axis, (label, values) in zip(axes.flat, series, strict=False):
-        axis.plot(motion.time, values, linewidth=0.9, label=list(joint_names))
-        axis.set_xlabel("time [s]", fontsize=8)
-        axis.set_ylabel(label, fontsize=8)
-    axes.flat[0].legend(fontsize=7, ncols=3)
-    last = axes.flat[3]
-    last.hist(np.minimum(found.random_conditions, 50 * found.condition), bins=40, color=RESIDUAL)
-    last.axvline(found.condition, color=PREDICTED, linewidth=1.5)
-    last.set_xlabel("condition number: random motions (grey), the one found (line)", fontsize=8)
-    return svg_text(figure)
 
+    def curves(label: str, values: Array) -> Callable[[Axes], None]:
+        def draw(axis: Axes) -> None:
+            axis.plot(motion.time, values, linewidth=0.9, label=list(joint_names))
+            axis.set_xlabel("time [s]")
+            axis.set_ylabel(label)
+            if values is motion.q:
+                axis.legend(fontsize=7, ncols=3)
 
-def svg_text(figure: Figure) -> str:
-    """A figure as inline SVG: the same bytes for the same numbers."""
-    with style({"svg.hashsalt": "psdmc", "svg.fonttype": "none", "path.simplify": True}):
-        buffer = io.StringIO()
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    text = buffer.getvalue()
-    return text[text.index("<svg") :]
+        return draw
+
+    def conditions(axis: Axes) -> None:
+        axis.hist(np.minimum(found.random_conditions, 50 * found.condition), bins=40, color=RESIDUAL)
+        axis.axvline(found.condition, color=PREDICTED, linewidth=1.5)
+        axis.set_xlabel("condition number: random motions (grey), the one found (line)")
+
+    return [
+        ("positions", curves("position [rad]", motion.q)),
+        ("speeds", curves("speed [rad/s]", motion.qd)),
+        ("accelerations", curves("acceleration [rad/s²]", motion.qdd)),
+        ("condition", conditions),
+    ]

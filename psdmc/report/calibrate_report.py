@@ -18,7 +18,7 @@ from psdmc.calibration.verdict.record import Calibration, NumberRow
 from psdmc.calibration.verdict.said_once import unsaid_warnings
 from psdmc.calibration.verdict.verdict import Verdict
 from psdmc.emit.render import environment
-from psdmc.report.calibrate_plots import excitation_figure, step_figure
+from psdmc.report.calibrate_plots import excitation_panels, step_panels
 
 CAPTIONS = {
     "Motor": "Torque of the known load, and what the calibrated motors say of the current that it adds (figure 2).",
@@ -28,13 +28,15 @@ CAPTIONS = {
     "All": "The whole torque of the fast motion.",
 }
 
+SHADED = "Shaded: held out, not used by the fit. Grey: what is left, observed minus predicted."
+
 
 @dataclass(frozen=True, slots=True)
 class FigureView:
-    """One picture with its caption."""
+    """Pictures side by side, one a joint or quantity, with their caption."""
 
     title: str
-    svg: str
+    panels: tuple[str, ...]
     caption: str
 
 
@@ -76,7 +78,7 @@ def write_report(record: Calibration, path: str | Path, found: Excitation | None
 def report_html(record: Calibration, found: Excitation | None = None) -> str:
     """The page as text."""
     figures = [
-        FigureView(step.step, step_figure(step), CAPTIONS.get(step.step, ""))
+        FigureView(step.step, step_panels(step), f"{CAPTIONS.get(step.step, '')} {SHADED}")
         for step in record.steps
         if step.samples
     ]
@@ -85,7 +87,7 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
             f"Condition number {found.condition:.2f}; the best of {len(found.random_conditions)} random motions "
             f"scaled to the limits has {found.random_conditions[0]:.2f}."
         )
-        figures.append(FigureView("Exciting motion", excitation_figure(found, record.joint_names), caption))
+        figures.append(FigureView("Exciting motion", excitation_panels(found, record.joint_names), caption))
     view = ReportView(
         robot=record.robot,
         summary=_summary(record),
@@ -235,7 +237,10 @@ def _plain(value: Any) -> str:
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tuple[int, ...] = ()) -> str:
     """An HTML table, every cell escaped."""
-    lines = ["<table>", "<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
+    lines = [
+        "<table>",
+        "<tr>" + "".join(f'<th scope="col">{html.escape(cell)}</th>' for cell in head) + "</tr>",
+    ]
     for row in rows:
         cells = (
             f'<td class="text">{html.escape(cell)}</td>'

@@ -1,0 +1,122 @@
+"""The pages that psdmc makes, in Chromium: no sideways scrolling at 400, 800 and 1280 px, light and dark, and no serious
+fault by axe-core. `make test-pages` runs it and keeps the screenshots in generated/pages."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from made_up_bench import made_up_result
+
+from psdmc.calibration.identify.quality import Quality
+from psdmc.calibration.identify.steps import JointQuality, Sample, StepQuality
+from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
+from psdmc.calibration.verdict.verdict import JointFigures, Verdict
+from psdmc.report.bench_page import write_page
+from psdmc.report.calibrate_report import write_report
+
+pytest.importorskip("playwright")
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "docs"))
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+WIDTHS = (400, 800, 1280)
+SCHEMES = ("light", "dark")
+SITE = ("index", "functions", "reference/cli", "decisions/index", "tutorials/controller", "benchmarks")
+JOINTS = tuple(f"a_rather_long_joint_name_{k}" for k in range(6))
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The pages by name: the benchmark's, a calibration's, and some of the site's."""
+    import site_pages
+
+    folder = tmp_path_factory.mktemp("pages")
+    site_pages.gather(folder / "source")
+    assert site_pages.render(folder / "source", folder / "site") == 0
+    write_page(made_up_result(), folder / "bench.html")
+    write_report(calibration(), folder / "calibration.html")
+    own = {name: folder / f"{name}.html" for name in ("bench", "calibration")}
+    return own | {f"site_{name.replace('/', '_')}": folder / f"site/{name}.html" for name in SITE}
+
+
+NAMES = ("bench", "calibration", *(f"site_{name.replace('/', '_')}" for name in SITE))
+
+
+def calibration() -> Calibration:
+    """A record with six joints, every kind of row and a verdict with doubts."""
+    x = np.linspace(0.0, 10.0, 400)
+    samples = tuple(
+        Sample(j, "time [s]", x, 10 * np.sin(x + k), 10 * np.sin(x + k) + 0.1, x > 8.0)
+        for k, j in enumerate(JOINTS)
+    )
+    quality = JointQuality(Quality(0.1, 0.999), Quality(0.2, 0.9876))
+    figures = tuple(JointFigures(j, 0.98, 0.3, 1.02, 0.05, True, 3.0, 0.2, 1.5, 0.4) for j in JOINTS)
+    doubt = "the model lacks an effect at a joint: the residual is no sensor noise"
+    verdict = Verdict((), (doubt,), (), figures, 40.0)
+    equation = "Izz1 + 0.0025 m2 + Iyy2 + 0.183125 m3 + Iyy3 + 0.183525 m4 + 0.183525 m5 + 0.183525 m6"
+    return Calibration(
+        robot="a robot",
+        method="linear fit",
+        joint_names=JOINTS,
+        model=None,  # type: ignore[arg-type]
+        parameters=tuple(
+            ParameterRow(f"theta_{k}", "inertial", 7.4, 0.01, "kg m^2", equation, True) for k in range(36)
+        ),
+        motors=tuple(NumberRow(j, "torque_constant", 36.1, 0.02, "Nm/A") for j in JOINTS),
+        friction=tuple(NumberRow(j, "stribeck_velocity", 0.02, 0.5, "rad/s", seen=False) for j in JOINTS),
+        steps=tuple(
+            StepQuality(step, dict.fromkeys(JOINTS, quality), samples) for step in ("Gravity", "Inertial")
+        ),
+        warnings=("a joint hardly moves",),
+        facts={"rank": 31, "singular_values": [3.0, 0.5]},
+        notes=("physical consistency moved the parameters by 3 standard deviations",),
+        verdict=verdict,
+    )
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    if BROWSER is None:
+        pytest.skip("no chromium")
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_scrolls_sideways(browser: Any, pages: dict[str, Path], name: str, width: int, scheme: str):
+    page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    page.goto(pages[name].as_uri())
+    kept = os.environ.get("PSDMC_SCREENSHOTS")
+    if kept:
+        page.screenshot(path=Path(kept) / f"{name}_{width}_{scheme}.png", full_page=width == WIDTHS[0])
+    found = page.evaluate("document.documentElement.scrollWidth")
+    page.close()
+
+    assert found <= width
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("name", NAMES)
+def test_axe_finds_no_serious_fault(browser: Any, pages: dict[str, Path], name: str, scheme: str):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    page = browser.new_page(viewport={"width": 800, "height": 900}, color_scheme=scheme)
+    page.goto(pages[name].as_uri())
+    found = axe.run(page).response["violations"]
+    page.close()
+    serious = [
+        f"{v['id']}: {v['nodes'][0]['html'][:120]}" for v in found if v["impact"] in ("serious", "critical")
+    ]
+
+    assert serious == []
