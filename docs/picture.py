@@ -13,7 +13,7 @@ ROBOT = "KR6"
 FUNCTIONS = ("inverse dynamics", "forward dynamics", "mass matrix", "regressor")
 CELL = re.compile(r"([\d.]+) \(([\d.]+)× / ([\d.]+)×\)")
 
-WIDTH, LEFT, BAR, GAP, TOP = 440, 122, 16, 18, 56
+WIDTH, LEFT, BAR, GAP, TOP = 470, 148, 16, 18, 56
 STYLE = """text { font: 14px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 12px; fill: #57606a }
 .psdmc { fill: #3949ab } .CasADi { fill: #8d99ae } .Pinocchio { fill: #c3c9d4 }
 @media (prefers-color-scheme: dark) {
