@@ -14,6 +14,7 @@ from psdmc.emit.package import PackageView
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 from psdmc.toolchain import compile as toolchain
+from psdmc.toolchain import kept_libraries
 from psdmc.toolchain.compiler_command import Compiler, find_compiler
 
 
@@ -27,7 +28,8 @@ def unoptimised_compiler(target: Target = NATIVE) -> Compiler:
 def without_optimisation() -> Iterator[None]:
     """Libraries compiled in this process inside are not optimised."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(toolchain, "find_compiler", unoptimised_compiler)
+        for module in (toolchain, kept_libraries):
+            patch.setattr(module, "find_compiler", unoptimised_compiler)
         yield
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ OTHERS = {"valgrind": {"--tool"}, "ros2 bag record": {"--compression-mode"}}
 """Options of other programs, which a message may tell a user to type."""
 
 
+@cache
 def commands() -> dict[str, set[str]]:
     group = typer.main.get_group(app)
     return {

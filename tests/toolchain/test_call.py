@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from direct import error, expected
 from traced import SIZES, L, N, arm_kernels, arm_package, arm_references
+from unoptimised import compiled
 
 from psdmc.emit.options import EmitOptions
 from psdmc.errors import InputError
@@ -24,7 +25,7 @@ RANDOM = np.random.default_rng(11)
 @pytest.fixture(scope="module")
 def robot() -> CompiledRobot:
     package = arm_package()
-    return CompiledRobot(interface_of(package), compile_library(package))
+    return CompiledRobot(interface_of(package), compiled(package, optimised=False))
 
 
 @pytest.mark.parametrize("name", [name for name, kernel in KERNELS.items() if not kernel.theta])

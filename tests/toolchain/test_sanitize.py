@@ -44,7 +44,7 @@ SHORT = {
     "gcc -fanalyzer": ("float64", "inline", arm),
     "gcc, all warnings": ("float64", "freestanding", arm),
     "clang, all warnings": ("float32", "inline", arm),
-    "clang-tidy": ("float64", "inline", arm),
+    "clang-tidy": ("float64", "inline", torques),
 }
 TOOLS = {tool.name: tool for tool in (*DYNAMIC, *STATIC)}
 
