@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -70,7 +70,7 @@ def checked_options(
     for name, value in (("base", base), ("tip", tip)):
         if value is not None and not isinstance(value, str):
             raise InputError(f"{name} is {shown(value)}, expected a link's name", "give a text")
-    if isinstance(assume_zero, str) or not _all_are_texts(assume_zero):
+    if not _are_texts_in_order(assume_zero):
         raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
     if not isinstance(floating, bool):
         raise InputError(f"floating is {shown(floating)}, expected True or False", "the default is False")
@@ -95,12 +95,13 @@ def checked_options(
 
 
 def _frames(frames: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(frames, str) or not _all_are_texts(frames):
+    if not _are_texts_in_order(frames):
         raise InputError(f"frames are {shown(frames)}, expected links' names", "such as tcp,camera")
-    twice = [name for k, name in enumerate(frames) if name in frames[:k]]
+    names = tuple(frames)
+    twice = [name for k, name in enumerate(names) if name in names[:k]]
     if twice:
         raise InputError(f"frame {shown(twice[0])} is named twice", "name each once")
-    return tuple(frames)
+    return names
 
 
 def _tool(tool: Sequence[float] | None) -> tuple[float, ...] | None:
@@ -127,6 +128,11 @@ def _lock(lock: Mapping[str, float] | None) -> dict[str, float]:
     if values is None:
         raise InputError(f"lock is {shown(dict(lock))}, expected finite positions", hint)
     return dict(zip(lock, values, strict=True))
+
+
+def _are_texts_in_order(values: object) -> bool:
+    """Not one text, which is a sequence of others; not a table or a set, which are in no order that means something."""
+    return not isinstance(values, str | Mapping | Set | Iterator) and _all_are_texts(values)
 
 
 def _all_are_texts(values: object) -> bool:

@@ -14,14 +14,15 @@ from psdmc.robot.mimic import followed
 from psdmc.robot.placement import Placement
 from psdmc.robot.snap import link_rotation, snap_axis
 from psdmc.robot.tree import listed
-from psdmc.robot.urdf import UrdfJoint, UrdfRobot
+from psdmc.robot.urdf import LOCKABLE, UrdfJoint, UrdfRobot
 
 
 def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> dict[str, float]:
     """The position, rad or m, of each joint that is held: those in `lock`, those that follow one of them, and those
     that follow a joint with a multiplier of zero.
 
-    InputError where `lock` names no movable joint, or a position that a joint cannot have.
+    InputError where `lock` names no movable joint, or a position that a joint cannot have; and for a joint of a type that
+    URDF does not have.
     """
     known = {joint.name: joint for joint in robot.joints}
     movable = [joint.name for joint in robot.joints if joint.is_movable]
@@ -43,6 +44,12 @@ def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> 
         leader = followed(joint, known, source, lock)
         if leader.joint.name in lock or leader.ratio == 0.0:
             found[joint.name] = leader.position(lock.get(leader.joint.name, 0.0))
+    strange = [name for name in found if known[name].type not in LOCKABLE]
+    if strange:
+        raise InputError(
+            f"{source}: joint {shown(strange[0])}, to be locked, is of type {shown(known[strange[0]].type)}",
+            f"types of joints that can be held: {listed([kind for kind in LOCKABLE if kind != 'fixed'])}",
+        )
     return found
 
 

@@ -7,12 +7,13 @@ and reads zero.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import pinocchio
 
 from psdmc.errors import InputError
+from psdmc.robot.mechanism import Array
 from psdmc.robot.numerals import words
 from psdmc.robot.urdf_words import ATTRIBUTES
 from psdmc.robot.xml_text import parse_xml
@@ -64,7 +65,25 @@ def locked_at(model: pinocchio.Model, held: Mapping[str, float]) -> pinocchio.Mo
     for joint, value in zip(joints, held.values(), strict=True):
         if model.joints[joint].nq == 1:
             q[model.joints[joint].idx_q] = value
-    return pinocchio.buildReducedModel(model, joints, q)
+    return reduced(model, joints, q)
+
+
+def reduced(model: pinocchio.Model, joints: Sequence[int], q: Array) -> pinocchio.Model:
+    """The model with these joints fixed where they are at q.
+
+    Pinocchio lets the frames of such joints hang on themselves: they get the parents back that they had.
+    """
+    found = pinocchio.buildReducedModel(model, list(joints), q)
+    number = {_key(frame): k for k, frame in enumerate(found.frames)}
+    for frame in model.frames:
+        above = model.frames[frame.parentFrame]
+        found.frames[number[_key(frame)]].parentFrame = number[_key(above)]
+    return found
+
+
+def _key(frame: pinocchio.Frame) -> tuple[str, bool]:
+    """Links and joints may share their names."""
+    return frame.name, frame.type == pinocchio.FrameType.BODY
 
 
 def dynamics_of(root: Element, movable: Collection[str] | None, kinds: Mapping[str, str]) -> Element:

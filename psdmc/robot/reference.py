@@ -23,7 +23,7 @@ from psdmc.robot.dh_textbook import dh_model
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
+from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model, reduced
 from psdmc.robot.tool import TOOL
 from psdmc.robot.urdf import read_urdf
 from psdmc.robot.urdf_floating import ROOT_JOINT
@@ -250,7 +250,7 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     whole = locked_at(whole, held)
     wanted = [JOINT_PREFIX + name for name in chain.joint_names]
     others = [k for k in range(1, whole.njoints) if whole.names[k] not in wanted]
-    model = pinocchio.buildReducedModel(whole, others, pinocchio.neutral(whole)) if others else whole
+    model = reduced(whole, others, pinocchio.neutral(whole)) if others else whole
     if list(model.names)[1:] != wanted:
         raise InputError(
             f"{loaded.source_name}: Pinocchio finds joints {list(model.names)[1:]}",

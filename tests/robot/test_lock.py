@@ -9,10 +9,13 @@ import pinocchio as pin
 import pytest
 from small_robots import LIMIT, joint, largest_difference, link, robot_data, torques, urdf
 
-from psdmc.compiler import derive
+from psdmc.compiler import derive, provenance
+from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.lock import parsed
+from psdmc.robot.reference import reference
 from psdmc.verification.check import check_model
 
 MIMIC = '<mimic joint="r" multiplier="-2" offset="0.25"/>'
@@ -37,6 +40,10 @@ def reduced(text: str, held: dict[str, float]) -> pin.Model:
     for name, value in held.items():
         q[whole.joints[whole.getJointId(name)].idx_q] = value
     return pin.buildReducedModel(whole, [whole.getJointId(name) for name in held], q)
+
+
+def model_of(robot: LoadedRobot) -> DynamicsModel:
+    return derive_model(robot.mechanism, expand=False, provenance=provenance(robot))
 
 
 def assert_is(robot: LoadedRobot, oracle: pin.Model) -> None:
@@ -104,6 +111,27 @@ def test_a_locked_branch_leaves_a_chain() -> None:
     chain = load_robot(robot_data("panda.urdf"), lock=held).chain
     assert chain.is_serial
     assert len(chain) == 7
+
+
+@pytest.mark.parametrize("held", [{"l": 0.5, "r": 0.1}, {"a": 0.4, "l": -1.0}, {"b": 1.0, "r": 0.2}])
+def test_the_way_to_an_end_leads_over_locked_joints(held: dict[str, float]) -> None:
+    """Pinocchio lets frames of joints that it locks hang on themselves; a way over them had no end."""
+    robot = loaded(held)
+    assert reference(robot, snapped=False).path_length == pytest.approx(4 * np.sqrt(0.14), rel=1e-12)
+    assert all(row.passed for row in check_model(model_of(robot)))
+
+
+@pytest.mark.parametrize("held", [{"r": 0.0}, {"l": 0.0}])
+def test_a_joint_of_no_type_of_urdfs_cannot_be_locked(held: dict[str, float], capfd) -> None:
+    text = ARM.replace('name="l" type="revolute"', 'name="l" type="spherical"')
+    with pytest.raises(
+        InputError, match=r"arm.urdf: joint 'l', to be locked, is of type 'spherical'"
+    ) as refused:
+        loaded(held, text)
+    assert refused.value.hint == (
+        "types of joints that can be held: 'revolute', 'continuous', 'prismatic', 'floating', 'planar'"
+    )
+    assert capfd.readouterr().err == ""
 
 
 def test_models_without_locked_joints_say_nothing_of_them() -> None:

@@ -105,6 +105,9 @@ def test_a_model_without_named_frames_has_the_hash_that_it_always_had(arm: Path)
         (["pedestal"], r"'pedestal' is fixed to the root"),
         (["tcp", "tcp"], r"frame 'tcp' is named twice"),
         ("tcp", r"frames are 'tcp', expected links' names"),
+        ({"tcp": 1}, r"frames are {'tcp': 1}, expected links' names"),
+        ({"tcp"}, r"frames are {'tcp'}, expected links' names"),
+        (iter(["tcp"]), r"frames are <list_iterator .*>, expected links' names"),
     ],
 )
 def test_what_cannot_be_a_frame_is_said(frames: list[str], message: str) -> None:
