@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from psdmc.derivation.extended import Long, extended
-from psdmc.derivation.link_by_link import reduced_to_digits, reduction_link_by_link
+from psdmc.derivation.link_by_link import links_together, reduced_to_digits, reduction_link_by_link
 from psdmc.derivation.reduce import Reduction, reduced
 from psdmc.derivation.sampled import is_plain, reduction_of, sampled_regressor
 from psdmc.derivation.units import Scaled
@@ -41,7 +41,8 @@ def _of_followers(scaled: Scaled) -> Reduction:
         if own.is_clear:
             return Reduction(tree.pivots[own.pivots], own.echelon @ tree.echelon, True)
     rows = echelon_rows(_flat(_to_own_torque(_seen(extended(scaled), tree.pivots))))
-    own = reduced_to_digits(rows, scaled.leads[tree.pivots] // PARAMETERS_PER_LINK)
+    links = links_together(scaled)[scaled.leads[tree.pivots] // PARAMETERS_PER_LINK]
+    own = reduced_to_digits(rows, links)
     return Reduction(tree.pivots[own.pivots], times(own.echelon, tree.echelon), False)
 
 

@@ -13,10 +13,11 @@ from scipy import sparse
 from psdmc.derivation.extended import Long, extended
 from psdmc.derivation.reduce import Reduction
 from psdmc.derivation.units import Scaled
+from psdmc.dynamics.frames import BASE
 from psdmc.dynamics.torque_rows import EFFECT as EFFECT
 from psdmc.dynamics.torque_rows import torque_rows
 from psdmc.robot.graded import graded_pivots, halving_shares, lengths
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK
 
 EXACT = 1e-16
 """Smaller coefficients of the echelon form are zero, lengths in the robot's unit: they add less than the last digit.
@@ -29,8 +30,33 @@ def reduction_link_by_link(robot: Scaled) -> Reduction:
     more."""
     long = extended(robot)
     rows = torque_rows(long.frames, long.link_frames, long.up)
-    links = robot.leads // PARAMETERS_PER_LINK
+    links = links_together(robot)[robot.leads // PARAMETERS_PER_LINK]
     return reduced_to_digits(np.asarray((sparse.csr_array(robot.span.T) @ rows.T).T), links)
+
+
+def links_together(robot: Scaled) -> NDArray[np.int64]:
+    """(n,) for each link the first of those whose columns are gone through together with its own.
+
+    Whatever a link does to the joints before it, the link that carries it could do: where that one has all its parameters,
+    nothing is left for later links there, and links are gone through one by one. Links that hang on one with fewer
+    parameters, or that joints of the same coordinate move, are another's equal: what little one of them has alone, another
+    may have in full.
+    """
+    parents = [frame.parent for frame in robot.frames]
+    own = robot.leads[robot.leads % PARAMETERS_PER_LINK != DRIVE] // PARAMETERS_PER_LINK
+    is_full = np.bincount(own, minlength=len(parents)) == BODY_PARAMETERS
+    followed = [(frame.follows[0], k) for k, frame in enumerate(robot.frames) if frame.follows is not None]
+    meets = {k for pair in followed for k in pair} | {k for k in parents if parents.count(k) > 1}
+    pairs = []
+    for k, above in enumerate(parents):
+        if above != BASE and above in meets and not is_full[above]:
+            pairs.append((above, k))
+            meets.add(k)
+    first = np.arange(len(parents))
+    for one, other in (*followed, *pairs):
+        low, high = sorted((first[one], first[other]))
+        first[first == high] = low
+    return first
 
 
 def reduced_to_digits(rows: Long, links: NDArray[np.int64]) -> Reduction:
