@@ -28,7 +28,7 @@ from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
 from psdmc.dynamics.frames import BASE, Frame, Turn, about_z, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
-from psdmc.dynamics.joint_wrenches import torque_row, wrenches_of_motion
+from psdmc.dynamics.joint_wrenches import torque_rows, wrenches_of_motions
 from psdmc.dynamics.motion import PLAIN, Choices, Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
     Composite,
@@ -37,10 +37,14 @@ from psdmc.dynamics.moving_composite import (
     before_turn,
     both,
     driven,
+    driven_freely,
     moved_to,
 )
+from psdmc.dynamics.own_axes import by_own_axes
 from psdmc.dynamics.scalar import Scalar, Vector, dot
-from psdmc.dynamics.twist import effort
+from psdmc.dynamics.slices import first_rates, positions, rates
+from psdmc.dynamics.twist import effort, efforts
+from psdmc.robot.joints import JointType
 
 Rows = tuple[tuple[Scalar, ...], ...]
 
@@ -72,26 +76,33 @@ def inverse_dynamics_derivatives(
     base_acceleration: Vector,
     choices: Choices = PLAIN,
 ) -> Derivatives:
-    """Derivatives of the joint torques by q, qd and qdd; arguments as those of `inverse_dynamics`, joints of one coordinate.
+    """Derivatives of the joint torques by q, qd and qdd; arguments as those of `inverse_dynamics`. Those by q of joints of
+    several coordinates are along the tangent: by a small motion along each of their rates, which stay what they are along
+    the moved frame's own axes.
 
     Exact zeros where neither joint carries the other.
     """
-    n = len(frames)
+    n, first = len(frames), first_rates(frames)
     forward = sweep_outward(frames, q, qd, None, qdd, base_acceleration, choices)
+    q, qd, qdd = positions(frames, q), rates(frames, qd), rates(frames, qdd)
     axes: list[Axis] = []
     steps: list[Step] = []
     for i in range(n):
         axis, step = axis_and_step(i, frames, qd, qdd, base_acceleration, forward, axes)
         axes.append(axis)
         steps.append(step)
-    by_q, by_qd, by_qdd = ([[0.0] * n for _ in range(n)] for _ in range(3))
-    gravity: list[Scalar] = [0.0] * n
+    nv = first[-1]
+    by_q, by_qd, by_qdd = ([[0.0] * nv for _ in range(nv)] for _ in range(3))
+    gravity: list[Scalar] = [0.0] * nv
     for i, composite in _composites(frames, bodies, q, qd, qdd, forward, choices, steps):
-        row = torque_row(frames[i], axes[i], composite)
-        gravity[i] = dot(row.c, axes[i].up)
-        _fill_row(i, frames, axes, steps, row, by_q, by_qd, by_qdd)
-        _fill_column(i, frames, steps, wrenches_of_motion(frames[i], axes[i], composite), by_q, by_qd)
-        by_qdd[i][i] = by_qdd[i][i] + drive_inertia[i]
+        for k, row in enumerate(torque_rows(frames[i], axes[i], composite), start=first[i]):
+            gravity[k] = dot(row.c, axes[i].up)
+            _fill_row((i, k), frames, axes, steps, row, qd, by_q, by_qd, by_qdd)
+        found = wrenches_of_motions(frames[i], axes[i], composite, qd[i])
+        for k, wrenches in enumerate(found, start=first[i]):
+            _fill_column((i, k), frames, steps, wrenches, by_q, by_qd)
+        if frames[i].joint.about_z:
+            by_qdd[first[i]][first[i]] = by_qdd[first[i]][first[i]] + drive_inertia[i]
     rows, slopes, mass = (tuple(tuple(row) for row in block) for block in (by_q, by_qd, by_qdd))
     return Derivatives(rows, slopes, mass, tuple(gravity))
 
@@ -115,20 +126,23 @@ def _composites(
     for i in reversed(range(len(frames))):
         frame, step = frames[i], steps[i]
         whole = at_rest(bodies[i])
-        if is_leaf[i]:
+        if is_leaf[i] and frame.joint.about_z:
             whole = at_rest(_leaf(frame, bodies[i], q[i], about_z(forward.states[i].turn), step, choices))
         else:
             for child in hung[i]:
                 whole = both(whole, child)
-            whole = before_turn(whole, about_z(forward.compound_turns[i]))
+            if frame.joint.about_z:
+                whole = before_turn(whole, about_z(forward.compound_turns[i]))
             for child in joined_to[i]:
                 whole = both(whole, child)
-        whole = driven(frame.joint, whole, qd[i], qdd[i])
+        drive = driven if frame.joint.about_z else driven_freely
+        whole = drive(frame.joint, whole, qd[i], qdd[i])
         found.append((i, whole))
         if frame.parent != BASE and step.joins:
             joined_to[frame.parent].append(moved_to(whole, step.offset))
         elif frame.parent != BASE:
-            hung[frame.parent].append(moved_to(along_parent(frame, whole), step.offset))
+            before = before_turn(whole, step.own)
+            hung[frame.parent].append(moved_to(along_parent(frame, before), step.offset))
     return found
 
 
@@ -141,39 +155,52 @@ def _leaf(frame: Frame, body: Body, q: Scalar, turn: Turn | None, step: Step, ch
 
 
 def _fill_row(
-    i: int,
+    at: tuple[int, int],
     frames: Sequence[Frame],
     axes: Sequence[Axis],
     steps: Sequence[Step],
     row: Row,
+    qd: Sequence[Scalar],
     by_q: list[list[Scalar]],
     by_qd: list[list[Scalar]],
     by_qdd: list[list[Scalar]],
 ) -> None:
-    """Set row i, for the joints between joint i and the base: the torque of joint i by their motion."""
-    j = i
+    """Set the row of joint and rate `at`, for the joints between that joint and the base: its torque by their motion."""
+    j, k = at
+    first = first_rates(frames)
     while True:
         joint, axis = frames[j].joint, axes[j]
-        turning = dot(row.a, axis.bend) + dot(row.b, axis.rate) + dot(row.c, axis.lever)
-        by_q[i][j] = effort(joint, (0.0, 0.0, dot(row.c, axis.bend)), (0.0, 0.0, turning))
-        turning = dot(row.a, axis.twice) + row.b[2]
-        by_qd[i][j] = effort(joint, (0.0, 0.0, dot(row.c, axis.twice)), (0.0, 0.0, turning))
-        by_qdd[i][j] = by_qdd[j][i] = effort(joint, row.c, row.a)
+        found = by_own_axes(joint, axis, row, qd[j]) if not joint.about_z else _by_axis(joint, axis, row)
+        for place, (x, y, z) in enumerate(zip(*found, strict=True), start=first[j]):
+            by_q[k][place], by_qd[k][place] = x, y
+            by_qdd[k][place] = by_qdd[place][k] = z
         if frames[j].parent == BASE:
             return
         row, j = steps[j].carried_row(row), frames[j].parent
 
 
+def _by_axis(joint: JointType, axis: Axis, row: Row) -> tuple[tuple[Scalar], tuple[Scalar], tuple[Scalar]]:
+    """Derivatives of a torque with this row by a joint's position, rate and acceleration."""
+    turning = dot(row.a, axis.bend) + dot(row.b, axis.rate) + dot(row.c, axis.lever)
+    by_q = effort(joint, (0.0, 0.0, dot(row.c, axis.bend)), (0.0, 0.0, turning))
+    turning = dot(row.a, axis.twice) + row.b[2]
+    by_qd = effort(joint, (0.0, 0.0, dot(row.c, axis.twice)), (0.0, 0.0, turning))
+    return (by_q,), (by_qd,), (effort(joint, row.c, row.a),)
+
+
 def _fill_column(
-    i: int,
+    at: tuple[int, int],
     frames: Sequence[Frame],
     steps: Sequence[Step],
     wrenches: tuple[Wrench, Wrench],
     by_q: list[list[Scalar]],
     by_qd: list[list[Scalar]],
 ) -> None:
-    """Set column i for the joints before joint i: their torques by its motion."""
-    (moved, pushed), j = wrenches, i
+    """Set the column of joint and rate `at` for the joints before that joint: their torques by its motion."""
+    (moved, pushed), (j, k) = wrenches, at
+    first = first_rates(frames)
     while frames[j].parent != BASE:
         moved, pushed, j = steps[j].carried(moved), steps[j].carried(pushed), frames[j].parent
-        by_q[j][i], by_qd[j][i] = effort(frames[j].joint, *moved), effort(frames[j].joint, *pushed)
+        found = zip(efforts(frames[j].joint, *moved), efforts(frames[j].joint, *pushed), strict=True)
+        for place, (x, y) in enumerate(found, start=first[j]):
+            by_q[place][k], by_qd[place][k] = x, y

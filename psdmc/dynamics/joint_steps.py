@@ -7,16 +7,28 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from psdmc.dynamics.frames import BASE, Frame, Turn, about_z, from_previous, inward, outward, to_previous
+from psdmc.dynamics.frames import (
+    BASE,
+    Frame,
+    Rotation,
+    Turn,
+    about_z,
+    from_previous,
+    inward,
+    outward,
+    to_previous,
+)
 from psdmc.dynamics.motion import Forward, Rates, Spin, spin_of
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform, transpose
+from psdmc.dynamics.twist import combined
 
 Wrench = tuple[Vector, Vector]
 """Force and moment about an origin."""
 
 
 class Axis(NamedTuple):
-    """The motion of the link before a joint, in the joint's orientation.
+    """The motion of the link before a joint, in the joint's orientation: before its turn, or after it where it is of several
+    coordinates.
 
     w, dw         rad/s, its angular velocity; rad/s^2, the derivative
     spin          its U, so that its points at r accelerate with acceleration + U r
@@ -60,8 +72,11 @@ class Step:
     offset    m, this origin from the parent's, and
     velocity  m/s, twice the velocity of that point of the parent's link about the parent's origin; both are in the shared
               orientation, or else along the axes of the parent's link
-    turn      the turn of the parent, or of its group of parallel axes up to it
+    turn      the turn of the parent, or of its group of parallel axes up to it; None where it is of several coordinates:
+              its orientation is after its turn
     slide     m/s, twice the rate at which the parent slides; None where it does not
+    own       this joint's turn where it is of several coordinates, and
+    drift     m/s, twice the linear rates of the parent where that is
     """
 
     frame: Frame
@@ -70,10 +85,12 @@ class Step:
     velocity: Vector
     turn: Turn | None
     slide: Scalar | None = None
+    own: Turn | Rotation | None = None
+    drift: Vector | None = None
 
     def to_link(self, v: Vector) -> Vector:
         """A vector along the axes in which `offset` is written."""
-        return v if self.joins else to_previous(self.frame, v)
+        return v if self.joins else to_previous(self.frame, inward(self.own, v))
 
     def to_orientation(self, v: Vector) -> Vector:
         """A vector along those axes, in the parent's orientation."""
@@ -91,6 +108,8 @@ class Step:
         a, b, c = self.to_orientation(a), self.to_orientation(b), self.to_orientation(c)
         if self.slide is not None:
             b = (b[0] - self.slide * c[1], b[1] + self.slide * c[0], b[2])
+        if self.drift is not None:
+            b = add(b, cross(self.drift, c))
         return Row(a, b, c)
 
 
@@ -103,13 +122,15 @@ def axis_and_step(
     forward: Forward,
     axes: Sequence[Axis],
 ) -> tuple[Axis, Step]:
-    """A joint's axis, and its step to its parent."""
+    """A joint's axis, and its step to its parent; qd and qdd joint by joint."""
     frame, offset, parent = frames[i], forward.states[i].offset, frames[i].parent
+    own = None if frame.joint.about_z else forward.states[i].turn
     if parent == BASE:
-        up = from_previous(frame, base_acceleration)
-        axis = _axis(ZERO, ZERO, up, up)
-        return axis, Step(frame, False, offset, ZERO, None)
-    turn, (acceleration, spin) = about_z(forward.compound_turns[parent]), forward.motions[parent]
+        up = outward(own, from_previous(frame, base_acceleration))
+        axis = axis_of(ZERO, ZERO, up, up)
+        return axis, Step(frame, False, offset, ZERO, None, own=own)
+    is_simple, (acceleration, spin) = frames[parent].joint.about_z, forward.motions[parent]
+    turn = about_z(forward.compound_turns[parent]) if is_simple else None
     before = add(acceleration, transform(spin.field, offset))
     joins = forward.joins[i]
     if joins:
@@ -120,13 +141,17 @@ def axis_and_step(
         velocity = cross(w, offset)
     else:
         rates = forward.rates[parent]
-        w, dw = from_previous(frame, rates.w), from_previous(frame, rates.dw_r)
-        before = from_previous(frame, before)
-        up = from_previous(frame, outward(turn, axes[parent].up))
+        w, dw = outward(own, from_previous(frame, rates.w)), outward(own, from_previous(frame, rates.dw_r))
+        before = outward(own, from_previous(frame, before))
+        up = outward(own, from_previous(frame, outward(turn, axes[parent].up)))
         velocity = cross(rates.w, offset)
+    axis, velocity = axis_of(w, dw, before, up), scale(velocity, 2.0)
+    if not is_simple:
+        drift = scale(combined(frames[parent].joint, qd[parent])[0], 2.0)
+        return axis, Step(frame, joins, offset, velocity, turn, own=own, drift=drift)
     slide = frames[parent].joint.slide(qd[parent])
     twice = None if slide is None else slide + slide
-    return _axis(w, dw, before, up), Step(frame, joins, offset, scale(velocity, 2.0), turn, twice)
+    return axis, Step(frame, joins, offset, velocity, turn, twice, own)
 
 
 def _after(axis: Axis, rate: Scalar | None, acceleration: Scalar | None) -> tuple[Vector, Vector]:
@@ -137,7 +162,8 @@ def _after(axis: Axis, rate: Scalar | None, acceleration: Scalar | None) -> tupl
     return (w[0], w[1], w[2] + rate), (dw[0] + w[1] * rate, dw[1] - w[0] * rate, dw[2] + acceleration)
 
 
-def _axis(w: Vector, dw: Vector, acceleration: Vector, up: Vector) -> Axis:
+def axis_of(w: Vector, dw: Vector, acceleration: Vector, up: Vector) -> Axis:
+    """The axis whose link before it moves so, in the joint's orientation."""
     wx, wy, _ = w
     twice = (wy + wy, -(wx + wx), 0.0)
     return Axis(w, dw, spin_of(Rates(w, dw)), acceleration, (wy, -wx, 0.0), twice, up)

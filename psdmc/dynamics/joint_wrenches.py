@@ -6,7 +6,21 @@ from __future__ import annotations
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.joint_steps import Axis, Row, Wrench
 from psdmc.dynamics.moving_composite import Composite
-from psdmc.dynamics.scalar import add, cross, scale, transform
+from psdmc.dynamics.own_axes import accelerating, axis_along, bending, composite_along, from_z, unit_twists
+from psdmc.dynamics.scalar import Scalar, add, cross, scale, transform
+from psdmc.dynamics.twist import combined
+
+
+def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
+    """A, B and C of each of a joint's rates about its own origin."""
+    if frame.joint.about_z:
+        return [torque_row(frame, axis, composite)]
+    found = []
+    for number, turns in unit_twists(frame.joint):
+        row = _turning_row if turns else _sliding_row
+        there = row(axis_along(axis, number), composite_along(composite, number))
+        found.append(Row(*(from_z(v, number) for v in there)))
+    return found
 
 
 def torque_row(frame: Frame, axis: Axis, composite: Composite) -> Row:
@@ -41,6 +55,23 @@ def _sliding_row(axis: Axis, composite: Composite) -> Row:
     hx, hy, _ = body.moment
     mx, my, _ = add(first, scale(cross(axis.w, body.moment), 2.0))
     return Row((hy, -hx, 0.0), (my, -mx, 0.0), (0.0, 0.0, body.mass))
+
+
+def wrenches_of_motions(
+    frame: Frame, axis: Axis, composite: Composite, rates: Scalar
+) -> list[tuple[Wrench, Wrench]]:
+    """For each of a joint's rates what `wrenches_of_motion` says of one."""
+    if frame.joint.about_z:
+        return [wrenches_of_motion(frame, axis, composite)]
+    found = []
+    own = combined(frame.joint, rates)
+    for number, turns in unit_twists(frame.joint):
+        there = axis_along(axis, number), composite_along(composite, number)
+        moved, pushed = (_turned_wrench, _turning_wrench) if turns else (_slid_wrench, _sliding_wrench)
+        first, second = ((from_z(f, number), from_z(m, number)) for f, m in (moved(*there), pushed(*there)))
+        bent = accelerating(composite.body, *bending(own, number, turns))
+        found.append((first, (add(second[0], bent[0]), add(second[1], bent[1]))))
+    return found
 
 
 def wrenches_of_motion(frame: Frame, axis: Axis, composite: Composite) -> tuple[Wrench, Wrench]:

@@ -9,9 +9,24 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from psdmc.dynamics.body import Body, in_previous, joined, shifted, spun
-from psdmc.dynamics.frames import Frame, Turn, to_previous
-from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, rotated_tensor, scale
+from psdmc.dynamics.body import Body, in_previous, joined, shifted, spun, turned
+from psdmc.dynamics.frames import Frame, Rotation, Turn, to_previous
+from psdmc.dynamics.motion import LinkMotion, Rates, spin_of
+from psdmc.dynamics.newton_euler import wrench
+from psdmc.dynamics.scalar import (
+    ZERO,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    multiply,
+    rotated_tensor,
+    scale,
+    transform,
+    transpose,
+)
+from psdmc.dynamics.twist import combined, own_rates
 from psdmc.robot.joints import JointType
 
 
@@ -70,12 +85,21 @@ def along_parent(frame: Frame, composite: Composite) -> Composite:
     return Composite(body, Momenta(second, to_previous(frame, first)), (force, moment))
 
 
-def before_turn(composite: Composite, turn: Turn | None) -> Composite:
-    """The composite in the orientation before a turn about z."""
+def before_turn(composite: Composite, turn: Turn | Rotation | None) -> Composite:
+    """The composite in the orientation before a turn."""
     if turn is None:
         return composite
+    if isinstance(turn, Rotation):
+        return _rotated(composite, turn)
     force, moment = (turn.inward(v) for v in composite.wrench)
     return Composite(spun(composite.body, turn), _turned(composite.momenta, turn), (force, moment))
+
+
+def _rotated(composite: Composite, turn: Rotation) -> Composite:
+    second, first = composite.momenta
+    second = multiply(multiply(turn.rows, second), transpose(turn.rows))
+    force, moment = (turn.inward(v) for v in composite.wrench)
+    return Composite(turned(composite.body, turn), Momenta(second, turn.inward(first)), (force, moment))
 
 
 def _turned(momenta: Momenta, turn: Turn) -> Momenta:
@@ -93,6 +117,36 @@ def driven(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> C
     rate, way = joint.turn(qd), joint.slide(qd)
     found = composite if rate is None else _spinning(composite, rate, joint.turn(qdd))
     return found if way is None else _sliding(found, way, joint.slide(qdd))
+
+
+def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
+    """The same of a joint of several coordinates, whose rates u and s are along the moved axes: r' gets s x r + u, r'' gets
+    du/dt + s x u + U r + 2 s x r', U of s and ds/dt."""
+    (u, s), (u_change, s_change) = (
+        combined(joint, own_rates(joint, qd)),
+        combined(joint, own_rates(joint, qdd)),
+    )
+    body, (second, first), (force, moment) = composite
+    pushed = wrench(LinkMotion(add(u_change, cross(s, u)), spin_of(Rates(s, s_change))), body)
+    force = add(force, add(pushed[0], cross(s, first)))
+    moment = add(moment, add(pushed[1], swept(second, s)))
+    rows: list[Vector] = []
+    for row, inertia, h in zip(second, second_rows(body), body.moment, strict=True):
+        rows.append(add(row, scale(add(cross(s, inertia), scale(u, h)), 2.0)))
+    first = add(first, scale(add(cross(s, body.moment), scale(u, body.mass)), 2.0))
+    return Composite(body, Momenta((rows[0], rows[1], rows[2]), first), (force, moment))
+
+
+def swept(second: Matrix, s: Vector) -> Vector:
+    """int r x (2 s x r') dm = (tr P - P^T) s"""
+    trace = second[0][0] + second[1][1] + second[2][2]
+    return add(scale(s, trace), scale(transform(transpose(second), s), -1.0))
+
+
+def second_rows(body: Body) -> Matrix:
+    """int r r^T dm"""
+    xx, yy, zz, xy, xz, yz = body.second
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
 def _spinning(composite: Composite, rate: Scalar, acceleration: Scalar) -> Composite:

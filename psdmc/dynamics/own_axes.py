@@ -1,0 +1,89 @@
+"""Joints of several coordinates in the recursion of derivatives: each of their rates is along or about one of the moved
+frame's own axes, which takes the place of z.
+
+All is in the orientation after the joint's turn. Beyond what holds of an axis there is one term: where one rate bends the
+direction that another one acts along, V x E of the joint's own twist V, which no single axis has.
+"""
+
+from __future__ import annotations
+
+from psdmc.dynamics.body import Body
+from psdmc.dynamics.joint_steps import Axis, Row, Wrench, axis_of
+from psdmc.dynamics.moving_composite import Composite, Momenta
+from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform, transpose
+from psdmc.dynamics.twist import combined, efforts
+from psdmc.robot.joints import JointType
+
+Vectors = tuple[Vector, Vector]
+"""A linear and an angular one."""
+
+
+def unit_twists(joint: JointType) -> list[tuple[int, bool]]:
+    """For each rate the number of its axis (0, 1, 2: x, y, z), and whether it turns about it."""
+    places = [(*linear, *angular).index(1.0) for linear, angular in joint.twists]
+    return [(place % 3, place >= 3) for place in places]
+
+
+def to_z(v: Vector, axis: int) -> Vector:
+    """The same vector where x, y, z are exchanged in turn, so that the axis becomes z."""
+    return (v[(axis + 1) % 3], v[(axis + 2) % 3], v[axis])
+
+
+def from_z(v: Vector, axis: int) -> Vector:
+    """Back."""
+    return to_z(v, (1 - axis) % 3)
+
+
+def axis_along(axis: Axis, number: int) -> Axis:
+    """The motion of the link before, in the axes in which this one is z."""
+    vectors = (to_z(v, number) for v in (axis.w, axis.dw, axis.acceleration, axis.up))
+    return axis_of(*vectors)
+
+
+def composite_along(composite: Composite, number: int) -> Composite:
+    """The composite in the axes in which this one is z."""
+    body, (second, first), (force, moment) = composite
+    xx, yy, zz, xy, xz, yz = body.second
+    squares, products = to_z((xx, yy, zz), number), to_z((yz, xz, xy), number)
+    turned = Body(body.mass, to_z(body.moment, number), (*squares, products[2], products[1], products[0]))
+    rows = to_z((second[0], second[1], second[2]), number)
+    a, b, c = (to_z(row, number) for row in rows)
+    return Composite(
+        turned, Momenta((a, b, c), to_z(first, number)), (to_z(force, number), to_z(moment, number))
+    )
+
+
+def bending(own: Vectors, number: int, turns: bool) -> Vectors:
+    """V x E, linear and angular: how the joint's own motion V bends the unit twist E."""
+    (u, s), e = own, _unit(number)
+    return (cross(u, e), cross(s, e)) if turns else (cross(s, e), ZERO)
+
+
+def accelerating(body: Body, linear: Vector, angular: Vector) -> Wrench:
+    """Force and moment that accelerate a body at rest so."""
+    xx, yy, zz, xy, xz, yz = body.second
+    ax, ay, az = angular
+    spun = (
+        (yy + zz) * ax - xy * ay - xz * az,
+        (xx + zz) * ay - xy * ax - yz * az,
+        (xx + yy) * az - xz * ax - yz * ay,
+    )
+    force = add(scale(linear, body.mass), cross(angular, body.moment))
+    return force, add(spun, cross(body.moment, linear))
+
+
+def by_own_axes(
+    joint: JointType, axis: Axis, row: Row, rates: Scalar
+) -> tuple[tuple[Scalar, ...], tuple[Scalar, ...], tuple[Scalar, ...]]:
+    """Derivatives of a torque with this row by each of the joint's positions, rates and accelerations."""
+    (a, b, c), (u, s) = row, combined(joint, rates)
+    field = transpose(axis.spin.field)
+    turning = add(transform(field, a), add(cross(b, axis.w), cross(c, axis.acceleration)))
+    by_q = efforts(joint, transform(field, c), turning)
+    bent = add(scale(axis.w, 2.0), s)
+    by_qd = efforts(joint, cross(c, bent), add(add(cross(a, bent), b), cross(c, u)))
+    return by_q, by_qd, efforts(joint, c, a)
+
+
+def _unit(number: int) -> Vector:
+    return (float(number == 0), float(number == 1), float(number == 2))
