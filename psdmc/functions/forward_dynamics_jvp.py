@@ -52,5 +52,4 @@ RECIPE = Recipe(
     "computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    of_axes=True,
 )

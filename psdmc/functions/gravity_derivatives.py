@@ -18,18 +18,21 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """At rest: d g / d q is symmetric, the second derivatives of potential energy, so that the lower triangle is enough."""
+    """At rest: d g / d q is symmetric, the second derivatives of potential energy, so that the lower triangle is enough
+    where joints have one coordinate each. Tangents of turns do not commute: there both are needed."""
     still = g.still
     found = inverse_dynamics_derivatives(
         g.frames, g.bodies, g.drives, g.inputs["q"], still, still, g.base_acceleration, g.choices
     )
+    if not all(frame.joint.about_z for frame in g.frames):
+        return {"g": found.gravity, "dg_dq": found.by_q}
     n = len(still)
     slopes = [[found.by_q[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
     return {"g": found.gravity, "dg_dq": slopes}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    rest = np.zeros_like(given["q"])
+    rest = np.zeros_like(given["qd"])
     by_q, _, _ = robot.torque_derivatives(given["q"], rest, rest)
     return {"g": robot.torques(given["q"], rest, rest, robot.base_acceleration), "dg_dq": by_q}
 
@@ -57,5 +60,4 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     beside="inverse_dynamics",
-    of_axes=True,
 )

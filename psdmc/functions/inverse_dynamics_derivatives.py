@@ -55,5 +55,4 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     benched=True,
-    of_axes=True,
 )

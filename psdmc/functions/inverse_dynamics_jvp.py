@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.manifold import coordinate_rates
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.program.slopes import slopes
 from psdmc.recipes.directions import DQ, DQD, DQDD, DTAU, along
@@ -22,7 +23,8 @@ DIRECTIONS = (DQ, DQD, DQDD)
 def trace(g: Ingredients) -> Outputs:
     q, qd, qdd = (g.inputs[name] for name in ("q", "qd", "qdd"))
     tau = torques(g, qd, qdd, g.base_acceleration)
-    tangent = [value for direction in DIRECTIONS for value in g.inputs[direction.name]]
+    dq, *others = (g.inputs[direction.name] for direction in DIRECTIONS)
+    tangent = [*coordinate_rates(g.frames, q, dq), *(value for other in others for value in other)]
     return {"tau": tau, "dtau": slopes(tau, [*q, *qd, *qdd], tangent)}
 
 
@@ -60,5 +62,4 @@ RECIPE = Recipe(
     "rnea, computeRNEADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    of_axes=True,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.manifold import pulled_back
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.program.slopes import gradients
 from psdmc.recipes.directions import COTANGENT, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, weighted
@@ -21,7 +22,7 @@ def trace(g: Ingredients) -> Outputs:
     q, qd, qdd = (g.inputs[name] for name in ("q", "qd", "qdd"))
     tau = torques(g, qd, qdd, g.base_acceleration)
     by_q, by_qd, by_qdd = gradients(tau, g.inputs[COTANGENT.name], (q, qd, qdd))
-    return {"tau": tau, "grad_q": by_q, "grad_qd": by_qd, "grad_qdd": by_qdd}
+    return {"tau": tau, "grad_q": pulled_back(g.frames, q, by_q), "grad_qd": by_qd, "grad_qdd": by_qdd}
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -60,5 +61,4 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     benched=True,
-    of_axes=True,
 )

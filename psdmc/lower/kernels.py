@@ -144,7 +144,7 @@ class _Lowered:
             program = trace_dynamics(recipe, arranged, self._search(theta).robot)
             return Kernel(recipe.signature, theta, program, program, "factored")
         candidates: list[Kernel] = []
-        n = self.model.n
+        n = self.model.nv
         if self._may_expand(recipe):
             program = lower_expanded(self.model, recipe, theta, self.costs)
             candidates.append(_kernel(recipe, theta, program, program, "expanded", self.costs, n))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc.dynamics.manifold import coordinate_rates, pulled_back
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.replay import substituted
 from psdmc.program.signature import Quantity, Signature
@@ -42,11 +43,11 @@ _FREE = "free_qdd"
 def torque_gradients(
     g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
-    """Gradients of the weighted torques by q and by qd, at fixed computed accelerations."""
+    """Gradients of the weighted torques by q (nv, along the tangent) and by qd, at fixed computed accelerations."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g)
     by_q, by_qd = gradients(torques(g, qd, free, g.base_acceleration), weights, (q, qd))
     found = substituted([*by_q, *by_qd], free, qdd)
-    return found[: len(q)], found[len(q) :]
+    return pulled_back(g.frames, q, found[: len(q)]), found[len(q) :]
 
 
 def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[Scalar]) -> list[Scalar]:
@@ -60,7 +61,7 @@ def parameter_gradient(g: Ingredients, qdd: Sequence[Scalar], weights: Sequence[
 def torque_slopes(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:
     """The torques' derivatives along the inputs dq and dqd, at fixed computed accelerations."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g)
-    along = [*g.inputs[DQ.name], *g.inputs[DQD.name]]
+    along = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name]]
     return substituted(slopes(torques(g, qd, free, g.base_acceleration), [*q, *qd], along), free, qdd)
 
 
