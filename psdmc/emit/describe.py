@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from psdmc.emit.info import JointInfo, PackageInfo
 from psdmc.emit.kernel_view import FunctionView
@@ -29,7 +29,7 @@ def description(
         f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the base frame",
         "",
         "Joints, each behind those that carry it:" if info.is_tree else "Joints, from base to tip:",
-        *(f"  {i}  {joint_line(joint)}" for i, joint in enumerate(info.joints)),
+        *(f"  {i}  {line}" for i, line in enumerate(_joints(info))),
         *(f"     {sentence}" for sentence in info.followers),
         "",
         "theta_b, base parameters in standard parameters about the file's link frames:",
@@ -106,6 +106,21 @@ def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
     """The user's choices by name; the target only where it is not the default."""
     target = {} if options.target == NATIVE else {"target": options.target.name}
     return {"real": options.real, "trig": options.trig, **info.options, **target}
+
+
+def _joints(info: PackageInfo) -> Iterator[str]:
+    """A line for each joint, with its places in q and rates where these are not its number."""
+    if not info.is_wide:
+        yield from map(joint_line, info.joints)
+        return
+    q, v = 0, 0
+    for joint in info.joints:
+        yield f"{joint_line(joint)}; {_places('q', q, joint.nq)}, {_places('rates', v, joint.nv)}"
+        q, v = q + joint.nq, v + joint.nv
+
+
+def _places(vector: str, first: int, count: int) -> str:
+    return f"{vector}[{first}]" if count == 1 else f"{vector}[{first}..{first + count - 1}]"
 
 
 def joint_line(joint: JointInfo) -> str:

@@ -32,10 +32,14 @@ from psdmc.emit.trig import (
     vector_trig,
 )
 from psdmc.errors import InputError
+from psdmc.functions import RECIPES
 from psdmc.program.kernel import Kernel
 from psdmc.target.flags import ARITHMETIC, GCC_ONLY
 from psdmc.target.target import Target
 from psdmc.target.vectors import HAS_VECTORS, LANE_BLOCK_BYTES
+
+ON_MANIFOLD = tuple(name for name, recipe in RECIPES.items() if recipe.default_where_wide)
+"""Functions that lead from one q to another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +231,12 @@ class PackageView:
         """Whether some kernel takes square roots."""
         bodies = (body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body))
         return any(body.has_roots for body in bodies)
+
+    @property
+    def leads_on(self) -> bool:
+        """Whether q is longer than the rates, and the package has what leads from one q to another."""
+        names = {function.name for function in self.functions}
+        return self.info.is_wide and all(recipe in names for recipe in ON_MANIFOLD)
 
     @property
     def has_several_outputs(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from pinocchio_robots import path_of
 import psdmc
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
+from psdmc.toolchain.compiler_command import find_compiler
 
 FUNCTIONS = ["inverse_dynamics", "mass_matrix", "forward_dynamics"]
 COUNT = 20
@@ -65,7 +67,8 @@ def test_check_passes_pinocchios_free_flyer(work: Path) -> None:
 
 
 def test_its_package_is_built_and_passes_its_own_test(work: Path) -> None:
-    done = typed("emit-c", "solo12.npz", "-o", "solo", "--functions", "inverse_dynamics", cwd=work)
+    functions = "inverse_dynamics,neutral,integrate,difference"
+    done = typed("emit-c", "solo12.npz", "-o", "solo", "--functions", functions, cwd=work)
     assert done.returncode == 0, done.stderr
     header = (work / "solo/include/solo/solo.h").read_text(encoding="utf-8")
     assert "solo_NQ 19" in header
@@ -74,13 +77,61 @@ def test_its_package_is_built_and_passes_its_own_test(work: Path) -> None:
     assert "from base to tip" not in header
     assert "FL_HFE (revolute)" in header
     assert "on link FL_SHOULDER" in header
-    assert "q[solo_NQ], ...;" in (work / "solo/README.md").read_text(encoding="utf-8")
+    assert "on link universe; q[0..6], rates[0..5]" in header
+    assert "on link FL_SHOULDER; q[8], rates[7]" in header
+    readme = (work / "solo/README.md").read_text(encoding="utf-8")
+    assert "q[solo_NQ], ...;" in readme
+    assert "`solo_integrate(q, v, q)` moves q by v, rates times seconds" in readme
     root, hip = json.loads((work / "solo/manifest.json").read_text(encoding="utf-8"))["joints"][:2]
     assert (root["nq"], root["nv"], root["parent"]) == (7, 6, "universe")
     assert (hip["parent"], "nq" in hip) == ("base_link", False)
     built = typed("build", "solo", cwd=work)
     assert built.returncode == 0, built.stderr
     assert "self-test passed" in built.stdout
+
+
+PROGRAM = """
+#include <solo/solo.h>
+#include <stdio.h>
+
+int main(void)
+{
+    double q[solo_NQ], start[solo_NQ], v[solo_NV], way[solo_NV], rest[solo_NV] = {0}, tau[solo_NV];
+    solo_neutral(q);
+    solo_neutral(start);
+    for (int k = 0; k < solo_NV; k++) {
+        v[k] = 0.1 * (k + 1);
+    }
+    solo_integrate(q, v, q);
+    solo_difference(start, q, way);
+    solo_inverse_dynamics(q, rest, rest, tau);
+    for (int k = 0; k < solo_NQ; k++) {
+        printf("%.17g ", q[k]);
+    }
+    for (int k = 0; k < solo_NV; k++) {
+        printf("%.17g ", way[k]);
+    }
+    for (int k = 0; k < solo_NV; k++) {
+        printf("%.17g ", tau[k]);
+    }
+    return 0;
+}
+"""
+"""What README tells: begin at the neutral position, move, and ask for torques there."""
+
+
+def test_a_c_program_moves_it_as_readme_says(work: Path, oracle: pin.Model) -> None:
+    (work / "main.c").write_text(PROGRAM, encoding="utf-8")
+    sources = [str(path) for path in sorted((work / "solo/src").glob("*.c"))]
+    command = [*find_compiler().command, "-std=c99", f"-I{work}/solo/include", str(work / "main.c"), *sources]
+    subprocess.run([*command, "-lm", "-o", str(work / "main")], check=True)
+    printed = subprocess.run([str(work / "main")], check=True, capture_output=True, text=True).stdout.split()
+    q, way, tau = np.split(np.array(printed, dtype=float), [oracle.nq, oracle.nq + oracle.nv])
+    v = 0.1 * np.arange(1, oracle.nv + 1)
+    np.testing.assert_allclose(q, pin.integrate(oracle, pin.neutral(oracle), v), atol=1e-14)
+    np.testing.assert_allclose(way, v, atol=1e-14)
+    rest = np.zeros(oracle.nv)
+    np.testing.assert_allclose(tau, pin.rnea(oracle, oracle.createData(), q, rest, rest), atol=1e-13)
 
 
 def test_compiled_functions_are_pinocchios(model: DynamicsModel, oracle: pin.Model) -> None:
@@ -112,7 +163,11 @@ REFUSED = [
     (("excite", "solo12.npz", "-o", "campaign"), 2, "a campaign is of joints of one coordinate each"),
     (("calibrate", "solo12.npz", "log.csv", "-o", "x.npz"), 2, "calibration is of joints of one coordinate"),
     (("bench", "solo12.npz"), 2, "the benchmark is of joints of one coordinate each"),
-    (("emit-c", "solo12.npz", "-o", "c", "--functions", "rk4_step"), 2, "no rk4_step"),
+    (
+        ("emit-c", "solo12.npz", "-o", "c", "--functions", "rk4_step_derivatives"),
+        2,
+        "no rk4_step_derivatives",
+    ),
 ]
 
 
