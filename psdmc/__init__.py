@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from psdmc.calibration.api import calibrate
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
+    from psdmc.export.export_urdf import export_urdf
     from psdmc.model.dynamics_model import DynamicsModel
     from psdmc.model.load import load
     from psdmc.model.store import save
@@ -25,6 +26,7 @@ __all__ = [
     "compile",
     "derive",
     "emit_c",
+    "export_urdf",
     "load",
     "save",
 ]
@@ -33,6 +35,7 @@ _MODULES = {name: "psdmc.errors" for name in __all__ if name.endswith("Error")}
 _MODULES |= dict.fromkeys(("compile", "derive", "emit_c"), "psdmc.compiler")
 _MODULES |= {
     "calibrate": "psdmc.calibration.api",
+    "export_urdf": "psdmc.export.export_urdf",
     "DynamicsModel": "psdmc.model.dynamics_model",
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",

@@ -19,6 +19,8 @@ FILES = {
     "solo12": "solo_description/robots/solo12.urdf",
     "talos": "talos_data/robots/talos_reduced.urdf",
     "allegro": "allegro_hand_description/urdf/allegro_right_hand.urdf",
+    "panda": "panda_description/urdf/panda.urdf",
+    "ur10": "ur_description/urdf/ur10_robot.urdf",
     "baxter": "baxter_description/urdf/baxter.urdf",
 }
 WIDE = {joint.pinocchio: joint for joint in (FREE, PLANAR, SPHERICAL, TRANSLATION)}

@@ -30,9 +30,10 @@ LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {
     "bench": LEFT_OF_TOOLS | {"lower"},
     "calibration": LEFT_OF_TOOLS,
+    "export": {"robot", "dynamics", "model", "calibration"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
-    "cli": LEFT_OF_TOOLS | {"bench", "calibration", "report"},
+    "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
 }
 
 OUTSIDE = {
@@ -73,6 +74,7 @@ OUTSIDE = {
         "cffi",
         "jinja2",
     },
+    "export": {"numpy", "mujoco"},
     "report": {"numpy", "matplotlib", "jinja2"},
     "compiler": {"numpy"},
     "cli": {"typer", "rich", "numpy"},

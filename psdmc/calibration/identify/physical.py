@@ -7,7 +7,6 @@ of 1, r and r r^T is positive. Then the mass matrix is positive definite everywh
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
@@ -16,6 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibration.identify.link_bodies import (
+    flat_rows,
+    held_rows,
+    pseudo_inertia,
+    reference_body,
+    vanishes,
+)
 from psdmc.calibration.logs.log import Array
 from psdmc.dynamics.parameters import inertia_matrix, second_moments
 from psdmc.errors import InputError, InternalError
@@ -46,13 +52,6 @@ class PhysicalOptions:
     smallest_drive: float = 1e-4
     known_body: float = 1.0
     unknown_body: float = 1e-2
-
-
-ORDINARY_BODY = (1.0, 1.0, 1.0, 5.0)
-"""Diagonal of a pseudo-inertia: 5 kg spread over 0.1 m."""
-THIN_BODY = 1e-3
-"""Eigenvalues of the file's pseudo-inertias count as at least this share of the largest: some published bodies are no
-distribution of mass, and others are points."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,13 +120,13 @@ def _nearest(
     loss = cp.sum_squares(np.linalg.qr(whitening, mode="r") @ away)
     constraints, divergence = [], 0.0
     for link in range(len(model.mechanism)):
-        own, unlike = _link_terms(cp, model, x, link, options)
+        own, unlike = link_terms(cp, model, x, link, options)
         constraints += own
         divergence += unlike
     if extra is not None and bounded[l:].any():
         held = np.flatnonzero(bounded[l:])
         constraints.append(extra[held] >= -values[l:][held] / size[held])
-    settle = SETTLING * cp.sum_squares(inner - _known_inner(model))
+    settle = SETTLING * cp.sum_squares(inner - known_inner(model))
     problem = cp.Problem(cp.Minimize(loss + settle + divergence), constraints)
     with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; the result is checked below
         warnings.simplefilter("ignore", UserWarning)
@@ -138,7 +137,7 @@ def _nearest(
     if inner.value is None:
         raise NotPhysical(f"physical consistency: clarabel found no solution ({problem.status})")
     found = np.asarray(span @ inner.value)
-    _require_physical(model, found)
+    require_physical(model, found)
     rest = np.zeros(0) if extra is None else values[l:] + size * np.asarray(extra.value)
     if bounded[l:].any() and float(rest[bounded[l:]].min()) < -SOLVER_SLACK * float(np.abs(rest).max()):
         raise NotPhysical(f"physical consistency: friction came out at {float(rest[bounded[l:]].min()):.3g}")
@@ -154,14 +153,14 @@ def whitening_of(covariance: Array) -> Array:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)) / scale)
 
 
-def _known_inner(model: DynamicsModel) -> Array:
+def known_inner(model: DynamicsModel) -> Array:
     """The span's coordinates of the file's standard parameters; zero where it has none."""
     span = model.mechanism.parameter_span
     known = np.nan_to_num(model.mechanism.parameters.reshape(-1))
     return np.asarray(np.linalg.lstsq(span, known, rcond=None)[0])
 
 
-def _require_physical(model: DynamicsModel, x: Array) -> None:
+def require_physical(model: DynamicsModel, x: Array) -> None:
     """NotPhysical unless the solution's pseudo-inertias have no negative eigenvalue beyond rounding, whatever the
     solver reports."""
     for joint, link in zip(model.mechanism.joints, x.reshape(-1, PARAMETERS_PER_LINK), strict=True):
@@ -183,7 +182,7 @@ ROUNDING = 1e-7
 constraints to 1e-8. The mass matrix is checked separately."""
 
 
-def _link_terms(
+def link_terms(
     cp: Any, model: DynamicsModel, x: Any, link: int, options: PhysicalOptions
 ) -> tuple[list[Any], Any]:
     """Constraints, pseudo-inertia above its bound, and divergence from the file's body; none of them for a link that
@@ -195,57 +194,14 @@ def _link_terms(
         constraints.append(x[start + 10] >= options.smallest_drive)
     if not np.any(span[start]):
         return constraints, 0.0
-    flat = _flat_rows(span, start)
-    held = [k for k in range(4) if k not in flat and not _vanishes(span, start, k)]
-    body = cp.bmat(_pseudo_inertia([x[start + k] for k in range(10)]))
-    constraints += [body[k, :] == 0 for k in flat if not _vanishes(span, start, k)]
+    held = held_rows(span, start)
+    body = cp.bmat(pseudo_inertia([x[start + k] for k in range(10)]))
+    constraints += [body[k, :] == 0 for k in flat_rows(span, start) if not vanishes(span, start, k)]
     block = body[held, :][:, held] if len(held) < 4 else body
-    near, weight = _reference_body(model.mechanism.parameters[link], held, options)
+    near, is_known = reference_body(model.mechanism.parameters[link], held)
+    weight = options.known_body if is_known else options.unknown_body
     divergence = cp.trace(np.linalg.inv(near) @ block) - cp.log_det(block)
     return [*constraints, block >> options.smallest * np.eye(len(held))], weight * divergence
-
-
-def _pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
-    """The pseudo-inertia of m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in units of 0.1 m: entries of similar size suit
-    the solver."""
-    m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = link
-    half = 0.5 * (ixx + iyy + izz)
-    t = 10.0
-    return [
-        [t * t * (half - ixx), -t * t * ixy, -t * t * ixz, t * hx],
-        [-t * t * ixy, t * t * (half - iyy), -t * t * iyz, t * hy],
-        [-t * t * ixz, -t * t * iyz, t * t * (half - izz), t * hz],
-        [t * hx, t * hy, t * hz, m],
-    ]
-
-
-def _reference_body(link: Array, held: list[int], options: PhysicalOptions) -> tuple[Array, float]:
-    """The body that a link should resemble, and the weight of that: the file's body, or an ordinary one."""
-    if not np.isfinite(link[:10]).all() or not link[0] > 0:
-        return np.diag([ORDINARY_BODY[k] for k in held]), options.unknown_body
-    body = np.array(_pseudo_inertia(link[:10].tolist()))[np.ix_(held, held)]
-    values, axes = np.linalg.eigh(body)
-    return np.asarray((axes * np.maximum(values, THIN_BODY * values[-1])) @ axes.T), options.known_body
-
-
-def _flat_rows(span: Array, start: int) -> list[int]:
-    """Rows of a pseudo-inertia that are zero in any body that the assumptions allow. A link without moment of inertia
-    about an axis has no extent across it, whatever its other moments are (a rod along x where Ixx is assumed zero)."""
-    rows: set[int] = set()
-    for axis, inertia in enumerate((4, 6, 9)):
-        if not np.any(np.abs(span[start + inertia]) > 1e-12):
-            rows |= {k for k in range(3) if k != axis}
-    return sorted(rows)
-
-
-def _vanishes(span: Array, start: int, k: int) -> bool:
-    """Whether the assumptions leave the k-th row of a pseudo-inertia zero (a planar link has no extent along z)."""
-    mass, moments = start, (start + 1, start + 2, start + 3)
-    if k == 3:
-        return not np.any(span[mass])
-    inertia = span[[start + 4, start + 6, start + 9]]
-    own = 0.5 * inertia.sum(axis=0) - inertia[k]
-    return not np.any(span[moments[k]]) and not np.any(np.abs(own) > 1e-12)
 
 
 def require_cvxpy() -> Any:

@@ -1,0 +1,78 @@
+"""Links as pseudo-inertias: which rows of them a model's assumptions leave, and the body that each should resemble."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from psdmc.calibration.logs.log import Array
+
+ORDINARY_BODY = (1.0, 1.0, 1.0, 5.0)
+"""Diagonal of a pseudo-inertia: 5 kg spread over 0.1 m."""
+THIN_BODY = 1e-3
+"""Eigenvalues of the file's pseudo-inertias count as at least this share of the largest: some published bodies are no
+distribution of mass, and others are points."""
+
+
+def pseudo_inertia(link: Sequence[Any]) -> list[list[Any]]:
+    """The pseudo-inertia of m, m r (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in units of 0.1 m: entries of similar size suit
+    the solver."""
+    m, hx, hy, hz, ixx, ixy, iyy, ixz, iyz, izz = link
+    half = 0.5 * (ixx + iyy + izz)
+    t = 10.0
+    return [
+        [t * t * (half - ixx), -t * t * ixy, -t * t * ixz, t * hx],
+        [-t * t * ixy, t * t * (half - iyy), -t * t * iyz, t * hy],
+        [-t * t * ixz, -t * t * iyz, t * t * (half - izz), t * hz],
+        [t * hx, t * hy, t * hz, m],
+    ]
+
+
+def reference_body(link: Array, held: list[int]) -> tuple[Array, bool]:
+    """The body that a link should resemble, and whether it is the file's: an ordinary one where the file has none."""
+    if not np.isfinite(link[:10]).all() or not link[0] > 0:
+        return np.diag([ORDINARY_BODY[k] for k in held]), False
+    body = np.array(pseudo_inertia(link[:10].tolist()))[np.ix_(held, held)]
+    values, axes = np.linalg.eigh(body)
+    return np.asarray((axes * np.maximum(values, THIN_BODY * values[-1])) @ axes.T), True
+
+
+def held_rows(span: Array, start: int) -> list[int]:
+    """Rows of a link's pseudo-inertia that are not zero by assumption; `start` is the place of its parameters in x."""
+    flat = flat_rows(span, start)
+    return [k for k in range(4) if k not in flat and not vanishes(span, start, k)]
+
+
+def flat_rows(span: Array, start: int) -> list[int]:
+    """Rows of a pseudo-inertia that are zero in any body that the assumptions allow. A link without moment of inertia
+    about an axis has no extent across it, whatever its other moments are (a rod along x where Ixx is assumed zero)."""
+    rows: set[int] = set()
+    for axis, inertia in enumerate((4, 6, 9)):
+        if not np.any(np.abs(span[start + inertia]) > 1e-12):
+            rows |= {k for k in range(3) if k != axis}
+    return sorted(rows)
+
+
+def flat_equations(span: Array, start: int) -> list[Array]:
+    """Rows over x (11 n,), zero for every body that the assumptions allow one link, whose parameters begin at `start`."""
+    if not np.any(span[start]):
+        return []
+    rows = []
+    for k in flat_rows(span, start):
+        for column in range(4):
+            row = np.zeros(len(span))
+            row[start : start + 10] = [pseudo_inertia(unit)[k][column] for unit in np.eye(10).tolist()]
+            rows.append(row)
+    return rows
+
+
+def vanishes(span: Array, start: int, k: int) -> bool:
+    """Whether the assumptions leave the k-th row of a pseudo-inertia zero (a planar link has no extent along z)."""
+    mass, moments = start, (start + 1, start + 2, start + 3)
+    if k == 3:
+        return not np.any(span[mass])
+    inertia = span[[start + 4, start + 6, start + 9]]
+    own = 0.5 * inertia.sum(axis=0) - inertia[k]
+    return not np.any(span[moments[k]]) and not np.any(np.abs(own) > 1e-12)

@@ -1,0 +1,172 @@
+"""What both files are written from: links on joints, each with its frame, its body and its joint's friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from psdmc.calibration.identify.physical_links import PhysicalLinks
+from psdmc.dynamics.parameters import moved
+from psdmc.errors import InputError
+from psdmc.export.friction import JointFriction, joint_friction
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.coordinates import Coordinate
+from psdmc.robot.inertia import about_com, without_noise
+from psdmc.robot.limits import joined
+from psdmc.robot.mechanism import BASE, BODY_PARAMETERS, DRIVE, Array, Joint, Mechanism, NamedFrame, Placement
+from psdmc.robot.names import naming_faults
+
+WORLD = "world"
+"""Link that the base hangs on where gravity does not point along the base's -z."""
+ON_AXIS = "_on_axis"
+"""Ending of the name of a link whose own frame, off its joint's axis, keeps the plain name."""
+ALONG = 1e-12
+"""Share of gravity's length beside its axis that is rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """One moving link. Its frame lies on its joint's axis, as URDF has it.
+
+    name      of the link that has the mass
+    parent    number of the body that its joint hangs on, or BASE
+    place     the link's frame in its joint frame
+    origin    the link's frame in its parent's (the base's) at q = 0
+    axis      (3,) of the joint, along the link's own axes
+    inertial  mass (kg), centre of mass (3,) and inertia about it (6,) (kg m^2, INERTIA_NAMES); None: no mass
+    drive     drive inertia, kg m^2 (kg)
+    follows   the coordinate of a joint that follows another
+    """
+
+    joint: Joint
+    name: str
+    parent: int
+    place: Placement
+    origin: Placement
+    axis: Array
+    inertial: tuple[float, Array, Array] | None
+    drive: float
+    friction: JointFriction | None
+    follows: Coordinate | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Written:
+    """A robot as it is written.
+
+    world    placement of the base in a link WORLD whose z points against gravity; None: the base's does, or the robot floats
+    gravity  (3,) m/s^2 along the axes of the outermost link
+    frames  named frames fixed to a body: its number, and the place in the body's link
+    """
+
+    name: str
+    base: str
+    world: Placement | None
+    gravity: Array
+    bodies: tuple[Body, ...]
+    frames: tuple[NamedFrame, ...]
+
+
+def written(model: DynamicsModel, links: PhysicalLinks, keep_frames: bool) -> Written:
+    """The robot with these links. InputError where a name cannot be written.
+
+    keep_frames  links keep their frames, which are on their axes (a URDF's); else links off their axes are named anew,
+                 and their frames written beside them
+    """
+    chain = model.mechanism
+    found = joint_friction(model)
+    places = [_place(joint, keep_frames) for joint in chain.joints]
+    taken = {chain.base_name, *(joint.link_name for joint in chain.joints), *(f.name for f in _frames(chain))}
+    names = [
+        joint.link_name if off is None else _free(joint.link_name + ON_AXIS, taken)
+        for joint, (_, off) in zip(chain.joints, places, strict=True)
+    ]
+    bodies = tuple(
+        _body(chain, k, names[k], [place for place, _ in places], links.parameters[k], found.get(joint.name))
+        for k, joint in enumerate(chain.joints)
+    )
+    own = [
+        NamedFrame(j.link_name, k, o)
+        for k, (j, (_, o)) in enumerate(zip(chain.joints, places, strict=True))
+        if o
+    ]
+    named = {frame.name: frame for frame in own}
+    for frame in _frames(chain):
+        if frame.name not in (*names, *named):
+            at = bodies[frame.joint].place.inverse() @ frame.placement
+            named[frame.name] = NamedFrame(frame.name, frame.joint, at)
+    world = _world(chain.gravity) if chain.types[0].about_z else None
+    gravity = chain.gravity if world is None else np.array([0.0, 0.0, -np.linalg.norm(chain.gravity)])
+    _require_names(chain, [*names, *named])
+    return Written(chain.name, chain.base_name, world, gravity, bodies, tuple(named.values()))
+
+
+def _frames(chain: Mechanism) -> tuple[NamedFrame, ...]:
+    return (chain.tip_frame, *chain.frames)
+
+
+def _place(joint: Joint, keep: bool) -> tuple[Placement, Placement | None]:
+    """Where the link's written frame is in the joint frame, and the file's own link frame in that, where they differ."""
+    if keep or not joint.type.about_z or joint.type.turn(1.0) is None:
+        return joint.link_frame, None
+    if not joint.link_frame.translation[:2].any():
+        return joint.link_frame, None
+    place = Placement(joint.link_frame.rotation, np.zeros(3))
+    return place, place.inverse() @ joint.link_frame
+
+
+def _free(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def _body(
+    chain: Mechanism,
+    k: int,
+    name: str,
+    places: list[Placement],
+    x: Array,
+    friction: JointFriction | None,
+) -> Body:
+    joint, parent = chain.joints[k], chain.parents[k]
+    outer = Placement.identity() if parent == BASE else places[parent]
+    own = x[:BODY_PARAMETERS]
+    if places[k] is not joint.link_frame:
+        own = without_noise(moved(own, places[k].inverse() @ joint.link_frame))
+    coordinate = chain.coordinates[k]
+    return Body(
+        joint=joint,
+        name=name,
+        parent=parent,
+        place=places[k],
+        origin=outer.inverse() @ joint.placement @ places[k],
+        axis=places[k].rotation[2] + 0.0,
+        inertial=about_com(own) if own[0] > 0.0 else None,
+        drive=float(x[DRIVE]),
+        friction=friction,
+        follows=coordinate if coordinate.leader != k else None,
+    )
+
+
+def _world(gravity: Array) -> Placement | None:
+    """Where the base sits in a frame with gravity along -z; None: so it is in the base's."""
+    size = float(np.linalg.norm(gravity))
+    up = -gravity / size if size else np.array([0.0, 0.0, 1.0])
+    if np.abs(up - [0.0, 0.0, 1.0]).max() < ALONG:
+        return None
+    across = np.eye(3)[int(np.argmin(np.abs(up)))]
+    x = across - (across @ up) * up
+    x /= np.linalg.norm(x)
+    return Placement(np.array([x, np.cross(up, x), up]), np.zeros(3))
+
+
+def _require_names(chain: Mechanism, links: list[str]) -> None:
+    """InputError where names do not fit into XML, or are not each other's only one."""
+    faults = naming_faults([chain.base_name, *links], "link") + naming_faults(
+        list(chain.joint_names), "joint"
+    )
+    if faults:
+        raise InputError(f"{chain.name!r}: {joined(faults)}", "correct the names in the robot's file")

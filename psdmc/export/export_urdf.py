@@ -1,0 +1,134 @@
+"""`psdmc.export_urdf`: a model back as a URDF that has its theta_b, and an MJCF where a URDF cannot hold all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.atomic import check_place, write_together, write_whole
+from psdmc.calibration.identify.physical_links import PhysicalLinks, physical_links
+from psdmc.errors import InputError, InternalError
+from psdmc.export.bodies import Written, written
+from psdmc.export.elements import as_text
+from psdmc.export.friction import calibrated_friction_notes, joint_friction
+from psdmc.export.from_mechanism import urdf_of
+from psdmc.export.from_source import urdf_with
+from psdmc.export.mjcf import mjcf_of
+from psdmc.export.numbers import exact
+from psdmc.export.read_back import LIMIT, Reading, read_mjcf_back, read_urdf_back
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.progress import Progress, silent
+from psdmc.robot.derivable import require_axes
+from psdmc.robot.joints import FREE
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import BASE, DRIVE
+
+MJCF_SUFFIX = ".xml"
+STANDARD = (0.0, 0.0, -9.81)
+"""m/s^2 in the root's axes that readers of a URDF take."""
+GRAVITY_ROUNDING = 1e-12
+"""Share of gravity by which it may differ from what readers of a URDF take."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exported:
+    """What was written, and how well other readers' torques agree with theta_b.
+
+    urdf, mjcf     the files; mjcf None where none was written
+    links          the links' standard parameters and their divergence from the file's
+    readings       of the URDF, by Pinocchio and MuJoCo
+    mjcf_reading   of the MJCF, by MuJoCo
+    notes          what the files do not hold, and what was changed, one sentence each
+    """
+
+    urdf: Path
+    mjcf: Path | None
+    links: PhysicalLinks
+    readings: tuple[Reading, ...]
+    mjcf_reading: Reading | None
+    notes: tuple[str, ...]
+
+
+def export_urdf(
+    model: DynamicsModel, path: str | Path, mjcf: bool | None = None, progress: Progress = silent
+) -> Exported:
+    """Write the model as a URDF whose links have its theta_b, and are the physical ones nearest to those of its file.
+
+    Where the model holds a URDF, names, limits and shapes are that file's; else links, joints and limits are written
+    from the model. Friction of a calibrated model is in <dynamics>.
+
+    mjcf   whether an MJCF is written beside it, with the suffix .xml; None: where the model has drive inertias
+
+    InputError where theta_b is unknown, where no physical links have it (NoSuchLinks), or where a file cannot be written.
+    """
+    target = Path(path)
+    beside = target.with_suffix(MJCF_SUFFIX)
+    _require_exportable(model)
+    check_place(target)
+    progress("finding physical links")
+    links = physical_links(model)
+    drives = links.parameters[:, DRIVE]
+    wanted = bool(drives.any()) if mjcf is None else mjcf
+    if wanted and beside == target:
+        raise InputError(f"{target}: the MJCF goes there, beside the URDF", "call the URDF NAME.urdf")
+    what, text, notes = _urdf(model, links)
+    progress("reading it back")
+    readings = read_urdf_back(model, text, drives, what.gravity)
+    _require_agreement(readings[0])
+    other = as_text(mjcf_of(what)) if wanted else None
+    mjcf_reading = None if other is None else read_mjcf_back(model, other)
+    if other is None:
+        write_whole(target, text)
+    else:
+        write_together(target.parent, {target.name: text, beside.name: other})
+    notes = (*_drive_notes(model, drives, beside if wanted else None), *_gravity_notes(what), *notes)
+    return Exported(target, beside if wanted else None, links, readings, mjcf_reading, notes)
+
+
+def _require_exportable(model: DynamicsModel) -> None:
+    """InputError where a joint is of a kind that is not written: all but one of one coordinate, and a free root."""
+    chain = model.mechanism
+    free = chain.types[0] is FREE and chain.parents[0] == BASE
+    if not all(kind.about_z for kind in chain.types[1:]) or not (free or chain.types[0].about_z):
+        require_axes(chain, "a written URDF")
+    model.known_theta_b()
+
+
+def _urdf(model: DynamicsModel, links: PhysicalLinks) -> tuple[Written, str, tuple[str, ...]]:
+    """What is written, the URDF's text, and notes on it."""
+    kept = model.provenance
+    from_file = kept.get("source_format") == "urdf" and {"source_text", "options"} <= set(kept)
+    what = written(model, links, keep_frames=from_file)
+    root, notes = urdf_with(what, kept) if from_file else (urdf_of(what), ())
+    return what, as_text(root), (*notes, *calibrated_friction_notes(joint_friction(model)))
+
+
+def _require_agreement(reading: Reading) -> None:
+    if not reading.error <= LIMIT:
+        raise InternalError(f"a written URDF's torques are {reading.error:.2g} away from theta_b's")
+
+
+def _drive_notes(model: DynamicsModel, drives: np.ndarray, mjcf: Path | None) -> list[str]:
+    if not drives.any():
+        return []
+    units = {0: "kg m^2", 1: "kg"}
+    values = ", ".join(
+        f"{shown(joint.name)} {drive:.4g} {units[joint.type.length_order]}"
+        for joint, drive in zip(model.mechanism.joints, drives, strict=True)
+        if drive
+    )
+    where = f"armature in {mjcf}" if mjcf else "in no file (--mjcf writes one with armature)"
+    return [f"drive inertia, which a URDF cannot hold, is {where}: {values}"]
+
+
+def _gravity_notes(what: Written) -> list[str]:
+    notes = []
+    if what.world is not None:
+        notes.append("the base hangs on link 'world', turned so that gravity is along its -z")
+    if np.abs(what.gravity - STANDARD).max() > GRAVITY_ROUNDING * abs(STANDARD[2]):
+        notes.append(
+            f"gravity is {exact(what.gravity)} m/s^2, which a URDF cannot hold: readers take {exact(STANDARD)}; set it there"
+        )
+    return notes
