@@ -202,6 +202,8 @@ def emit_c(
 ) -> None:
     """Write a model's C package: header, sources, build files, self-test."""
     from psdmc import compiler
+    from psdmc.cli.one_line import one_line
+    from psdmc.emit.names import identifier
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.load import load
 
@@ -223,6 +225,9 @@ def emit_c(
             target,
         )
     print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
+    asked = name or found.mechanism.name
+    if identifier(asked) != asked:
+        print(f"note: in C '{one_line(asked)}' is {identifier(asked)}")
     for note in run_time_only(found, wanted):
         print(f"note: {note}")
     say_next("build", output)

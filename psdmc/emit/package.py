@@ -312,8 +312,19 @@ def package_files(package: PackageView) -> dict[str, str]:
         files[f"{adapter}/{package.robot}_{adapter}.c"] = ADAPTERS[adapter](
             package.robot, package.real, package.kernels
         )
+    files = {path: licensed(path, text) for path, text in files.items()}
     files["manifest.json"] = manifest(package.robot, package.info, package.options, package.functions, files)
     return files
+
+
+C_SUFFIXES = (".c", ".h", ".hpp", ".inc")
+LICENCE = "/* SPDX-License-Identifier: 0BSD */\n"
+"""First line of each C file: the code is its user's, without any obligation."""
+
+
+def licensed(path: str, text: str) -> str:
+    """The text of a file with its licence, where it is C."""
+    return LICENCE + text if path.endswith(C_SUFFIXES) else text
 
 
 _FOR_BATCHES = {
@@ -367,4 +378,6 @@ def _build_files(package: PackageView) -> tuple[tuple[str, str], ...]:
         (f"{package.robot}.pc.in", "pc.in.jinja"),
         ("Makefile", "Makefile.jinja"),
         ("README.md", "README.md.jinja"),
+        ("LICENSE", "LICENSE.jinja"),
+        ("package.xml", "package.xml.jinja"),
     )

@@ -84,3 +84,14 @@ def test_adapters_need_shared_libraries(tmp_path: Path) -> None:
     found: DynamicsModel = psdmc.derive(ROBOT)
     with pytest.raises(InputError, match="target cortex-m7 has no shared libraries, which casadi loads"):
         psdmc.emit_c(found, tmp_path / "arm", adapters=["casadi"], target="cortex-m7")
+
+
+@pytest.mark.parametrize(("name", "in_c"), [("panda-tcp", "panda_tcp"), ("int", "robot_int"), ("arm", None)])
+def test_another_name_in_c_is_told(
+    name: str, in_c: str | None, model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert emit(model, tmp_path / "arm", "--name", name) in (0, None)
+
+    said = capsys.readouterr().out
+    assert (f"note: in C '{name}' is {in_c}\n" in said) if in_c else ("note:" not in said)
+    assert (tmp_path / "arm" / "include" / (in_c or name) / f"{in_c or name}.h").is_file()

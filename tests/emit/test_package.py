@@ -66,6 +66,17 @@ def test_text_ends_with_one_newline_and_has_no_trailing_blanks() -> None:
         assert not re.search(r"[ \t]+$", text, re.MULTILINE), path
 
 
+def test_every_file_of_c_says_its_licence_and_the_package_holds_it() -> None:
+    files = package_files(pendulum(references=REFERENCES))
+    for path, text in files.items():
+        if path.endswith((".c", ".h", ".hpp", ".inc")):
+            assert text.splitlines()[0] == "/* SPDX-License-Identifier: 0BSD */", path
+
+    assert "It is yours" in files["LICENSE"]
+    assert "It is yours, without any obligation" in files["include/pendulum/pendulum.h"]
+    assert "<license>0BSD</license>" in files["package.xml"]
+
+
 def test_the_order_of_kernels_does_not_matter() -> None:
     turned = dict(reversed(pendulum_kernels().items()))
     again = package_view(pendulum_info(), turned, EmitOptions(), REFERENCES)

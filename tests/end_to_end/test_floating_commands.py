@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import json
 import shutil
 import subprocess
@@ -52,9 +53,8 @@ def of_pinocchio(oracle: pin.Model, function, *states: np.ndarray) -> np.ndarray
 
 def test_show_tells_of_the_root_joint(work: Path) -> None:
     shown = typed("show", "solo12.npz", cwd=work).stdout
-    row = next(line for line in shown.splitlines() if "│ root_joint" in line)
-    cells = [cell.strip() for cell in row.strip("│").split("│")]
-    assert cells[:8] == ["root_joint", "base_link", "universe", "free", *4 * ["none"]]
+    row = next(line for line in shown.splitlines() if line.startswith("root_joint"))
+    assert re.split(" {2,}", row)[:5] == ["root_joint", "base_link", "universe", "free", "none"]
     assert "universe to 4 ends" in shown
     assert "monomials not expanded (they are of joints of one coordinate)" in shown
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -76,8 +77,9 @@ def test_show_says_what_each_joint_hangs_on(work: Path) -> None:
     shown = typed("show", "torso.npz", cwd=work).stdout
     assert "base to 2 ends, tip hand_l" in shown
     assert "monomials not expanded (a tree's are only with --expand)" in shown
-    rows = [line.split("│")[1:4] for line in shown.splitlines() if line.startswith("│")]
-    hanging = {name.strip(): parent.strip() for name, _, parent in rows[:5]}
+    lines = [re.split(" {2,}", line) for line in shown.splitlines()]
+    first = next(k for k, line in enumerate(lines) if line[:3] == ["joint", "link", "hangs on"]) + 1
+    hanging = {line[0]: line[2] for line in lines[first : first + len(JOINTS)]}
     assert hanging == dict(zip(JOINTS, ("base", "torso", "arm_l", "torso", "arm_r"), strict=True))
 
 

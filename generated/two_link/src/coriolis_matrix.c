@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* coriolis_matrix: C(q, qd) with dM/dt - 2 C skew-symmetric */
 #include "internal.h"
 #include "rows.h"

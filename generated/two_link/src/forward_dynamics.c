@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* forward_dynamics: qdd = M(q)^-1 (tau - h(q, qd)) */
 #include "internal.h"
 #include "rows.h"

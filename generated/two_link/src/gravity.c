@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* gravity: g(q) */
 #include "internal.h"
 #include "rows.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Four consecutive outputs, one state per lane, into rows [state][variable]. */
 #ifndef two_link_GROUPS_H
 #define two_link_GROUPS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Private to the sources of two_link: real numbers, vectors of them, sines and cosines. */
 #ifndef two_link_INTERNAL_H
 #define two_link_INTERNAL_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* jacobian: linear then angular velocity of the tip per unit joint rate, base frame */
 #include "internal.h"
 #include "rows.h"

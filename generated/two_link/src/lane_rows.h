@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Bodies included after this header compute WIDTH states, one per vector lane, and write each state's output into a
    row of its own: their output is an array of WIDTH pointers. No include guard: lane_states.h undoes it. */
 #include "groups.h"

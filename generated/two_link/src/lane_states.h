@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Bodies included after this header compute WIDTH states, one per vector lane; their pointers point at
    [variable][LANES] blocks. No include guard: one_state.h redefines the same names. */
 #include "internal.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* mass_matrix: M(q), both triangles */
 #include "internal.h"
 #include "rows.h"

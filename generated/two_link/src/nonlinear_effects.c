@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* nonlinear_effects: h(q, qd) = C(q, qd) qd + g(q) */
 #include "internal.h"
 #include "rows.h"

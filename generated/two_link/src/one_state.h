@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Bodies included after this header compute one state. No include guard: lane_states.h redefines the same names. */
 #include "internal.h"
 

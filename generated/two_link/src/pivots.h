@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* A pivot that is not positive: the accelerations become NaN. */
 #ifndef two_link_PIVOTS_H
 #define two_link_PIVOTS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* regressor: Y with tau = Y theta_b */
 #include "internal.h"
 #include "rows.h"

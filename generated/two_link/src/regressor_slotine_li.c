@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* regressor_slotine_li: Y with M(q) qdd_r + C(q, qd) qd_r + g(q) = Y theta_b */
 #include "internal.h"
 #include "rows.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Between NumPy rows, [state][variable], and one block of lanes, [variable][LANES]. */
 #ifndef two_link_ROWS_H
 #define two_link_ROWS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Sines and cosines of several angles at once, one angle per vector lane. */
 #ifndef two_link_SINCOS_H
 #define two_link_SINCOS_H

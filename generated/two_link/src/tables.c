@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Names, limits and parameters of two_link. */
 #include <math.h>
 

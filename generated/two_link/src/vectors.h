@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Vectors of reals in GCC's and clang's extension; on other targets a "vector" is one real. */
 #ifndef two_link_VECTORS_H
 #define two_link_VECTORS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Reference states as rows and as blocks of lanes, and places for what the functions give there. */
 #include <stddef.h>
 

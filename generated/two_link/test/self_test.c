@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Compares every function of two_link, in every layout, with reference values from its model. Status 0 if all agree. */
 #include "two_link/two_link.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* What the functions gave against what they should give. */
 #include <float.h>
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* inverse_dynamics: tau = M(q) qdd + h(q, qd) */
 #include "internal.h"
 #include "rows.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* States and what the functions give there, worked out from the model by Newton-Euler, not by this code: SI units, one
    state per row, matrices row by row. theta_b_given and tau_theta_given belong to the functions that take theta_b. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: 0BSD */
 /* Compares every function of pendulum, in every layout, with reference values from its model. Status 0 if all agree. */
 #include "pendulum/pendulum.h"
 
