@@ -52,7 +52,7 @@ def oracle() -> pin.Model:
 def test_show_says_what_each_joint_follows(work: Path) -> None:
     shown = typed("show", "gripper.npz", cwd=work).stdout
     rows = {
-        row[0]: row[2]
+        row[0]: row[3]
         for line in reversed(shown.splitlines())  # of several pieces of the table the first counts
         if len(row := re.split(" {2,}", line)) > 3
     }
