@@ -38,7 +38,7 @@ MAY_IMPORT |= {
 
 OUTSIDE = {
     "real_arrays": {"numpy"},
-    "robot": {"numpy", "pinocchio", "defusedxml", "mujoco"},
+    "robot": {"numpy", "pinocchio", "defusedxml", "mujoco", "xacro"},
     "dynamics": {"numpy"},
     "model": {"numpy", "scipy", "pandas", "sympy"},
     "derivation": {"numpy", "scipy"},

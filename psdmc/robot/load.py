@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -13,16 +12,16 @@ from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
+from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
+from psdmc.robot.source_words import with_source_words
 from psdmc.robot.tool import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
 
 __all__ = ["DEFAULT_SNAP", "LoadOptions", "LoadedRobot", "SourceFormat", "load_robot", "load_robot_text"]
-
-SourceFormat = Literal["urdf", "dh"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +64,8 @@ def load_robot(
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
 ) -> LoadedRobot:
-    """The robot in a URDF or DH TOML file (told apart by the suffix .toml). Options as in LoadOptions.
+    """The robot in a URDF, MJCF, xacro or DH TOML file (told apart by the suffixes .toml and .xacro, and by the root
+    element). Options as in LoadOptions.
 
     InputError where the file or an option is wrong, naming what and where.
     """
@@ -74,7 +74,9 @@ def load_robot(
     options = checked_options(
         base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
     )
-    return _loaded(text, "dh" if file.suffix.lower() == ".toml" else "urdf", file.name, options)
+    text, source_format, options = as_source(file, text, options)
+    _refuse_size(len(text.encode(errors="replace")), file.name)
+    return _loaded(text, source_format, file.name, options)
 
 
 def load_robot_text(
@@ -135,7 +137,7 @@ def robot_text(file: Path) -> str:
 def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> Draft:
     gravity = None if options.gravity is None else np.array(options.gravity)
     if source_format == "urdf":
-        return urdf_draft(
+        draft = urdf_draft(
             text,
             source,
             options.base,
@@ -146,6 +148,7 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
             options.lock,
             options.floating,
         )
+        return with_source_words(draft, text, source)
     if options.base is not None or options.tip is not None:
         raise InputError(f"{source}: --base and --tip name links of a URDF", "leave them out for a DH table")
     if options.lock:

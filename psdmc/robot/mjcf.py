@@ -1,0 +1,98 @@
+"""An MJCF file as MuJoCo itself compiles it: defaults, includes, geometry's inertias and reference positions resolved.
+
+The compiled model is written down as a URDF of the same tree (psdmc/robot/mjcf_text.py). All that psdmc does with URDFs
+then holds for it, and a model file has a source that can be read again without MuJoCo and the file's includes.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from psdmc.errors import InputError
+from psdmc.robot.limits import shown
+from psdmc.robot.mjcf_faults import followers, left_out, refuse_constraints
+from psdmc.robot.mjcf_names import Names
+from psdmc.robot.mjcf_text import tree_text
+
+ROOT = re.compile(r"\s*(?:<\?xml.*?\?>|<!--.*?-->|\s+)*<\s*([\w:.-]+)", re.DOTALL)
+"""Up to the name of an XML text's root element."""
+
+REASON = 300
+"""Characters of MuJoCo's own message that an error repeats."""
+
+
+@dataclass(frozen=True, slots=True)
+class MjcfRobot:
+    """text: a URDF of the tree; gravity m/s^2 in the world's frame; `is_free`: the root link is on a free joint."""
+
+    text: str
+    gravity: tuple[float, float, float]
+    is_free: bool
+
+
+def root_tag(text: str) -> str:
+    """Name of the root element of an XML text; '' where there is none."""
+    found = ROOT.match(text.lstrip("\ufeff"))
+    return found[1] if found else ""
+
+
+def read_mjcf(path: Path, source: str) -> MjcfRobot:
+    """The robot in an MJCF file.
+
+    InputError where MuJoCo is not installed or refuses the file, and where the file has what psdmc does not model.
+    """
+    mujoco = _mujoco(source)
+    model = _compiled(mujoco, path, source)
+    names = Names.of(mujoco, model)
+    refuse_constraints(mujoco, model, names, source)
+    free = _free_root(mujoco, model, names, source)
+    notes = [f"MJCF, as MuJoCo {mujoco.__version__} compiles it", *left_out(mujoco, model, names)]
+    gx, gy, gz = model.opt.gravity.tolist()
+    follows = followers(mujoco, model, names)
+    return MjcfRobot(tree_text(mujoco, model, names, follows, free, notes), (gx, gy, gz), free is not None)
+
+
+def _mujoco(source: str) -> Any:
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError(
+            f"{source}: an MJCF file, which MuJoCo reads, and MuJoCo is not installed",
+            "pip install 'psdmc[mjcf]', or give a URDF",
+        ) from None
+    return mujoco
+
+
+def _compiled(mujoco: Any, path: Path, source: str) -> Any:
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ")
+        raise InputError(
+            f"{source}: MuJoCo refuses it: {reason[:REASON]}",
+            "files that it includes, and its meshes, must be where it says: try MuJoCo's own viewer",
+        ) from None
+
+
+def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None:
+    """The body on a free joint that all others move with; None where the robot stands."""
+    free = [
+        int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
+    ]
+    moving = [
+        b
+        for b in range(1, model.nbody)
+        if model.body_jntnum[b] and model.body_weldid[model.body_parentid[b]] == 0
+    ]
+    if not free:
+        return None
+    if len(moving) > 1:
+        listed = ", ".join(shown(names.body(b)) for b in moving[:8])
+        raise InputError(
+            f"{source}: bodies {listed} move apart from each other, one of them freely: several robots",
+            "leave one of them in the file",
+        )
+    return free[0]

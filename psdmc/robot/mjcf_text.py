@@ -1,0 +1,171 @@
+"""The tree of a compiled MJCF as the text of a URDF, every number with all its digits.
+
+MuJoCo places a body in its parent, then moves it by its joints one after the other, each about or along an axis through
+a point of the body, by q - ref. A URDF has one joint per link, about the link's own origin: a body with k joints becomes
+a chain of k links, each in its joint's anchor, and where the last anchor is not the body's origin one more, fixed.
+Turning (shifting) a joint's frame by -ref makes its q MuJoCo's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.robot.limits import TINIEST
+from psdmc.robot.mjcf_faults import Follows
+from psdmc.robot.mjcf_names import Names, free_name
+from psdmc.robot.source_words import DRIVE, NOTE
+
+Array = NDArray[np.float64]
+UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(slots=True)
+class _Writer:
+    """The text under way. `links`, `joints`: names that are taken."""
+
+    mujoco: Any
+    model: Any
+    names: Names
+    follows: Mapping[str, Follows]
+    root: Element
+    links: set[str] = field(default_factory=set)
+    joints: set[str] = field(default_factory=set)
+
+    def link(self, name: str, body: int | None = None) -> None:
+        """A link; with the inertia of a body where it has one."""
+        element = SubElement(self.root, "link", name=name)
+        if body is None or self.model.body_mass[body] <= 0.0:
+            return
+        inertial = SubElement(element, "inertial")
+        _origin(inertial, self.model.body_ipos[body], self.model.body_iquat[body])
+        SubElement(inertial, "mass", value=_number(self.model.body_mass[body]))
+        xx, yy, zz = self.model.body_inertia[body]
+        moments = {"ixx": _number(xx), "iyy": _number(yy), "izz": _number(zz)}
+        SubElement(inertial, "inertia", moments | {"ixy": "0", "ixz": "0", "iyz": "0"})
+
+    def joint(self, name: str, kind: str, parent: str, child: str, place: tuple[Array, Array]) -> Element:
+        element = SubElement(self.root, "joint", name=name, type=kind)
+        _origin(element, *place)
+        SubElement(element, "parent", link=parent)
+        SubElement(element, "child", link=child)
+        return element
+
+
+def tree_text(
+    mujoco: Any,
+    model: Any,
+    names: Names,
+    follows: Mapping[str, Follows],
+    free: int | None,
+    notes: Sequence[str],
+) -> str:
+    """A URDF; `follows` are the joints that follow others, `free` is the body that is to be the root, on a free joint."""
+    robot = Element("robot", name=_robot_name(mujoco, model), version="1.1")
+    for note in notes:
+        SubElement(robot, NOTE, text=note)
+    writer = _Writer(mujoco, model, names, follows, robot, set(names.bodies), set(names.joints))
+    root = 0 if free is None else free
+    writer.link(names.body(root), root)
+    for body in range(1, model.nbody):
+        if body != root and _is_below(model, body, root):
+            _body(writer, body)
+    indent(robot)
+    return tostring(robot, encoding="unicode") + "\n"
+
+
+def _is_below(model: Any, body: int, root: int) -> bool:
+    while body not in (0, root):
+        body = int(model.body_parentid[body])
+    return body == root
+
+
+def _body(writer: _Writer, body: int) -> None:
+    """The links and joints of one body."""
+    model, names = writer.model, writer.names
+    parent, own = names.body(model.body_parentid[body]), names.body(body)
+    place, turn, anchor = model.body_pos[body], model.body_quat[body], np.zeros(3)
+    first = int(model.body_jntadr[body])
+    joints = range(first, first + int(model.body_jntnum[body]))
+    for j in joints:
+        axis, point = model.jnt_axis[j], model.jnt_pos[j]
+        last = j == joints[-1] and not point.any()
+        child = own if last else free_name(f"{own}_{names.joint(j)}", writer.links)
+        writer.link(child, body if last else None)
+        origin = place + _rotated(writer.mujoco, turn, point - anchor)
+        _moving(writer, j, parent, child, _at_reference(writer, j, origin, turn, axis))
+        parent, place, turn, anchor = child, np.zeros(3), UNTURNED, point
+    if parent == own:
+        return
+    writer.link(own, body)
+    fixed = free_name(f"{own}_fixed", writer.joints)
+    writer.joint(fixed, "fixed", parent, own, (place - _rotated(writer.mujoco, turn, anchor), turn))
+
+
+def _at_reference(writer: _Writer, j: int, origin: Array, turn: Array, axis: Array) -> tuple[Array, Array]:
+    """A joint's frame, so that its q is the file's: turned about, or shifted along, its axis by minus its reference."""
+    model, mujoco = writer.model, writer.mujoco
+    reference = float(model.qpos0[model.jnt_qposadr[j]])
+    if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE:
+        return origin - reference * _rotated(mujoco, turn, axis), turn
+    back, product = np.zeros(4), np.zeros(4)
+    mujoco.mju_axisAngle2Quat(back, np.array(axis), -reference)
+    mujoco.mju_mulQuat(product, turn, back)
+    return origin, product
+
+
+def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array, Array]) -> None:
+    model, name = writer.model, writer.names.joint(j)
+    slides = model.jnt_type[j] == writer.mujoco.mjtJoint.mjJNT_SLIDE
+    limited, forced = bool(model.jnt_limited[j]), bool(model.jnt_actfrclimited[j])
+    kind = "prismatic" if slides else "revolute" if limited else "continuous"
+    element = writer.joint(name, kind, parent, child, place)
+    SubElement(element, "axis", xyz=_numbers(model.jnt_axis[j]))
+    limits: dict[str, str] = {}
+    if limited:
+        limits |= dict(zip(("lower", "upper"), map(_number, model.jnt_range[j]), strict=True))
+    if forced:
+        limits["effort"] = _number(np.abs(model.jnt_actfrcrange[j]).max())
+    if limits:
+        SubElement(element, "limit", limits)
+    dof = int(model.jnt_dofadr[j])
+    damping, friction = model.dof_damping[dof], model.dof_frictionloss[dof]
+    if damping > 0.0 or friction > 0.0:
+        SubElement(element, "dynamics", damping=_number(damping), friction=_number(friction))
+    if name in writer.follows:
+        rule = writer.follows[name]
+        numbers = {"multiplier": _number(rule.ratio), "offset": _number(rule.offset)}
+        SubElement(element, "mimic", {"joint": rule.leader, **numbers})
+    if model.dof_armature[dof] > 0.0:
+        SubElement(element, DRIVE, inertia=_number(model.dof_armature[dof]))
+
+
+def _origin(parent: Element, place: Array, turn: Array) -> None:
+    w, x, y, z = turn
+    SubElement(parent, "origin", xyz=_numbers(place), quat_xyzw=_numbers((x, y, z, w)))
+
+
+def _rotated(mujoco: Any, turn: Array, vector: Array) -> Array:
+    found = np.zeros(3)
+    mujoco.mju_rotVecQuat(found, np.array(vector), np.array(turn))
+    return found
+
+
+def _robot_name(mujoco: Any, model: Any) -> str:
+    """The model's own name: the first of its names."""
+    return model.names[: model.names.index(b"\0")].decode(errors="replace") or "robot"
+
+
+def _numbers(values: Array | Sequence[float]) -> str:
+    return " ".join(_number(value) for value in values)
+
+
+def _number(value: Any) -> str:
+    """All digits of a number; what is smaller than URDFs may have is zero."""
+    plain = float(value)
+    return repr(plain) if abs(plain) >= TINIEST else "0"

@@ -1,0 +1,46 @@
+"""Words of psdmc's own in the URDF that it makes of an MJCF: drive inertias and notes, in a name space that others skip."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from xml.etree.ElementTree import Element
+
+from psdmc.errors import InputError
+from psdmc.robot.draft import Draft
+from psdmc.robot.limits import DRIVE_INERTIA
+from psdmc.robot.mechanism import DRIVE as DRIVE_PLACE
+from psdmc.robot.xml_text import number, parse_xml
+
+SPACE = "urn:psdmc:source"
+DRIVE = f"{{{SPACE}}}drive"
+"""Of a <joint>: inertia, kg m^2 (kg), of its drive."""
+NOTE = f"{{{SPACE}}}note"
+"""Of the <robot>: text, one sentence for `show`."""
+
+MOST_NOTES = 100
+
+
+def with_source_words(draft: Draft, text: str, source: str) -> Draft:
+    """The draft with what a text of psdmc's own making says beside its URDF; InputError where a number of it is wrong."""
+    if SPACE not in text:
+        return draft
+    root = parse_xml(text, source, "robot")
+    try:
+        found = {joint.get("name", ""): _drive(joint) for joint in root.findall("joint")}
+    except ValueError as error:
+        raise InputError(f"{source}: {error}", "derive the robot again from its own file") from None
+    drives = {name: inertia for name, inertia in found.items() if inertia}
+    notes = [" ".join(note.get("text", "").split()) for note in root.findall(NOTE)[:MOST_NOTES]]
+    parameters = []
+    for joint, own in zip(draft.joints, draft.parameters, strict=True):
+        values = own.copy()
+        values[DRIVE_PLACE] += drives.get(joint.name, 0.0)
+        parameters.append(values)
+    has_drive = tuple(
+        drive or joint.name in drives for drive, joint in zip(draft.drives, draft.joints, strict=True)
+    )
+    return replace(draft, parameters=tuple(parameters), drives=has_drive, notes=(*notes, *draft.notes))
+
+
+def _drive(joint: Element) -> float:
+    return number(joint.find(DRIVE), "inertia", 0.0, DRIVE_INERTIA, is_magnitude=True)
