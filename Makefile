@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-lowest test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-targets test-lowest test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -60,6 +60,12 @@ test-accuracy: $(READY) ## accuracy of every robot's and function's C as psdmc.c
 
 test-trees: $(READY) ## 20 whole robots, compiled, and 300 random trees against Pinocchio and MuJoCo, with figures; make test takes a few
 	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py
+
+TARGET_PROGRAMS := qemu-aarch64 qemu-s390x qemu-arm aarch64-linux-gnu-gcc s390x-linux-gnu-gcc arm-none-eabi-gcc
+test-targets: $(READY) ## self-tests of every function on 64-bit ARM, big-endian s390x and Cortex-M under qemu-user; minutes
+	@for program in $(TARGET_PROGRAMS); do command -v $$program >/dev/null || { echo "error: $$program is not installed"; \
+	  echo "hint: apt install qemu-user gcc-aarch64-linux-gnu gcc-s390x-linux-gnu libc6-dev-s390x-cross gcc-arm-none-eabi libnewlib-arm-none-eabi"; exit 2; }; done
+	PSDMC_TARGETS=whole $(RUN)/python -m pytest -q -rsP tests/toolchain/test_target_machines.py -k "compiled_for or first_byte"
 
 LOWEST := .venv-lowest
 LOWEST_TESTS = $(FAST) tests/test_atomic.py tests/emit/test_package.py tests/emit/test_write.py tests/toolchain/test_call.py \

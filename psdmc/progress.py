@@ -5,7 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable
 
 Progress = Callable[[str], None]
-"""Called with the name of each step as it begins."""
+"""Called with the name of each step as it begins, and again as it goes on; a Step says how far it is."""
+
+
+class Step(str):
+    """A step's text that also says which share of its stage's work is done, 0 to 1."""
+
+    __slots__ = ("share",)
+    share: float
+
+    def __new__(cls, text: str, share: float) -> Step:
+        step = super().__new__(cls, text)
+        step.share = min(max(share, 0.0), 1.0)
+        return step
+
+    def within(self, stage: str) -> Step:
+        """The same share under a longer text, `stage: text`."""
+        return Step(f"{stage}: {self}", self.share)
+
+
+def within(stage: str, progress: Progress) -> Progress:
+    """Progress whose steps are told as `stage: step`."""
+
+    def tell(step: str) -> None:
+        progress(step.within(stage) if isinstance(step, Step) else f"{stage}: {step}")
+
+    return tell
 
 
 def silent(step: str) -> None:

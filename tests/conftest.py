@@ -1,7 +1,8 @@
 """Shared set-up: test helpers beside this file can be imported by name; hypothesis draws the same examples every time,
 or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it; Ctrl-C
 is heard by the commands under test also where a shell runs the tests in the background and has it ignored; Python keeps
-the bytecode of tests and psdmc, which hundreds of processes load, also where the environment says otherwise."""
+the bytecode of tests and psdmc, which hundreds of processes load, also where the environment says otherwise; commands
+under test tell no progress, which depends on the machine's load."""
 
 from __future__ import annotations
 
@@ -21,6 +22,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+os.environ["PSDMC_PROGRESS"] = "off"
 
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("explore", derandomize=False)

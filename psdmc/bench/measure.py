@@ -9,6 +9,7 @@ import numpy as np
 
 from psdmc.bench.contestant import Runner
 from psdmc.bench.machine import IDLE_SHARE, others_share
+from psdmc.progress import Step
 from psdmc.robot.mechanism import Array
 
 PATIENCE = 3
@@ -76,7 +77,7 @@ def measure(
     quiet: list[list[_Trials]] = []
     noisy: list[list[_Trials]] = []
     while len(quiet) < rounds and len(quiet) + len(noisy) < PATIENCE * rounds:
-        progress(f"round {len(quiet) + 1} of {rounds}")
+        progress(Step(f"round {len(quiet) + 1} of {rounds}", len(quiet) / rounds))
         between()
         share = others_share()
         trials = _round(runners)

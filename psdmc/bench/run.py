@@ -17,7 +17,7 @@ from psdmc.bench.rivals import EVERYONE, Entrant, psdmc_c
 from psdmc.bench.states import COUNT, States
 from psdmc.bench.threads import measure_threads
 from psdmc.bench.versions import versions
-from psdmc.progress import Progress, silent
+from psdmc.progress import Progress, silent, within
 
 SCALED = psdmc_c.EXPANDED
 SCALED_RIVALS = ("psdmc factored", "psdmc expanded", "Pinocchio")
@@ -89,7 +89,7 @@ def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> Ca
         for runner in runners:
             runner.move()
 
-    measured = measure(runners, settings.rounds, lambda text: progress(f"{case.name}: {text}"), move)
+    measured = measure(runners, settings.rounds, within(case.name, progress), move)
     return CaseResult(
         name=case.name,
         note=case.note,

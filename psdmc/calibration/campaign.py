@@ -36,6 +36,7 @@ from psdmc.calibration.motions.sweeps import (
 from psdmc.calibration.motions.trajectory import Trajectory, sliding_joints, write_trajectory
 from psdmc.errors import InputError
 from psdmc.progress import Progress
+from psdmc.progress import Step as Share
 from psdmc.robot.mechanism import Mechanism
 
 LARGEST_ACCELERATION = 1e6
@@ -115,7 +116,7 @@ def plan_campaign(
     if wanted.columns is None:
         inertial = tuple(int(k) for k in gravity_split(chain, model, l).rest)
         wanted = replace(wanted, columns=inertial)
-    found = excite(chain, model, wanted, _spoken(progress))
+    found = excite(chain, model, wanted, _spoken(progress, wanted.seconds))
     motion = found.motion.sampled(chain.joint_names, options.sweep.period, options.repeats)
     motion = from_rest_to_rest(replace(motion, sliding=sliding_joints(chain)), chain)
     runs.append(PlannedRun("inertial", "inertial", motion))
@@ -137,15 +138,16 @@ def bounded(chain: Mechanism, acceleration: float | None) -> Mechanism:
     return replace(chain, joints=tuple(joints))
 
 
-def _spoken(progress: Progress) -> Callable[[float, float], None]:
-    """A function that reports the search's progress every few seconds."""
+def _spoken(progress: Progress, longest: float) -> Callable[[float, float], None]:
+    """A function that reports the progress of a search of `longest` seconds, every few of them."""
     said = 0.0
 
     def say(seconds: float, condition: float) -> None:
         nonlocal said
         if seconds - said >= SPOKEN_EVERY:
             said = seconds
-            progress(f"exciting motion: condition {condition:.2f} after {seconds:.0f} s")
+            text = f"exciting motion: condition {condition:.2f} after {seconds:.0f} s"
+            progress(Share(text, seconds / longest))
 
     return say
 

@@ -19,6 +19,7 @@ from psdmc.calibration.plant.plant_file import plant_texts
 from psdmc.calibration.plant.virtual_robot import Payload, VirtualRobot, load_virtual_robot, simulate
 from psdmc.errors import InputError
 from psdmc.processes import in_processes
+from psdmc.progress import Step
 
 INDEX = "simulated.json"
 LARGEST_SEED = 2**31
@@ -75,8 +76,9 @@ def simulate_campaign(
     stale = [
         job for job in jobs if known.get(job.run.log.name) != keys[job.run.log] or not job.run.log.exists()
     ]
-    for name in in_processes(_simulated, stale, min(options.workers, len(stale))):
-        progress(name)
+    done = in_processes(_simulated, stale, min(options.workers, len(stale)))
+    for count, name in enumerate(done, start=1):
+        progress(Step(f"simulated {name}, {count} of {len(stale)}", count / len(stale)))
     index = {path.name: key for path, key in sorted(keys.items())}
     make_folder(index_path.parent)
     write_whole(index_path, json.dumps(index, indent=1) + "\n")

@@ -1,23 +1,154 @@
-"""The current step of a command, shown on a terminal."""
+"""The current step of a command and the time it will take: on a terminal a line that changes, elsewhere one line a stage."""
 
 from __future__ import annotations
 
+import os
+import re
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+
+from psdmc.cli.one_line import one_line
+from psdmc.progress import Progress, Step
+
+PATIENCE = 2.0
+"""s that a command may take before anything is said, and between two lines where there is no terminal."""
+
+TICK = 0.2
+"""s between two looks at the clock."""
+
+FIRST_SHARE = 0.02
+"""Share of the work from which the time left is estimated."""
+
+
+class Estimate:
+    """A stage, and when it will be done.
+
+    A stage begins with a step of another wording (figures do not count), and where a share is smaller than the last.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._key = ""
+        self._share: float | None = None
+        self._first: tuple[float, float] | None = None
+        self.begun = clock()
+        self.text = ""
+        self.stage = 0
+
+    def tell(self, step: str) -> None:
+        """A step began or went on."""
+        share = step.share if isinstance(step, Step) else None
+        key = "" if share is not None and self._share is not None else re.sub(r"[\d.,]+", "", step)
+        fell = share is not None and (self._share is None or share < self._share)
+        if fell or (share is None and key != self._key):
+            self.stage += 1
+            self.begun = self._clock()
+            self._first = None if share is None else (self.begun, share)
+        self.text, self._share, self._key = one_line(str(step)), share, key or self._key
+
+    def spent(self) -> float:
+        """s since the stage began."""
+        return self._clock() - self.begun
+
+    def left(self) -> float | None:
+        """s until the stage's work is done, at the pace so far; None where that cannot be said yet."""
+        if self._share is None or self._first is None:
+            return None
+        begun, first = self._first
+        done = self._share - first
+        if done < FIRST_SHARE:
+            return None
+        return (self._clock() - begun) * (1.0 - self._share) / done
+
+
+def in_words(seconds: float) -> str:
+    """About so long: '40 s', '3 min'."""
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
+class Lines:
+    """Lines for where there is no terminal: one for each stage that lasts, none before PATIENCE."""
+
+    def __init__(self, say: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
+        self._say, self._clock = say, clock
+        self._lock = threading.Lock()
+        self._estimate = Estimate(clock)
+        self._last, self._told = clock(), 0
+
+    def tell(self, step: str) -> None:
+        with self._lock:
+            self._estimate.tell(step)
+
+    def look(self) -> None:
+        """Say the current stage where PATIENCE has passed since the last line, and it has not been said."""
+        with self._lock:
+            now, at = self._clock(), self._estimate
+            if now - self._last < PATIENCE or at.stage == self._told:
+                return
+            self._last, self._told = now, at.stage
+            left = at.left()
+            ending = "" if left is None else f", about {in_words(left)} left"
+            self._say(f"{at.text} ...{ending}")
 
 
 @contextmanager
-def steps() -> Iterator[Callable[[str], None]]:
-    """A line on standard error with the step and its time; nothing where that is no terminal."""
-    if sys.stderr is None or not sys.stderr.isatty():
+def steps() -> Iterator[Progress]:
+    """Progress that is told on standard error, unless the variable PSDMC_PROGRESS is 'off'."""
+    if sys.stderr is None or os.environ.get("PSDMC_PROGRESS", "").lower() == "off":
         yield lambda step: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    elif sys.stderr.isatty():
+        with _on_a_terminal() as tell:
+            yield tell
+    else:
+        with _in_lines() as tell:
+            yield tell
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("", total=None)
-        yield lambda step: progress.update(task, description=step)
+
+@contextmanager
+def _in_lines() -> Iterator[Progress]:
+    lines, done = Lines(_say), threading.Event()
+
+    def watch() -> None:
+        while not done.wait(TICK):
+            lines.look()
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield lines.tell
+    finally:
+        done.set()
+        watcher.join()
+
+
+def _say(text: str) -> None:
+    with suppress(OSError, ValueError):  # whoever closed it does not want to know
+        print(text, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _on_a_terminal() -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}", markup=False),
+    )
+    console, estimate = Console(stderr=True), Estimate()
+    with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("", total=None, left="")
+
+        def tell(step: str) -> None:
+            estimate.tell(step)
+            left = estimate.left() if estimate.spent() >= PATIENCE else None
+            text = "" if left is None else f"about {in_words(left)} left"
+            progress.update(task, description=estimate.text, left=text)
+
+        yield tell

@@ -18,6 +18,7 @@ from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.products import written_out
 from psdmc.program.program import Program
+from psdmc.progress import Step
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.limits import shown
@@ -49,12 +50,14 @@ def lower(
     refuse_wide(model, wanted(functions, model.mechanism))
     lowered = _Lowered(model, lowering, costs)
     kernels: dict[str, Kernel] = {}
-    for recipe in map(RECIPES.__getitem__, wanted(functions, model.mechanism)):
+    recipes = [RECIPES[name] for name in wanted(functions, model.mechanism)]
+    for number, recipe in enumerate(recipes):
         takes_theta = recipe.signature.theta
         for theta in (False, True) if takes_theta and theta_variants else (False,):
             if not theta and model.theta_b is None and takes_theta:
                 continue
-            progress(recipe.name + ("_theta" if theta else ""))
+            share = (number + 0.5 * theta) / len(recipes)
+            progress(Step(f"lowering {recipe.name}{'_theta' if theta else ''}", share))
             try:
                 kernel = lowered.kernel(recipe, theta)
             except SingularMassMatrix as singular:

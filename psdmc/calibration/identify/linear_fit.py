@@ -26,6 +26,7 @@ from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.row_store import HELD_BYTES
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.progress import Step
 from psdmc.robot.mechanism import Mechanism
 
 
@@ -188,7 +189,8 @@ def linear_problem(
             if not count:
                 remarks += _ripples(log, states, options)
             count += len(at)
-            progress(f"linear fit: {log.name}: {(states.first + at[-1]) / len(log):.0%}")
+            share = (states.first + at[-1]) / len(log)
+            progress(Step(f"linear fit: {log.name}: {share:.0%}", share))
         outs.append(held_out(count, options.split))
     problem = LinearProblem(chain, rows, np.concatenate(torques), np.concatenate(outs), l, names)
     return problem, tuple(remarks)

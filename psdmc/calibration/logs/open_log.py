@@ -17,7 +17,7 @@ from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
 from psdmc.calibration.logs.table_limits import LARGEST_STORED_ROWS
 from psdmc.calibration.logs.table_pieces import PIECES
 from psdmc.errors import InputError
-from psdmc.progress import Progress
+from psdmc.progress import Progress, Step
 
 SMALL_FILE = 64 * 1024**2
 """Bytes of a table that is read at once."""
@@ -68,7 +68,8 @@ def _counted(
                 f"{path}: more than {LARGEST_STORED_ROWS:,} rows, expected at most that",
                 "cut it into several",
             )
-        progress(f"reading {path.name}: {count:,} rows, {min(place() / size, 1.0):.0%}")
+        share = min(place() / size, 1.0)
+        progress(Step(f"reading {path.name}: {count:,} rows, {share:.0%}", share))
         yield piece
 
 
