@@ -36,7 +36,7 @@ from psdmc.functions import RECIPES
 from psdmc.program.kernel import Kernel
 from psdmc.target.flags import ARITHMETIC, GCC_ONLY
 from psdmc.target.target import Target
-from psdmc.target.vectors import HAS_VECTORS, LANE_BLOCK_BYTES
+from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES
 
 ON_MANIFOLD = tuple(name for name, recipe in RECIPES.items() if recipe.default_where_wide)
 """Functions that lead from one q to another."""
@@ -127,7 +127,7 @@ class PackageView:
     @property
     def has_vectors(self) -> str:
         """Preprocessor condition: the compiler has GCC's vector extension, and rounds as the sincos needs."""
-        return HAS_VECTORS
+        return HAS_VECTORS if self.real == "double" else f"{HAS_VECTORS} && {FLOATS_STAY}"
 
     @property
     def trig_scalar(self) -> ScalarTrig:

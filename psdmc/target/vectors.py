@@ -8,6 +8,10 @@ HAS_VECTORS = "defined(__GNUC__) && (!defined(__i386__) || defined(__SSE2_MATH__
 """C condition: the compiler has GCC's vector extension and no x87, whose excess precision would break the rounding of
 the inline sine."""
 
+FLOATS_STAY = "(!defined(__FLT_EVAL_METHOD__) || __FLT_EVAL_METHOD__ == 0)"
+"""C condition: expressions of floats are floats. Where they are doubles (s390x with -std=c99) a vector of floats times one
+is an error, and the inline sine of floats rounds otherwise."""
+
 LANE_BLOCK_BYTES = 64
 """Bytes of one variable in a block of the lane-by-lane layout. The same for every target: R_LANES is part of the
 interface."""
