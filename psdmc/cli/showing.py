@@ -31,15 +31,22 @@ def show(
     terms: Annotated[bool, typer.Option("--terms", help="list the monomials y")] = False,
     cost: Annotated[bool, typer.Option("--cost", help="operations per function and lowering")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON document instead, all digits")] = False,
+    latex: Annotated[bool, typer.Option("--latex", help="the base parameters in LaTeX instead")] = False,
 ) -> None:
     """Print a model: joints, sizes, base parameters with equations, values and units, certificate. Of a robot file: all of
     its joints, what each hangs on and follows."""
-    if terms and cost:
-        raise InputError("--terms and --cost are two questions", "ask one at a time")
+    asked = [f"--{word}" for word, given in (("terms", terms), ("cost", cost), ("latex", latex)) if given]
+    if len(asked) > 1 or (latex and json):
+        both = " and ".join([*asked, *(["--json"] if latex and json else [])])
+        raise InputError(f"{both} are several questions", "ask one at a time")
     if model.suffix.lower() in ROBOT_SUFFIXES:
-        if terms or cost:
-            raise InputError(f"{model}: --terms and --cost are of models", "derive one first: psdmc derive")
+        if asked:
+            raise InputError(f"{model}: {asked[0]} is of models", "derive one first: psdmc derive")
         _show_robot(model, json)
+    elif latex:
+        from psdmc.model.load import load
+
+        print(load(model).to_latex())
     else:
         _show_model(model, terms, cost, json)
 

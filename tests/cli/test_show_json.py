@@ -76,10 +76,29 @@ def test_a_robot_file_its_terms_and_its_cost(model: DynamicsModel, tmp_path: Pat
     assert all(row["total"] == row["mul"] + row["add"] for row in rows)  # type: ignore[attr-defined]
 
 
-def test_two_questions_at_once_are_refused(model: DynamicsModel, tmp_path: Path) -> None:
+def test_latex_is_what_python_gives_and_nothing_else(model: DynamicsModel, tmp_path: Path) -> None:
     model.save(tmp_path / "m.npz")
-    done = typed("show", tmp_path / "m.npz", "--terms", "--cost")
+    done = typed("show", tmp_path / "m.npz", "--latex")
+
+    assert done.stdout == model.to_latex() + "\n"
+    assert done.stdout.startswith("\\begin{aligned}\n\\theta_{0} &= ")
+    assert typed("show", robot_path("scara"), "--latex").returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--terms", "--cost"), "--terms and --cost"),
+        (("--latex", "--cost"), "--cost and --latex"),
+        (("--latex", "--json"), "--latex and --json"),
+    ],
+)
+def test_two_questions_at_once_are_refused(
+    options: tuple[str, ...], said: str, model: DynamicsModel, tmp_path: Path
+) -> None:
+    model.save(tmp_path / "m.npz")
+    done = typed("show", tmp_path / "m.npz", *options)
 
     assert done.returncode == 2
-    assert done.stderr.startswith("error: --terms and --cost are two questions\nhint: ")
+    assert done.stderr.startswith(f"error: {said} are several questions\nhint: ")
     assert done.stdout == ""
