@@ -15,6 +15,7 @@ from psdmc.emit.lanes import VectorWidth, vector_widths
 from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
+from psdmc.emit.patterns import Pattern, patterns
 from psdmc.emit.products import Shape
 from psdmc.emit.prototypes import Prototype, payload_prototypes
 from psdmc.emit.reals import check_range
@@ -68,10 +69,17 @@ class PackageView:
 
     @property
     def size_macros(self) -> dict[str, int]:
-        """Further sizes of the header, where joints, q and rates are not equally many: name and value."""
-        if not self.info.is_wide:
-            return {}
-        return {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv}
+        """Further sizes of the header: name and value. Of joints, q and rates where they are not equally many; of sparse
+        matrices' patterns."""
+        wide = {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv} if self.info.is_wide else {}
+        return wide | {pattern.macro: len(pattern.places) for pattern in self.patterns}
+
+    @property
+    def patterns(self) -> tuple[Pattern, ...]:
+        """Of sparse matrices; a serial chain's zeros are few, and its package has no such tables."""
+        if not self.info.is_tree:
+            return ()
+        return tuple(pattern for pattern in patterns(self.functions) if pattern.is_sparse)
 
     @property
     def l(self) -> int:  # noqa: E743
@@ -139,7 +147,8 @@ class PackageView:
 
     @property
     def tables(self) -> tuple[Table, ...]:
-        return tables(self.info, self.robot, self.real, self.uses_frames, self.target.texts)
+        own = tables(self.info, self.robot, self.real, self.uses_frames, self.target.texts)
+        return (*own, *(pattern.table(self.robot) for pattern in self.patterns))
 
     @property
     def table_declarations(self) -> tuple[str, ...]:

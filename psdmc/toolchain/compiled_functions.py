@@ -43,6 +43,7 @@ class CompiledFunctions:
         self._dtype = np.dtype(interface.dtype)
         self._pointer = self._ffi.typeof(f"{interface.real} *")
         self._kernels = {name: _bound(interface, self._library, name) for name in interface.kernels}
+        self._patterns = dict(interface.patterns)
         self.joint_names = interface.joint_names
         self.frame_names = interface.frame_names
         self.library = library
@@ -63,12 +64,28 @@ class CompiledFunctions:
         kernel.batch(math.prod(lead), *map(self._address, rows), *map(self._address, outs))
         return outs[0] if len(outs) == 1 else results(function)(*outs)
 
+    def pattern(self, name: str) -> tuple[Array, Array]:
+        """Rows and columns, (k,) each, of the entries of a function's matrix that may differ from zero at some state, row by
+        row: `robot.mass_matrix(q)[..., rows, columns]` are its values, packed.
+
+        name  of a function that returns one matrix: 'mass_matrix', 'regressor' ...; InputError for others
+        """
+        self._kernel(name)
+        if name not in self._patterns:
+            matrices = ", ".join(self._patterns)
+            raise InputError(
+                f"{self._robot}: {name} is no function of one matrix", f"compiled are {matrices or 'none'}"
+            )
+        rows, columns = np.array(self._patterns[name], dtype=np.intp).reshape(-1, 2).T
+        return rows, columns
+
     def _kernel(self, name: str) -> _Kernel:
         found = self._kernels.get(name)
         if found is None and self._more is not None:
             other = self._more(name.removesuffix("_theta"))
             self._others.append(other)
             self._kernels = other._kernels | self._kernels
+            self._patterns = other._patterns | self._patterns
             found = self._kernels.get(name)
         if found is None:
             compiled = ", ".join(self._kernels)

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from psdmc.emit.package import PackageView
+from psdmc.emit.patterns import patterns
 from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 
@@ -32,6 +33,7 @@ class Interface:
     frame_names  the named frames
     units        parts of q, from an entry to before another, whose length must be one
     kernels      name -> trailing axes of each of its results
+    patterns     function -> (row, column) of the entries of its matrix that may differ from zero
     cdef         C declarations of the functions that are called
     """
 
@@ -46,6 +48,7 @@ class Interface:
     frame_names: tuple[str, ...]
     units: tuple[tuple[int, int], ...]
     kernels: Mapping[str, tuple[tuple[int, ...], ...]]
+    patterns: Mapping[str, tuple[tuple[int, int], ...]]
     cdef: str
 
     @property
@@ -68,6 +71,7 @@ def interface_of(package: PackageView) -> Interface:
         frame_names=package.info.frames,
         units=package.info.units,
         kernels={kernel.name: tuple(output.shape for output in kernel.outputs) for kernel in package.kernels},
+        patterns={pattern.function: pattern.places for pattern in patterns(package.functions)},
         cdef="".join(
             f"{prototype.text};\n"
             for kernel in package.kernels
@@ -102,4 +106,9 @@ def _from_plain(plain: dict[str, Any]) -> Interface:
     joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
     units = tuple((int(start), int(stop)) for start, stop in plain.pop("units"))
     kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
-    return Interface(joint_names=joints, frame_names=frames, units=units, kernels=kernels, **plain)
+    places = {
+        name: tuple((row, column) for row, column in own) for name, own in plain.pop("patterns").items()
+    }
+    return Interface(
+        joint_names=joints, frame_names=frames, units=units, kernels=kernels, patterns=places, **plain
+    )
