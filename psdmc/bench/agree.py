@@ -13,6 +13,12 @@ from psdmc.robot.mechanism import Array
 CHECKED = 1024
 """States compared; enough to meet every term of a robot's dynamics."""
 
+CHECKED_REALS = 1 << 24
+"""Outputs compared, 128 MiB of them: a humanoid's regressor in standard parameters has 12,000 a state."""
+
+FEWEST = 64
+"""States compared of the largest of robots."""
+
 SOLVED = 1e-7
 STRICT = 1e-10
 """Largest error of an output relative to its largest value; forward dynamics amplifies rounding by the mass matrix's
@@ -22,15 +28,23 @@ SMALL = 1e-3
 """Outputs that stay below this share of the largest one are compared on its scale: they may be zero."""
 
 
+def checked_states(outputs: int) -> int:
+    """How many states are compared where a function puts out so many numbers: a power of two, so that batches come out
+    even."""
+    return min(CHECKED, 1 << int(np.log2(max(FEWEST, CHECKED_REALS // outputs))))
+
+
 def disagreement(runner: Runner, states: States) -> float:
     """Largest error of a contestant's outputs, relative to each output's largest value."""
     expected = states.expected(runner.contestant.function)
     found = runner.outputs()
+    if runner.contestant.convention == "MuJoCo":
+        found = states.from_mujoco(found)
     weights = runner.contestant.weights
     if weights is not None:
         found = found.reshape(states.count, -1, len(weights)) @ weights
         return relative_error(found, expected)
-    ends = np.cumsum(output_sizes(runner.contestant.function, states.n))[:-1]
+    ends = np.cumsum(output_sizes(runner.contestant.function, states.sizes))[:-1]
     blocks = zip(np.split(found, ends, axis=1), np.split(expected, ends, axis=1), strict=True)
     return max(relative_error(*block) for block in blocks)
 

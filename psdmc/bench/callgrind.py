@@ -72,12 +72,12 @@ def _counted(library: Path, contestants: Sequence[Contestant], states: States) -
 
 def _job(contestant: Contestant, states: States, folder: Path) -> str:
     """One line for counter.cpp, and the file of states that it names."""
-    name = f"{contestant.function}_{contestant.lanes}.bin"
+    name = f"{contestant.function}_{contestant.lanes}_{contestant.convention}.bin"
     (folder / name).write_bytes(
-        np.concatenate(states.inputs(contestant.function, contestant.lanes)).tobytes()
+        np.concatenate(states.inputs(contestant.function, contestant.lanes, contestant.convention)).tobytes()
     )
     more = states.more(contestant.function)
-    return f"{contestant.symbol} {states.n} {more} {contestant.outputs} {STATES} {STATES} {name}"
+    return f"{contestant.symbol} {states.nq} {states.nv} {more} {contestant.outputs} {STATES} {STATES} {name}"
 
 
 def _total(dump: Path) -> int:

@@ -6,12 +6,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psdmc.bench.states import sizes_of
 from psdmc.dynamics.parameters import joint_frame_map, standard_parameters
 from psdmc.errors import InputError
+from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.derivable import require_axes
+from psdmc.program.signature import Sizes
+from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism
 from psdmc.robot.small import times
+
+LONGEST_INPUT = 256
+"""Positions of the largest robot that the loops take: LONGEST_INPUT of rivals/loops.hpp."""
+
+JOINTS = ("RZ", "PZ", "FreeFlyer")
+"""Pinocchio's short words for the types that rivals' models have: pinocchio_model.hpp and serial_joints.hpp."""
 
 FLOOR_MOUNT = (0.0, 0.0, -9.81)
 
@@ -34,7 +43,11 @@ class Case:
     derive_bytes: int | None = None
 
     def __post_init__(self) -> None:
-        require_axes(self.chain, "the benchmark")
+        if self.chain.nq > LONGEST_INPUT:
+            raise InputError(
+                f"{self.name}: {self.chain.nq} positions, the benchmark takes {LONGEST_INPUT}",
+                "cut a chain out of it with --base and --tip",
+            )
         if self.model.theta_b is None or np.isnan(self.chain.parameters).any():
             raise InputError(
                 f"{self.name}: the benchmark needs every inertial parameter, and some are unknown",
@@ -49,6 +62,22 @@ class Case:
     def n(self) -> int:
         """Number of joints."""
         return len(self.chain)
+
+    @property
+    def sizes(self) -> Sizes:
+        return sizes_of(self.chain, self.model.l)
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """The functions that the benchmark measures on this robot: those that differentiate by q are of joints with one
+        coordinate each."""
+        benched = {name: recipe for name, recipe in RECIPES.items() if recipe.benched}
+        return tuple(name for name, recipe in benched.items() if not (self.is_wide and recipe.of_axes))
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether some joint has several coordinates."""
+        return any(not kind.about_z for kind in self.chain.types)
 
     @property
     def has_drive_inertia(self) -> bool:
@@ -80,13 +109,29 @@ def physical_body(rng: np.random.Generator) -> Array:
     return standard_parameters(masses.sum(), times(masses, places), np.trace(second) * np.eye(3) - second)
 
 
+def refuse_unlike(chain: Mechanism) -> None:
+    """InputError where a robot has joints that the rivals' models are not made for."""
+    for i, joint in enumerate(chain.joints):
+        if joint.type.pinocchio not in JOINTS:
+            raise InputError(
+                f"joint {shown(joint.name)} {joint.type.verb}: the rivals' models are of {', '.join(JOINTS)}",
+                "leave this rival out",
+            )
+        if i not in chain.own_joints:
+            raise InputError(
+                f"joint {shown(joint.name)} follows another, which the rivals' models leave out",
+                "hold it with --lock",
+            )
+
+
 def robot_as_numbers(chain: Mechanism) -> str:
     """The chain as plain text for rivals: exact placements and bodies about the joint frames, so that no parser is
-    involved.
+    involved. InputError as of refuse_unlike.
 
     n and gravity; then per joint Pinocchio's word for its type, parent (0 the base, else counted from 1), rotation (9,
     row-major), translation (3), body (10 standard parameters about the joint frame) and drive inertia.
     """
+    refuse_unlike(chain)
     lines = [f"{len(chain)} {_numbers(chain.gravity)}"]
     for joint, parent, row in zip(chain.joints, chain.parents, chain.parameters, strict=True):
         body = times(joint_frame_map(joint.link_frame), row[:DRIVE])

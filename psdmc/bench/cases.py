@@ -1,10 +1,12 @@
-"""The robots of the benchmark: published geometry, popular arms, and two generic arms."""
+"""The robots of the benchmark: published geometry, popular arms, two generic arms; quadrupeds, a humanoid, a hand, two arms
+on a torso."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,20 +25,34 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "robots"
 
 BUNDLED = {"Denso": "denso_floor.toml", "KR6": "kr6.toml", "LBR7": "lbr7.toml"}
 
-POPULAR = {
-    "UR5": ("ur_description/urdf/ur5_robot.urdf", None),
-    "Panda": ("panda_description/urdf/panda.urdf", "panda_link7"),
+POPULAR: dict[str, tuple[str, dict[str, Any]]] = {
+    "UR5": ("ur_description/urdf/ur5_robot.urdf", {}),
+    "Panda": ("panda_description/urdf/panda.urdf", {"tip": "panda_link7"}),
+    "solo12": ("solo_description/robots/solo12.urdf", {"floating": True}),
+    "anymal_b": ("anymal_b_simple_description/robots/anymal.urdf", {"floating": True}),
+    "talos": ("talos_data/robots/talos_reduced.urdf", {"floating": True}),
+    "allegro": ("allegro_hand_description/urdf/allegro_right_hand.urdf", {}),
+    "baxter": (
+        "baxter_description/urdf/baxter.urdf",
+        {"lock": {f"{side}_gripper_{finger}_finger_joint": 0.0 for side in "lr" for finger in "lr"}},
+    ),
 }
-"""Path inside example-robot-data's robots, and the tip that leaves fingers out."""
+"""Path inside example-robot-data's robots, and how it is read: the tip or the locks leave grippers out, whose fingers follow
+each other, so that every rival can take part."""
+
+ARMS, TREES = ("UR5", "Panda"), ("solo12", "anymal_b", "talos", "allegro", "baxter")
+"""Of POPULAR."""
 
 
 def standard_chains(seed: int = SEED) -> dict[str, Callable[[], Mechanism]]:
-    """For each standard robot's name the function that makes its chain; two generic arms are among them."""
+    """For each standard robot's name the function that makes its chain or tree; two generic arms are among them."""
     makers: dict[str, Callable[[], Mechanism]] = {}
-    for name in ("Denso", "KR6", "LBR7", "UR5", "Panda"):
+    for name in (*BUNDLED, *ARMS):
         makers[name] = lambda name=name: generic_chain(_known(name), seed)  # type: ignore[misc]
     for n in (6, 7):
         makers[f"generic {n}R"] = lambda n=n: generic_chain(oblique_chain(n, seed + n), seed)  # type: ignore[misc]
+    for name in TREES:
+        makers[name] = lambda name=name: generic_chain(_known(name), seed)  # type: ignore[misc]
     return makers
 
 
@@ -105,8 +121,8 @@ def bundled_chain(name: str) -> Mechanism:
 def _known(name: str) -> Mechanism:
     if name in BUNDLED:
         return bundled_chain(name)
-    path, tip = POPULAR[name]
-    return load_robot(_robot_data() / path, tip=tip).chain
+    path, options = POPULAR[name]
+    return load_robot(_robot_data() / path, **options).chain
 
 
 def _robot_data() -> Path:

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from psdmc.bench.states import States, at_cache_line, moved
+from psdmc.bench.states import Convention, States, at_cache_line, moved
 from psdmc.functions import RECIPES
 from psdmc.robot.mechanism import Array
 
@@ -55,6 +55,7 @@ class Contestant:
     layout        how states are passed
     lanes         states per block where the layout is lane by lane
     sections      reals per state of each array that a batch call fills one after the other; () where it fills one
+    convention    of a free root's states
     robot         text for its `setup`, None where the library knows its robot
     weights       where functions differ in what they put out (regressors): output rows times these are torques
     operations    (multiplications, additions), None where unknown
@@ -70,6 +71,7 @@ class Contestant:
     layout: Layout = "state"
     lanes: int = 1
     sections: tuple[int, ...] = ()
+    convention: Convention = "psdmc"
     robot: str | None = None
     weights: Array | None = None
     operations: tuple[int, int] | None = None
@@ -85,7 +87,8 @@ class Work(ctypes.Structure):
 
     _fields_ = [
         ("count", ctypes.c_size_t),
-        ("n", ctypes.c_size_t),
+        ("nq", ctypes.c_size_t),
+        ("nv", ctypes.c_size_t),
         ("outputs", ctypes.c_size_t),
         ("ring", ctypes.c_size_t),
         ("q", ctypes.c_void_p),
@@ -103,9 +106,11 @@ class Runner:
     def __init__(self, contestant: Contestant, states: States) -> None:
         self.contestant = contestant
         self._library = ctypes.CDLL(str(contestant.library))
-        ring = min(states.count, max(TAIL_BLOCK, 1 << int(np.log2(RING_BYTES / (8 * contestant.outputs)))))
+        one_a_call = contestant.layout == "state"
+        room = max(1 if one_a_call else TAIL_BLOCK, RING_BYTES // (8 * contestant.outputs))
+        ring = min(states.count, 1 << int(np.log2(room)))
         self._output = at_cache_line(ring * contestant.outputs)
-        self._block = min(BLOCK, states.count) if contestant.layout == "state" else ring
+        self._block = min(BLOCK, states.count) if one_a_call else ring
         self._states = states
         several = len(RECIPES[contestant.function].signature.outputs) > 1
         self._count = max(self._block, states.count // (SEVERAL_SHARE if several else 1))
@@ -146,12 +151,14 @@ class Runner:
         """Seconds of each block from the library's loop over `count` states (its share), as ns per state."""
         count = max(block, count or self._count)
         states, function = self._states, self.contestant.function
-        q, qd, x, *others = (vector.ctypes.data for vector in states.inputs(function, self.contestant.lanes))
+        inputs = states.inputs(function, self.contestant.lanes, self.contestant.convention)
+        q, qd, x, *others = (vector.ctypes.data for vector in inputs)
         ring = len(output) // self.contestant.outputs
         y = others[0] if others else None
         work = Work(
             count,
-            states.n,
+            states.nq,
+            states.nv,
             self.contestant.outputs,
             ring,
             q,

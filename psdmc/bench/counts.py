@@ -73,7 +73,7 @@ def count(
 def operations(case: Case) -> dict[str, dict[str, float]]:
     """Multiplications and additions (with subtractions and divisions) of each function's PROGRAMs."""
     table: dict[str, dict[str, float]] = {}
-    for name, kernel in psdmc_c.kernels_of(case.model, "factored", psdmc_c.FUNCTIONS).items():
+    for name, kernel in psdmc_c.kernels_of(case.model, "factored", case.functions).items():
         single, batch = cost(kernel.single), cost(kernel.batch)
         table[name] = {
             "mul": single.mul,

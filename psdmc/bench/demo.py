@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,20 +15,19 @@ from psdmc.bench.agree import relative_error
 from psdmc.bench.case import Case
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import Settings, run
+from psdmc.bench.states import sizes_of
 from psdmc.errors import exit_status_of
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
-from psdmc.model.random_states import random_states
-from psdmc.program.signature import Sizes
+from psdmc.model.random_states import states_of
 from psdmc.progress import Progress
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.verification.check import source_of
 
-FUNCTIONS = tuple(name for name, recipe in RECIPES.items() if recipe.benched and not recipe.times_theta)
 OURS, THEIRS = "psdmc factored", "Pinocchio"
-SETTINGS = Settings(rounds=3, rivals=(OURS, THEIRS), functions=FUNCTIONS)
+SETTINGS = Settings(rounds=3, rivals=(OURS, THEIRS))
 """Fewer trials than `make bench`: a quick estimate."""
 
 STATES = 1000
@@ -36,25 +36,29 @@ SEED = 2021
 
 def demo(model: DynamicsModel, progress: Progress) -> str:
     """The table as text."""
+    case = Case(model.mechanism.name, model)
+    functions = tuple(name for name in case.functions if not RECIPES[name].times_theta)
     progress("compiling, and comparing with Pinocchio")
-    errors = errors_against_pinocchio(model, compiler.compile(model, "factored", FUNCTIONS))
-    result = run([Case(model.mechanism.name, model)], SETTINGS, progress)
+    errors = errors_against_pinocchio(model, compiler.compile(model, "factored", functions), functions)
+    result = run([case], replace(SETTINGS, functions=functions), progress)
     return "\n".join(_lines(model, errors, result))
 
 
-def errors_against_pinocchio(model: DynamicsModel, robot: CompiledRobot) -> dict[str, float]:
+def errors_against_pinocchio(
+    model: DynamicsModel, robot: CompiledRobot, functions: Sequence[str]
+) -> dict[str, float]:
     """Largest error of each compiled function against Pinocchio's reading of the source, relative to each output's
     largest value over random states."""
     pinocchio = reference(source_of(model))
-    rng, sizes = np.random.default_rng(SEED), Sizes.of_chain(model.n, model.l)
-    q, qd, qdd = random_states(rng, STATES, model.n)
+    rng, sizes = np.random.default_rng(SEED), sizes_of(model.mechanism, model.l)
+    q, qd, qdd = states_of(model.mechanism, rng, STATES)
     given = {"q": q, "qd": qd, "qdd": qdd, "tau": pinocchio.inverse_dynamics(q, qd, qdd)}
-    for quantity in (quantity for name in FUNCTIONS for quantity in RECIPES[name].signature.inputs):
+    for quantity in (quantity for name in functions for quantity in RECIPES[name].signature.inputs):
         if quantity.name not in given:
             drawn = rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(quantity.axes)))
             given[quantity.name] = quantity.largest * drawn
     errors: dict[str, float] = {}
-    for name in FUNCTIONS:
+    for name in functions:
         signature = RECIPES[name].signature
         found = robot.call(signature, [given[quantity.name] for quantity in signature.inputs])
         expected = RECIPES[name].pinocchio(pinocchio, given).values()
@@ -74,8 +78,8 @@ def _lines(model: DynamicsModel, errors: dict[str, float], result: BenchResult) 
         f"{'':<30}{'operations':>14}{'largest error':>16}{'psdmc':>12}{'psdmc batch':>13}{'Pinocchio C++':>15}{'':>8}"
     )
     yield f"{'':<30}{'mul + add':>14}{'to Pinocchio':>16}{'ns/call':>12}{'ns/state':>13}{'ns/call':>15}{'faster':>8}"
-    for name in FUNCTIONS:
-        yield _row(case, name, errors[name])
+    for name, error in errors.items():
+        yield _row(case, name, error)
     yield ""
     if not case.idle:
         yield "The machine was busy with other work meanwhile: times are not reliable."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from psdmc.bench.agree import CHECKED, disagreement, tolerance
+from psdmc.bench.agree import checked_states, disagreement, tolerance
 from psdmc.bench.assemble import Assembled, assemble
 from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Runner, Unavailable
@@ -114,11 +114,13 @@ def checked(
     case: Case, contestants: Sequence[Contestant], seed: int
 ) -> tuple[list[Contestant], list[float], tuple[Unavailable, ...]]:
     """The contestants whose outputs are right, their errors, and the others with what is wrong."""
-    states = States.random(case.chain, CHECKED, seed)
+    drawn: dict[int, States] = {}
     right: list[Contestant] = []
     errors: list[float] = []
     wrong: list[Unavailable] = []
     for contestant in contestants:
+        count = checked_states(contestant.outputs)
+        states = drawn.setdefault(count, States.random(case.chain, count, seed))
         error = disagreement(Runner(contestant, states), states)
         if error <= tolerance(contestant.function):
             right.append(contestant)

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 from zlib import crc32
 
 import numpy as np
 
 from psdmc.functions import RECIPES
+from psdmc.model.random_states import on_joints
 from psdmc.program.signature import Quantity, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.robot.joints import FREE
 from psdmc.robot.mechanism import Array, Mechanism
+from psdmc.robot.mujoco_reading import force_from_mujoco, to_mujoco
 
 COUNT = 65_536
 """States per trial: with a thousand, the branch predictor learns the path of each sincos in glibc."""
+
+Convention = Literal["psdmc", "MuJoCo"]
+"""Of a free root's position, rates and efforts: psdmc's are Pinocchio's."""
 
 CACHE_LINE = 64
 """Alignment in bytes of every contestant's arrays, as a careful user's; malloc's own alignment varies."""
@@ -33,9 +40,14 @@ def _further(function: str) -> tuple[Quantity, ...]:
     return RECIPES[function].signature.inputs[3:]
 
 
-def output_sizes(function: str, n: int) -> tuple[int, ...]:
-    """Reals per state of each output of a function of states, for n joints."""
-    return tuple(Sizes.of_chain(n, 0).size(output) for output in RECIPES[function].signature.outputs)
+def sizes_of(robot: Mechanism, l: int = 0) -> Sizes:
+    """What a signature's words mean for a robot with l base parameters."""
+    return Sizes(len(robot), robot.nq, robot.nv, l, len(robot.frames))
+
+
+def output_sizes(function: str, sizes: Sizes) -> tuple[int, ...]:
+    """Reals per state of each output of a function of states."""
+    return tuple(sizes.size(output) for output in RECIPES[function].signature.outputs)
 
 
 def moved(array: Array) -> Array:
@@ -49,34 +61,48 @@ def moved(array: Array) -> Array:
 class States:
     """`count` random states of a chain.
 
-    q, qd, qdd  (count, n)
+    q        (count, nq), quaternions of length one
+    qd, qdd  (count, nv)
     """
 
     chain: Mechanism
     q: Array
     qd: Array
     qdd: Array
-    _layouts: dict[tuple[str, int], Array] = field(default_factory=dict, repr=False)
+    _layouts: dict[tuple[str, int, Convention], Array] = field(default_factory=dict, repr=False)
 
     @staticmethod
     def random(chain: Mechanism, count: int, seed: int) -> States:
         """Uniform within an ordinary arm's limits."""
         rng = np.random.default_rng(seed)
-        ranges = np.array([joint.ordinary for joint in chain.types])
-        q, qd, qdd = (rng.uniform(-1.0, 1.0, (count, len(chain))) * ranges[:, k] for k in range(3))
-        return States(chain, q, qd, qdd)
+        own = [chain.types[i] for i in chain.own_joints]
+        ranges = np.array([joint.ordinary for joint in own])
+        lengths = [[joint.nq for joint in own], *2 * [[joint.nv for joint in own]]]
+        q, qd, qdd = (
+            rng.uniform(-1.0, 1.0, (count, sum(each))) * np.repeat(ranges[:, k], each)
+            for k, each in enumerate(lengths)
+        )
+        return States(chain, on_joints(chain, q), qd, qdd)
 
     @property
     def count(self) -> int:
         return len(self.q)
 
     @property
-    def n(self) -> int:
-        return len(self.chain)
+    def nq(self) -> int:
+        return self.chain.nq
+
+    @property
+    def nv(self) -> int:
+        return self.chain.nv
+
+    @cached_property
+    def sizes(self) -> Sizes:
+        return sizes_of(self.chain)
 
     @cached_property
     def tau(self) -> Array:
-        """(count, n) torques at these states."""
+        """(count, nv) torques at these states."""
         return self._robot.torques(self.q, self.qd, self.qdd, self._robot.base_acceleration)
 
     @cached_property
@@ -95,16 +121,35 @@ class States:
         blocks = RECIPES[function].reference(self._robot, given).values()
         return np.hstack([values.reshape(self.count, -1) for values in blocks])
 
-    def inputs(self, function: str, lanes: int = 1) -> tuple[Array, ...]:
+    def inputs(self, function: str, lanes: int = 1, convention: Convention = "psdmc") -> tuple[Array, ...]:
         """q, qd, what the function reads third (qdd or tau) and further inputs, flat; with lanes > 1 in blocks
         [variable][lane]."""
         x = next((q.name for q in RECIPES[function].signature.inputs[2:]), "qdd")
-        first = [self._laid_out(name, getattr(self, name), lanes) for name in ("q", "qd", x)]
-        return (*first, *(self._laid_out(q.name, self._drawn(q), lanes) for q in _further(function)))
+        given = self.mujocos if convention == "MuJoCo" else {n: getattr(self, n) for n in ("q", "qd", x)}
+        first = [self._laid_out(name, given[name], lanes, convention) for name in ("q", "qd", x)]
+        return (
+            *first,
+            *(self._laid_out(q.name, self._drawn(q), lanes, convention) for q in _further(function)),
+        )
+
+    @cached_property
+    def mujocos(self) -> dict[str, Array]:
+        """q, qd and qdd in MuJoCo's convention: it is not timed converting them."""
+        states = (self.q, self.qd, self.qdd)
+        converted = to_mujoco(*states) if self.has_free_root else states
+        return dict(zip(("q", "qd", "qdd"), converted, strict=True))
+
+    def from_mujoco(self, tau: Array) -> Array:
+        """(count, nv) efforts by psdmc's convention from MuJoCo's."""
+        return force_from_mujoco(self.mujocos["q"], tau) if self.has_free_root else tau
+
+    @property
+    def has_free_root(self) -> bool:
+        return self.chain.types[0] == FREE
 
     def more(self, function: str) -> int:
         """Reals per state of the function's further input, 0 where it has none."""
-        return sum(Sizes.of_chain(self.n, 0).size(quantity) for quantity in _further(function))
+        return sum(self.sizes.size(quantity) for quantity in _further(function))
 
     def move(self) -> None:
         """Move all inputs to another place in memory. Which physical pages an array gets decides whose lines collide in
@@ -115,20 +160,21 @@ class States:
 
     def _shaped(self, quantity: Quantity) -> Array:
         """(count, ...) values of a further input."""
-        shape = Sizes.of_chain(self.n, 0).shape(quantity.axes)
+        shape = self.sizes.shape(quantity.axes)
         return self._drawn(quantity).reshape(self.count, *shape)
 
     def _drawn(self, quantity: Quantity) -> Array:
         """(count, size) values within plus and minus its largest, the same for the same name."""
-        size = Sizes.of_chain(self.n, 0).size(quantity)
+        size = self.sizes.size(quantity)
         rng = np.random.default_rng(crc32(quantity.name.encode()))
         return rng.uniform(-quantity.largest, quantity.largest, (self.count, size))
 
-    def _laid_out(self, name: str, rows: Array, lanes: int) -> Array:
+    def _laid_out(self, name: str, rows: Array, lanes: int, convention: Convention) -> Array:
         """The values in one layout, shared by all contestants, so that caches are equally warm for each."""
-        if (name, lanes) not in self._layouts:
+        key = name, lanes, convention
+        if key not in self._layouts:
             blocks = rows.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1)
             flat = at_cache_line(rows.size)
             flat[:] = blocks.ravel()
-            self._layouts[name, lanes] = flat
-        return self._layouts[name, lanes]
+            self._layouts[key] = flat
+        return self._layouts[key]

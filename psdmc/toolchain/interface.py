@@ -17,7 +17,7 @@ from psdmc.emit.patterns import patterns
 from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 
-FORMAT = 4
+FORMAT = 5
 """Version of the text's form."""
 
 

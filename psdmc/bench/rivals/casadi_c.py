@@ -17,11 +17,11 @@ from psdmc.bench.rivals.pinocchio_cpp import (
     SYMBOLS,
     includes,
     incomparable,
-    is_comparable,
     outputs_of,
     pinocchio_prefix,
     standard_parameters,
     variant_of,
+    ways_of,
 )
 from psdmc.bench.versions import version_of
 from psdmc.errors import ToolchainError
@@ -73,9 +73,8 @@ def _entered(
             weights=standard_parameters(case) if function == "regressor" else None,
             operations=counts[way],
         )
-        for function, ways in WAYS.items()
+        for function, ways in ways_of(case, WAYS).items()
         for way in ways
-        if is_comparable(case, function)
     ]
 
 
@@ -95,7 +94,7 @@ def symbolic(case: Case) -> Any:
 
 def _generated(case: Case) -> Path:
     """The C file that the writer makes; its other output is beside it."""
-    command = [str(_writer()), "robot.txt", "generated"]
+    command = [str(_writer()), "robot.txt", "generated", *_all_ways(case)]
     return built("generated.c", command, {"robot.txt": robot_as_numbers(case.chain)})
 
 
@@ -125,14 +124,13 @@ def _casadi() -> Path:
 
 def _scalar(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
     """The C as CasADi wrote it, compiled as C."""
-    del case
     lines = ['#include "loops.hpp"', 'extern "C" {']
-    lines += [f"int {way}(const double **, double **, int *, double *, int);" for way in _all_ways()]
+    lines += [f"int {way}(const double **, double **, int *, double *, int);" for way in _all_ways(case)]
     lines += ["}"]
     lines += [
         f"PSDMC_CONTESTANT({way}, []({_given(way)}) {{ "
         f"const double *in[] = {{{', '.join(_names(way))}}}; {way}(in, &out, nullptr, nullptr, 0); }})"
-        for way in _all_ways()
+        for way in _all_ways(case)
     ]
     sources = {
         "generated.c": generated,
@@ -154,7 +152,7 @@ def _scalar(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
 
 def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
     """The same C compiled as C++, with a vector as its number type."""
-    size = {way: outputs_of(case, function) for function, ways in WAYS.items() for way in ways}
+    size = {way: outputs_of(case, function) for function, ways in ways_of(case, WAYS).items() for way in ways}
     lines = [
         '#include "loops.hpp"',
         '#include "casadi_lanes.hpp"',
@@ -166,10 +164,10 @@ def _by_lane(case: Case, generated: str, flags: tuple[str, ...]) -> Path:
     lines += [
         f"PSDMC_BATCH_CONTESTANT({way}, [](std::size_t count, {_given(way)}) {{ "
         f"for (std::size_t i = 0; i < count; i += PSDMC_LANES) {{ const Lanes *in[] = {{"
-        f"{', '.join(f'(const Lanes *)({name} + i * {case.n})' for name in _names(way))}}}; "
+        f"{', '.join(f'(const Lanes *)({name} + i * {_length(case, name)})' for name in _names(way))}}}; "
         f"Lanes *to = (Lanes *)(out + i * {size[way]}); "
         f"casadi_c::{way}(in, &to, nullptr, nullptr, 0); }} }})"
-        for way in _all_ways()
+        for way in _all_ways(case)
     ]
     names = ("loops.hpp", "casadi_lanes.hpp")
     sources = {"generated.c": generated, "glue.cpp": "\n".join(lines) + "\n"} | {
@@ -199,5 +197,9 @@ def _given(way: str) -> str:
     return ", ".join([*(f"const double *{name}" for name in _names(way)), "double *out"])
 
 
-def _all_ways() -> list[str]:
-    return [way for ways in WAYS.values() for way in ways]
+def _length(case: Case, name: str) -> int:
+    return case.chain.nq if name == "q" else case.chain.nv
+
+
+def _all_ways(case: Case) -> list[str]:
+    return [way for ways in ways_of(case, WAYS).values() for way in ways]

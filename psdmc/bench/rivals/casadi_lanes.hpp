@@ -39,6 +39,10 @@ inline Lanes operator-(Lanes a, Lanes b) { return a.v - b.v; }
 inline Lanes operator*(Lanes a, Lanes b) { return a.v * b.v; }
 inline Lanes operator/(Lanes a, Lanes b) { return a.v / b.v; }
 inline Lanes operator-(Lanes a) { return -a.v; }
+inline Lanes sqrt(Lanes a) {
+  for (int k = 0; k < PSDMC_LANES; ++k) a.v[k] = __builtin_sqrt(a.v[k]);
+  return a;
+}
 inline Lanes sin(Lanes a) { return PSDMC_VECTOR_FUNCTION(sin)(a.v); }
 inline Lanes cos(Lanes a) { return PSDMC_VECTOR_FUNCTION(cos)(a.v); }
 

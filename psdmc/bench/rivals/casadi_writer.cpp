@@ -1,6 +1,6 @@
 // Writes C for one robot: Pinocchio's algorithms run on CasADi's symbols, printed by CasADi's code generator.
 //
-// usage: casadi_writer ROBOT.txt NAME; writes NAME.c, NAME.txt: per function its multiplications and additions, and
+// usage: casadi_writer ROBOT.txt NAME FUNCTION...; writes NAME.c, NAME.txt: per function its multiplications and additions, and
 // NAME.casadi: forward dynamics as CasADi's own file
 #include <pinocchio/autodiff/casadi.hpp>
 
@@ -100,10 +100,11 @@ struct Writer {
   explicit Writer(std::istream &robot) {
     read_model(robot, model);
     const auto n = model.nv;
-    q = SX::sym("q", n), qd = SX::sym("qd", n), x = SX::sym("x", n);
+    q = SX::sym("q", model.nq), qd = SX::sym("qd", n), x = SX::sym("x", n);
     cotangent = SX::sym("cotangent", n);
-    q_.resize(n), qd_.resize(n), x_.resize(n);
-    for (int i = 0; i < n; ++i) q_(i) = q(i), qd_(i) = qd(i), x_(i) = x(i);
+    q_.resize(model.nq), qd_.resize(n), x_.resize(n);
+    for (int i = 0; i < model.nq; ++i) q_(i) = q(i);
+    for (int i = 0; i < n; ++i) qd_(i) = qd(i), x_(i) = x(i);
   }
 
   casadi::Function function(const std::string &name, const Matrix &output) const { return function(name, column(output)); }
@@ -163,23 +164,30 @@ struct Writer {
     return pinocchio::nonLinearEffects(model, data, q_, qd_);
   }
 
-  void write(const std::string &name) const {
+  /// One function by its name.
+  casadi::Function made(const std::string &name) const {
+    Data data(model);
+    if (name == "inverse_dynamics") return function(name, pinocchio::rnea(model, data, q_, qd_, x_));
+    if (name == "forward_dynamics_aba") return function(name, pinocchio::aba(model, data, q_, qd_, x_));
+    if (name == "forward_dynamics_ldl") return function(name, solved(mass_matrix(), x_ - nonlinear_effects()));
+    if (name == "mass_matrix") return function(name, mass_matrix());
+    if (name == "nonlinear_effects") return function(name, nonlinear_effects());
+    if (name == "gravity") return function(name, pinocchio::computeGeneralizedGravity(model, data, q_));
+    if (name == "regressor") return function(name, pinocchio::computeJointTorqueRegressor(model, data, q_, qd_, x_));
+    if (name == "inverse_dynamics_derivatives_jacobian") return function(name, inverse_dynamics_jacobian());
+    if (name == "inverse_dynamics_derivatives_recursion") return function(name, inverse_dynamics_recursion());
+    if (name == "forward_dynamics_derivatives_jacobian") return function(name, forward_dynamics_jacobian());
+    if (name == "forward_dynamics_derivatives_recursion") return function(name, forward_dynamics_recursion());
+    if (name == "inverse_dynamics_vjp") return vjp(name, pinocchio::rnea(model, data, q_, qd_, x_));
+    if (name == "forward_dynamics_vjp_aba") return vjp(name, pinocchio::aba(model, data, q_, qd_, x_));
+    if (name == "forward_dynamics_vjp_ldl") return vjp(name, solved(mass_matrix(), x_ - nonlinear_effects()));
+    throw std::invalid_argument("no function " + name);
+  }
+
+  void write(const std::string &name, const std::vector<std::string> &wanted) const {
     Data data(model);
     Generated code(name);
-    code.add(function("inverse_dynamics", pinocchio::rnea(model, data, q_, qd_, x_)));
-    code.add(function("forward_dynamics_aba", pinocchio::aba(model, data, q_, qd_, x_)));
-    code.add(function("forward_dynamics_ldl", solved(mass_matrix(), x_ - nonlinear_effects())));
-    code.add(function("mass_matrix", mass_matrix()));
-    code.add(function("nonlinear_effects", nonlinear_effects()));
-    code.add(function("gravity", pinocchio::computeGeneralizedGravity(model, data, q_)));
-    code.add(function("regressor", pinocchio::computeJointTorqueRegressor(model, data, q_, qd_, x_)));
-    code.add(function("inverse_dynamics_derivatives_jacobian", inverse_dynamics_jacobian()));
-    code.add(function("inverse_dynamics_derivatives_recursion", inverse_dynamics_recursion()));
-    code.add(function("forward_dynamics_derivatives_jacobian", forward_dynamics_jacobian()));
-    code.add(function("forward_dynamics_derivatives_recursion", forward_dynamics_recursion()));
-    code.add(vjp("inverse_dynamics_vjp", pinocchio::rnea(model, data, q_, qd_, x_)));
-    code.add(vjp("forward_dynamics_vjp_aba", pinocchio::aba(model, data, q_, qd_, x_)));
-    code.add(vjp("forward_dynamics_vjp_ldl", solved(mass_matrix(), x_ - nonlinear_effects())));
+    for (const auto &each : wanted) code.add(made(each));
     code.generate();
     function("forward_dynamics", Matrix(pinocchio::aba(model, data, q_, qd_, x_))).save(name + ".casadi");
   }
@@ -188,8 +196,8 @@ struct Writer {
 }  // namespace
 
 int main(int count, char **arguments) {
-  if (count != 3) return 2;
+  if (count < 3) return 2;
   std::ifstream text(arguments[1]);
-  Writer(text).write(arguments[2]);
+  Writer(text).write(arguments[2], {arguments + 3, arguments + count});
   return 0;
 }

@@ -1,6 +1,6 @@
 // Runs contestants' loops once each, under callgrind, which counts what happens inside them and nothing else.
 //
-// usage: counter LIBRARY ROBOT.txt JOBS.txt; a job is a line: symbol, n, length of a fourth input, outputs, states a call,
+// usage: counter LIBRARY ROBOT.txt JOBS.txt; a job is a line: symbol, nq, nv, length of a fourth input, outputs, states a call,
 // states in all, file of q, qd, x and the fourth input as doubles.
 #include <dlfcn.h>
 
@@ -22,12 +22,13 @@ int main(int, char **arguments) {
 
   std::ifstream jobs(arguments[3]);
   std::string symbol, states;
-  std::size_t n, more, outputs, block, count;
-  while (jobs >> symbol >> n >> more >> outputs >> block >> count >> states) {
-    std::vector<double> values((3 * n + more) * count), output(outputs * count), seconds(count);
+  std::size_t nq, nv, more, outputs, block, count;
+  while (jobs >> symbol >> nq >> nv >> more >> outputs >> block >> count >> states) {
+    std::vector<double> values((nq + 2 * nv + more) * count), output(outputs * count), seconds(count);
     std::ifstream(states, std::ios::binary).read(reinterpret_cast<char *>(values.data()), std::streamsize(values.size() * 8));
     const double *q = values.data();
-    const bench::Work work{count, n, outputs, count, q, q + n * count, q + 2 * n * count, output.data(), more, q + 3 * n * count};
+    const double *qd = q + nq * count, *x = qd + nv * count;
+    const bench::Work work{count, nq, nv, outputs, count, q, qd, x, output.data(), more, x + nv * count};
     using Loop = void (*)(const bench::Work *, std::size_t, double *);
     auto loop = reinterpret_cast<Loop>(dlsym(library, (symbol + "_throughput").c_str()));
     if (!loop) return std::cerr << dlerror() << "\n", 1;

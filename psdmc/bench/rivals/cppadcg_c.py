@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, source
-from psdmc.bench.rivals.pinocchio_cpp import DEFINES, includes, outputs_of, pinocchio_prefix, variant_of
+from psdmc.bench.rivals.pinocchio_cpp import (
+    DEFINES,
+    includes,
+    outputs_of,
+    pinocchio_prefix,
+    variant_of,
+    ways_of,
+)
 from psdmc.bench.versions import version_of
 from psdmc.errors import ToolchainError
 from psdmc.toolchain.compiler_command import find_compiler
@@ -29,19 +37,22 @@ WAYS = {
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
     """CppADCodeGen's functions for one robot; ToolchainError where its wheel is missing."""
-    library = _library(written(case), flags)
+    ways_by_function = ways_of(case, WAYS)
+    every = [way for ways in ways_by_function.values() for way in ways]
+    library = _library(written(case), every, flags)
     return [
         Contestant(
             RIVAL, function, library, way, outputs_of(case, function), variant=variant_of(way, function)
         )
-        for function, ways in WAYS.items()
+        for function, ways in ways_by_function.items()
         for way in ways
     ]
 
 
 def written(case: Case) -> str:
     """CppADCodeGen's C for the case."""
-    command = [str(_writer()), "robot.txt", "generated.c"]
+    every = [way for ways in ways_of(case, WAYS).values() for way in ways]
+    command = [str(_writer()), "robot.txt", "generated.c", *every]
     return built("generated.c", command, {"robot.txt": robot_as_numbers(case.chain)}).read_text()
 
 
@@ -68,10 +79,9 @@ def _writer() -> Path:
     return built("cppadcg_writer", command, {name: source(name) for name in names}, depends)
 
 
-def _library(generated: str, flags: tuple[str, ...]) -> Path:
+def _library(generated: str, every: Sequence[str], flags: tuple[str, ...]) -> Path:
     """The C as it was written, compiled as C, behind the loops."""
     given = "const double *q, const double *qd, const double *x, double *out"
-    every = [way for ways in WAYS.values() for way in ways]
     lines = ['#include "loops.hpp"', 'extern "C" {', *(f"void {way}({given});" for way in every), "}"]
     lines += [f"PSDMC_CONTESTANT({way}, []({given}) {{ {way}(q, qd, x, out); }})" for way in every]
     sources = {

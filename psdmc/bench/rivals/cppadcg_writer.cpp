@@ -1,6 +1,6 @@
 // Writes C for one robot: Pinocchio's algorithms recorded by CppAD, differentiated and printed by CppADCodeGen.
 //
-// usage: cppadcg_writer ROBOT.txt OUTPUT.c
+// usage: cppadcg_writer ROBOT.txt OUTPUT.c FUNCTION...
 #include <pinocchio/codegen/cppadcg.hpp>
 
 #include <fstream>
@@ -42,12 +42,13 @@ struct Writer {
 
   /// What an algorithm puts out, as a function of q, qd and x behind each other.
   CppAD::ADFun<Coded> recorded(const Algorithm &algorithm) const {
-    const auto n = model.nv;
-    Vector inputs = Vector::Zero(3 * n);
+    const auto nq = model.nq, n = model.nv;
+    Vector inputs = Vector::Zero(nq + 2 * n);
+    inputs.head(nq) = pinocchio::neutral(model);
     CppAD::Independent(inputs);
     Data data(model);
     std::vector<Recorded> outputs;
-    algorithm(data, inputs.head(n), inputs.segment(n, n), inputs.tail(n), outputs);
+    algorithm(data, inputs.head(nq), inputs.segment(nq, n), inputs.tail(n), outputs);
     Vector all = Eigen::Map<Vector>(outputs.data(), Eigen::Index(outputs.size()));
     CppAD::ADFun<Coded> found(inputs, all);
     found.optimize();
@@ -60,7 +61,7 @@ struct Writer {
     print(name, [&](const std::vector<Coded> &x) { return function.Forward(0, x); });
   }
 
-  /// A C function of its derivatives by q, qd and x, behind its n outputs where they are wanted too.
+  /// A C function of its derivatives by q, qd and x of joints with a coordinate each, behind its n outputs where they are wanted too.
   void jacobian(const std::string &name, const Algorithm &algorithm, bool with_outputs) {
     auto function = recorded(algorithm);
     print(name, [&](const std::vector<Coded> &x) {
@@ -77,14 +78,16 @@ struct Writer {
 
   template <class Outputs>
   void print(const std::string &name, Outputs outputs) {
-    const auto n = std::size_t(model.nv);
+    const auto nq = std::size_t(model.nq), n = std::size_t(model.nv);
     CppAD::cg::CodeHandler<double> handler;
-    std::vector<Coded> x(3 * n);
+    std::vector<Coded> x(nq + 2 * n);
     handler.makeVariables(x);
     std::vector<Coded> y = outputs(x);
     std::vector<std::string> given, found;
-    for (const char *input : {"q", "qd", "x"})
-      for (std::size_t j = 0; j < n; ++j) given.push_back(std::string(input) + "[" + std::to_string(j) + "]");
+    const auto name_inputs = [&](const std::string &input, std::size_t size) {
+      for (std::size_t j = 0; j < size; ++j) given.push_back(input + "[" + std::to_string(j) + "]");
+    };
+    name_inputs("q", nq), name_inputs("qd", n), name_inputs("x", n);
     for (std::size_t j = 0; j < y.size(); ++j) found.push_back("out[" + std::to_string(j) + "]");
     CppAD::cg::LangCCustomVariableNameGenerator<double> names(found, given, "v", "w");
     CppAD::cg::LanguageC<double> language("double");
@@ -95,7 +98,8 @@ struct Writer {
         << body.str() << "}\n";
   }
 
-  void write() {
+  /// The C function of that name.
+  void write(const std::string &name) {
     using pinocchio::Convention;
     const Algorithm rnea = [this](Data &d, const Vector &q, const Vector &qd, const Vector &x, auto &to) {
       give(pinocchio::rnea(model, d, q, qd, x), to);
@@ -103,20 +107,19 @@ struct Writer {
     const Algorithm aba = [this](Data &d, const Vector &q, const Vector &qd, const Vector &x, auto &to) {
       give(pinocchio::aba(model, d, q, qd, x, Convention::LOCAL), to);
     };
-    out << "#include <math.h>\n";
-    value("inverse_dynamics", rnea);
-    value("forward_dynamics", aba);
-    value("mass_matrix", [this](Data &d, const Vector &q, const Vector &, const Vector &, auto &to) {
+    if (name == "inverse_dynamics") value(name, rnea);
+    if (name == "forward_dynamics") value(name, aba);
+    if (name == "mass_matrix") value(name, [this](Data &d, const Vector &q, const Vector &, const Vector &, auto &to) {
       pinocchio::crba(model, d, q, Convention::LOCAL);
       give(symmetric(d.M), to);
     });
-    jacobian("inverse_dynamics_derivatives_jacobian", rnea, false);
-    jacobian("forward_dynamics_derivatives_jacobian", aba, true);
-    value("inverse_dynamics_derivatives_recursion", [this](Data &d, const Vector &q, const Vector &qd, const Vector &x, auto &to) {
+    if (name == "inverse_dynamics_derivatives_jacobian") jacobian(name, rnea, false);
+    if (name == "forward_dynamics_derivatives_jacobian") jacobian(name, aba, true);
+    if (name == "inverse_dynamics_derivatives_recursion") value(name, [this](Data &d, const Vector &q, const Vector &qd, const Vector &x, auto &to) {
       pinocchio::computeRNEADerivatives(model, d, q, qd, x);
       for (const Matrix &matrix : {Matrix(d.dtau_dq), Matrix(d.dtau_dv), symmetric(d.M)}) give(matrix, to);
     });
-    value("forward_dynamics_derivatives_recursion", [this](Data &d, const Vector &q, const Vector &qd, const Vector &x, auto &to) {
+    if (name == "forward_dynamics_derivatives_recursion") value(name, [this](Data &d, const Vector &q, const Vector &qd, const Vector &x, auto &to) {
       pinocchio::computeABADerivatives(model, d, q, qd, x);
       give(d.ddq, to);
       for (const Matrix &matrix : {Matrix(d.ddq_dq), Matrix(d.ddq_dv), symmetric(d.Minv)}) give(matrix, to);
@@ -127,10 +130,11 @@ struct Writer {
 }  // namespace
 
 int main(int count, char **arguments) {
-  if (count != 3) return 2;
+  if (count < 3) return 2;
   Writer writer{{}, std::ofstream(arguments[2])};
   std::ifstream robot(arguments[1]);
   read_model(robot, writer.model);
-  writer.write();
+  writer.out << "#include <math.h>\n";
+  for (int k = 3; k < count; ++k) writer.write(arguments[k]);
   return 0;
 }

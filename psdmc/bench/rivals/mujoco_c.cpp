@@ -11,7 +11,7 @@ mjModel *model = nullptr;
 mjData *data = nullptr;
 
 void move_to(const double *q, const double *qd, const double *qdd) {
-  std::memcpy(data->qpos, q, sizeof(double) * std::size_t(model->nv));
+  std::memcpy(data->qpos, q, sizeof(double) * std::size_t(model->nq));
   std::memcpy(data->qvel, qd, sizeof(double) * std::size_t(model->nv));
   std::memcpy(data->qacc, qdd, sizeof(double) * std::size_t(model->nv));
   mj_kinematics(model, data);

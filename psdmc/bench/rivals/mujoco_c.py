@@ -10,15 +10,19 @@ from xml.etree import ElementTree
 import numpy as np
 
 from psdmc.bench.build import built, cxx
-from psdmc.bench.case import Case
+from psdmc.bench.case import Case, refuse_unlike
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import inertia_matrix, joint_frame_map
-from psdmc.errors import ToolchainError
+from psdmc.errors import InputError, ToolchainError
+from psdmc.robot.joints import FREE
+from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BASE, DRIVE, Array, Mechanism
 
 RIVAL = "MuJoCo"
 FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")
+
+OTHER_BIAS = "a free root's rates are along the world's axes there, which makes its bias another"
 
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
@@ -29,9 +33,14 @@ def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavail
         return [Unavailable(RIVAL, "it wants mass on every link")]
     robot = mjcf(case.chain)
     library = _compiled(flags)
-    if ctypes.CDLL(str(library)).setup(robot.encode()) != case.n:
+    if ctypes.CDLL(str(library)).setup(robot.encode()) != case.chain.nv:
         return [Unavailable(RIVAL, "it refuses this robot's inertia")]
-    return [Contestant(RIVAL, name, library, name, case.n, robot=robot) for name in FUNCTIONS]
+    found: list[Contestant | Unavailable] = [
+        Contestant(RIVAL, name, library, name, case.chain.nv, convention="MuJoCo", robot=robot)
+        for name in FUNCTIONS
+        if name == "inverse_dynamics" or not case.is_wide
+    ]
+    return [*found, *([Unavailable(f"{RIVAL}, nonlinear_effects", OTHER_BIAS)] if case.is_wide else [])]
 
 
 def _compiled(flags: tuple[str, ...]) -> Path:
@@ -62,7 +71,12 @@ def _mujoco() -> Path:
 
 
 def mjcf(chain: Mechanism) -> str:
-    """The chain as MuJoCo's XML: one body a joint, its frame psdmc's joint frame, its joint about z."""
+    """The chain as MuJoCo's XML: one body a joint, its frame psdmc's joint frame, its joint about z or free.
+
+    InputError where MuJoCo has no such joint, or a free one elsewhere than psdmc.
+    """
+    refuse_unlike(chain)
+    _refuse_moved_root(chain)
     root = ElementTree.Element("mujoco", model="robot")
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="false")
     ElementTree.SubElement(root, "option", gravity=_text(chain.gravity))
@@ -75,10 +89,22 @@ def mjcf(chain: Mechanism) -> str:
             pos=_text(joint.placement.translation),
             quat=_text(quaternion(joint.placement.rotation)),
         )
-        ElementTree.SubElement(body, "joint", type=joint.type.mujoco, axis="0 0 1")
+        moving = ElementTree.SubElement(body, "joint", type=joint.type.mujoco)
+        if joint.type.about_z:
+            moving.set("axis", "0 0 1")
         _add_inertia(body, joint_frame_map(joint.link_frame) @ row[:DRIVE])
         bodies.append(body)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _refuse_moved_root(chain: Mechanism) -> None:
+    """MuJoCo's free joints are on the world, and their positions are the body's in the world."""
+    for joint, parent in zip(chain.joints, chain.parents, strict=True):
+        placed = np.any(joint.placement.translation) or np.any(joint.placement.rotation != np.eye(3))
+        if joint.type == FREE and (parent != BASE or placed):
+            raise InputError(
+                f"its free joints are on the world, and {shown(joint.name)} is elsewhere", "leave it out"
+            )
 
 
 def _add_inertia(body: ElementTree.Element, x: Array) -> None:

@@ -28,6 +28,8 @@ using Vector = Eigen::Ref<const Eigen::VectorXd>;
 
 Vector vector(const double *values) { return Eigen::Map<const Eigen::VectorXd>(values, model->nv); }
 
+Vector positions(const double *values) { return Eigen::Map<const Eigen::VectorXd>(values, model->nq); }
+
 void give(const Eigen::VectorXd &from, double *to) { Eigen::Map<Eigen::VectorXd>(to, from.size()) = from; }
 
 template <class Matrix>
@@ -38,33 +40,33 @@ void give_matrix(const Matrix &from, double *to) {
 }
 
 void rnea(const double *q, const double *qd, const double *qdd, double *tau) {
-  give(pinocchio::rnea(*model, *data, vector(q), vector(qd), vector(qdd)), tau);
+  give(pinocchio::rnea(*model, *data, positions(q), vector(qd), vector(qdd)), tau);
 }
 
 template <Convention convention>
 void aba(const double *q, const double *qd, const double *tau, double *qdd) {
-  give(pinocchio::aba(*model, *data, vector(q), vector(qd), vector(tau), convention), qdd);
+  give(pinocchio::aba(*model, *data, positions(q), vector(qd), vector(tau), convention), qdd);
 }
 
 template <Convention convention>
 void crba(const double *q, const double *, const double *, double *M) {
-  pinocchio::crba(*model, *data, vector(q), convention);
+  pinocchio::crba(*model, *data, positions(q), convention);
   if (copies_matrices) data->M.triangularView<Eigen::StrictlyLower>() = data->M.transpose();
   give_matrix(data->M, M);
 }
 
 void nonlinear_effects(const double *q, const double *qd, const double *, double *h) {
-  give(pinocchio::nonLinearEffects(*model, *data, vector(q), vector(qd)), h);
+  give(pinocchio::nonLinearEffects(*model, *data, positions(q), vector(qd)), h);
 }
 
 void gravity(const double *q, const double *, const double *, double *g) {
-  give(pinocchio::computeGeneralizedGravity(*model, *data, vector(q)), g);
+  give(pinocchio::computeGeneralizedGravity(*model, *data, positions(q)), g);
 }
 
 void regressor(const double *q, const double *qd, const double *qdd, double *Y) {
   // Its shipped instantiation, unlike the others', takes vectors that own their memory.
   static Eigen::VectorXd q_, qd_, qdd_;
-  q_ = vector(q), qd_ = vector(qd), qdd_ = vector(qdd);
+  q_ = positions(q), qd_ = vector(qd), qdd_ = vector(qdd);
   give_matrix(pinocchio::computeJointTorqueRegressor(*model, *data, q_, qd_, qdd_), Y);
 }
 
@@ -75,12 +77,12 @@ void give_matrices(const Eigen::MatrixXd &by_q, const Eigen::MatrixXd &by_qd, Ei
 }
 
 void rnea_derivatives(const double *q, const double *qd, const double *qdd, double *out) {
-  pinocchio::computeRNEADerivatives(*model, *data, vector(q), vector(qd), vector(qdd));
+  pinocchio::computeRNEADerivatives(*model, *data, positions(q), vector(qd), vector(qdd));
   if (copies_matrices) give_matrices(data->dtau_dq, data->dtau_dv, data->M, out);
 }
 
 void aba_derivatives(const double *q, const double *qd, const double *tau, double *out) {
-  pinocchio::computeABADerivatives(*model, *data, vector(q), vector(qd), vector(tau));
+  pinocchio::computeABADerivatives(*model, *data, positions(q), vector(qd), vector(tau));
   give(data->ddq, out);
   if (copies_matrices) give_matrices(data->ddq_dq, data->ddq_dv, data->Minv, out + model->nv);
 }
@@ -96,13 +98,13 @@ void give_products(const ByQ &by_q, const ByQd &by_qd, const Last &last, const d
 }
 
 void rnea_vjp(const double *q, const double *qd, const double *qdd, const double *cotangent, double *out) {
-  pinocchio::computeRNEADerivatives(*model, *data, vector(q), vector(qd), vector(qdd));
+  pinocchio::computeRNEADerivatives(*model, *data, positions(q), vector(qd), vector(qdd));
   give(data->tau, out);
   give_products(data->dtau_dq, data->dtau_dv, data->M, cotangent, out + model->nv);
 }
 
 void aba_vjp(const double *q, const double *qd, const double *tau, const double *cotangent, double *out) {
-  pinocchio::computeABADerivatives(*model, *data, vector(q), vector(qd), vector(tau));
+  pinocchio::computeABADerivatives(*model, *data, positions(q), vector(qd), vector(tau));
   give(data->ddq, out);
   give_products(data->ddq_dq, data->ddq_dv, data->Minv, cotangent, out + model->nv);
 }

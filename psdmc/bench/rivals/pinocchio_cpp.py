@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -72,11 +73,28 @@ def contestants(case: Case, rival: str, compiled_library: Path) -> list[Contesta
             robot=robot,
             weights=standard_parameters(case) if function == "regressor" else None,
         )
-        for function, symbols in SYMBOLS.items()
-        for symbol in symbols
+        for function in case.functions
         if is_comparable(case, function)
+        for symbol in SYMBOLS[function]
     ]
     return [*found, *incomparable(case, rival)]
+
+
+def ways_of(case: Case, ways: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+    """By function those ways that compute what psdmc computes for this robot.
+
+    Where joints have several coordinates, a derivative by q is by rates of change; a tool that differentiates C finds one
+    by coordinates.
+    """
+    return {
+        function: tuple(way for way in ways[function] if not (case.is_wide and way.endswith(BY_COORDINATES)))
+        for function in case.functions
+        if function in ways and is_comparable(case, function)
+    }
+
+
+BY_COORDINATES = ("_jacobian", "_vjp", "_vjp_aba", "_vjp_ldl")
+"""Endings of ways that differentiate by the entries of q."""
 
 
 def variant_of(symbol: str, function: str) -> str:
@@ -87,7 +105,7 @@ def variant_of(symbol: str, function: str) -> str:
 def outputs_of(case: Case, function: str) -> int:
     """Numbers per state that a rival puts out: as many as psdmc, except with standard parameters in place of base
     parameters."""
-    return 10 * case.n**2 if function == "regressor" else sum(output_sizes(function, case.n))
+    return 10 * case.n * case.chain.nv if function == "regressor" else sum(output_sizes(function, case.sizes))
 
 
 def is_comparable(case: Case, function: str) -> bool:

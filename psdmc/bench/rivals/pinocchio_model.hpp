@@ -6,12 +6,21 @@
 
 #include <pinocchio/multibody.hpp>
 
+/// A joint by Pinocchio's short word for its type (JOINTS in psdmc/bench/case.py), added to the model; its number.
+template <class Model>
+auto add_joint(Model &model, std::size_t parent, const std::string &type, const typename Model::SE3 &placement,
+               const std::string &name) {
+  using Joints = typename Model::JointCollection;
+  if (type == "RZ") return model.addJoint(parent, typename Joints::JointModelRZ(), placement, name);
+  if (type == "PZ") return model.addJoint(parent, typename Joints::JointModelPZ(), placement, name);
+  return model.addJoint(parent, typename Joints::JointModelFreeFlyer(), placement, name);
+}
+
 /// Fills an empty model from the text of robot_as_numbers (psdmc/bench/case.py): n, gravity, then per joint its type,
 /// parent, placement, body about the joint frame and drive inertia.
 template <class Model>
 void read_model(std::istream &text, Model &model) {
   using Scalar = typename Model::Scalar;
-  using Joints = typename Model::JointCollection;
   using Placement = typename Model::SE3;
   std::size_t n = 0;
   Eigen::Vector3d gravity;
@@ -31,12 +40,12 @@ void read_model(std::istream &text, Model &model) {
     text >> drive(i);
     const Placement placement(rotation.cast<Scalar>(), translation.cast<Scalar>());
     const std::string name = "joint" + std::to_string(i);
-    const auto joint = type == "RZ" ? model.addJoint(parent, typename Joints::JointModelRZ(), placement, name)
-                                    : model.addJoint(parent, typename Joints::JointModelPZ(), placement, name);
+    const auto joint = add_joint(model, parent, type, placement, name);
     // A link without a body: FromDynamicParameters would divide by its mass.
     const bool is_empty = body.isZero(0.0);
     model.inertias[joint] = is_empty ? Model::Inertia::Zero() : Model::Inertia::FromDynamicParameters(body.cast<Scalar>());
   }
-  model.armature = drive.cast<Scalar>();
+  for (std::size_t i = 0; i < n; ++i)
+    model.armature.segment(model.idx_vs[i + 1], model.nvs[i + 1]).setConstant(Scalar(drive(i)));
   model.gravity.linear(gravity.cast<Scalar>());
 }

@@ -23,7 +23,7 @@ from psdmc.recipes.recipe import Polynomials
 from psdmc.toolchain.compiler_command import find_compiler, run
 
 FUNCTIONS = tuple(name for name, recipe in RECIPES.items() if recipe.benched)
-"""The functions that the benchmark measures."""
+"""The functions that the benchmark measures on arms; see Case.functions."""
 
 EXPANDED = tuple(
     name for name in FUNCTIONS if RECIPES[name].polynomials in (Polynomials.TORQUE, Polynomials.SOLVED)
@@ -37,7 +37,7 @@ EXPANDED_LIMIT = 30_000
 
 def factored(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
     """The factored lowering, which users get."""
-    return contestants(case, "factored", FUNCTIONS, flags)
+    return contestants(case, "factored", case.functions, flags)
 
 
 def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
@@ -69,7 +69,7 @@ def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, .
 
 def _ways(case: Case, rival: str, kernel: Kernel, library: Path, lanes: int) -> list[Contestant]:
     name = kernel.name
-    sections = _sections(kernel.function, case.n, case.model.l)
+    sections = _sections(kernel.function, case.sizes)
     size = sum(sections)
     weights = case.model.theta_b if RECIPES[name].times_theta else None
     single, batch = (cost(program) for program in (kernel.single, kernel.batch))
@@ -126,7 +126,7 @@ def glue(package: PackageView) -> str:
     lines = ['#include "loops.hpp"', '#include "library.h"']
     for view in package.functions:
         symbol, given = f"{package.robot}_{view.name}", _given(view.signature)
-        sizes = _sections(view.signature, package.n, package.l)
+        sizes = _sections(view.signature, package.info.sizes)
         one, many = (", ".join(_arguments(view.signature, sizes, each)) for each in ("", "count * "))
         lines += [f"PSDMC_CONTESTANT({view.name}, []({given}) {{ {symbol}({one}); }})"]
         lines += [
@@ -152,6 +152,6 @@ def _arguments(function: Signature, sizes: Sequence[int], each: str) -> list[str
     return [*INPUTS[: len(function.inputs)], *outputs]
 
 
-def _sections(function: Signature, n: int, l: int) -> tuple[int, ...]:
+def _sections(function: Signature, sizes: Sizes) -> tuple[int, ...]:
     """Reals per state of each output."""
-    return tuple(Sizes.of_chain(n, l).size(output) for output in function.outputs)
+    return tuple(sizes.size(output) for output in function.outputs)
