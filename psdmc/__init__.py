@@ -6,6 +6,8 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from psdmc.version import VERSION as __version__
+
 if TYPE_CHECKING:
     from psdmc.calibration.api import calibrate
     from psdmc.compiler import compile, derive, emit_c
@@ -14,14 +16,17 @@ if TYPE_CHECKING:
     from psdmc.model.dynamics_model import DynamicsModel
     from psdmc.model.load import load
     from psdmc.model.store import save
+    from psdmc.toolchain.call import CompiledRobot
 
 __all__ = [
+    "CompiledRobot",
     "DerivationError",
     "DynamicsModel",
     "InputError",
     "InternalError",
     "PsdmcError",
     "ToolchainError",
+    "__version__",
     "calibrate",
     "compile",
     "derive",
@@ -31,7 +36,8 @@ __all__ = [
     "save",
 ]
 
-_MODULES = {name: "psdmc.errors" for name in __all__ if name.endswith("Error")}
+_MODULES = {"CompiledRobot": "psdmc.toolchain.call"}
+_MODULES |= {name: "psdmc.errors" for name in __all__ if name.endswith("Error")}
 _MODULES |= dict.fromkeys(("compile", "derive", "emit_c"), "psdmc.compiler")
 _MODULES |= {
     "calibrate": "psdmc.calibration.api",
@@ -43,12 +49,14 @@ _MODULES |= {
 """The module of each name. Modules are loaded when a name is first used, so that the command line starts fast."""
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module 'psdmc' has no attribute {name!r}")
-    found = getattr(import_module(_MODULES[name]), name)
-    globals()[name] = found
-    return found
+if not TYPE_CHECKING:  # a type checker would take any name that there is none of
+
+    def __getattr__(name: str) -> Any:
+        if name not in _MODULES:
+            raise AttributeError(f"module 'psdmc' has no attribute {name!r}")
+        found = getattr(import_module(_MODULES[name]), name)
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

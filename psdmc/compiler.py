@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from psdmc.emit.adapters import chosen, with_needed
 from psdmc.emit.info import package_info
@@ -36,6 +36,8 @@ from psdmc.toolchain.kept_kernels import lowered_once
 from psdmc.toolchain.kept_libraries import compiled_once
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from psdmc.robot.load import LoadedRobot
 
 
@@ -160,6 +162,43 @@ def emit_c(
     return write_package(directory, package_files(package), force)
 
 
+@overload
+def compile(
+    model: DynamicsModel | str | Path,
+    lowering: Lowering = ...,
+    functions: Sequence[str] | str | None = ...,
+    real: Literal["float64"] | None = ...,
+    trig: Trig | None = ...,
+    progress: Progress = ...,
+    target: str | Target = ...,
+) -> CompiledRobot: ...
+
+
+@overload
+def compile(
+    model: DynamicsModel | str | Path,
+    lowering: Lowering = ...,
+    functions: Sequence[str] | str | None = ...,
+    *,
+    real: Literal["float32"],
+    trig: Trig | None = ...,
+    progress: Progress = ...,
+    target: str | Target = ...,
+) -> CompiledRobot[np.float32]: ...
+
+
+@overload
+def compile(
+    model: DynamicsModel | str | Path,
+    lowering: Lowering = ...,
+    functions: Sequence[str] | str | None = ...,
+    real: Real | None = ...,
+    trig: Trig | None = ...,
+    progress: Progress = ...,
+    target: str | Target = ...,
+) -> CompiledRobot[np.float32] | CompiledRobot: ...
+
+
 def compile(
     model: DynamicsModel | str | Path,
     lowering: Lowering = "auto",
@@ -168,7 +207,7 @@ def compile(
     trig: Trig | None = None,
     progress: Progress = silent,
     target: str | Target = NATIVE,
-) -> CompiledRobot:
+) -> CompiledRobot[Any]:
     """The model's functions, compiled for this machine and callable on NumPy arrays; cached by content.
 
     model      or the path of a model file
@@ -194,7 +233,7 @@ def compile(
 
     parts = (model.content_hash, lowering, options.real, options.trig, *wanted(functions, model.mechanism))
 
-    def more(function: str) -> CompiledRobot:
+    def more(function: str) -> CompiledRobot[Any]:
         return compile(model, lowering, [function], real, trig, progress, target)
 
     return CompiledRobot(*compiled_once(parts, make, machine), more if functions is None else None)

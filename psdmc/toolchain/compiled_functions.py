@@ -18,13 +18,15 @@ from psdmc.errors import InputError, ToolchainError
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.real_arrays import real_array
 from psdmc.robot.unit_lengths import refuse_other_lengths
+from psdmc.toolchain import given_outputs
 from psdmc.toolchain.interface import Interface, batch_symbol
+from psdmc.toolchain.robot_facts import RobotFacts
 from psdmc.toolchain.stubs import result_name
 
 Array = NDArray[Any]
 
 
-class CompiledFunctions:
+class CompiledFunctions(RobotFacts):
     """The library of a compiled package, called by a function's signature.
 
     more  compiles one function that the package does not have, by name, when it is first called; None: such a call is an
@@ -34,6 +36,7 @@ class CompiledFunctions:
     def __init__(
         self, interface: Interface, library: Path, more: Callable[[str], CompiledFunctions] | None = None
     ) -> None:
+        super().__init__(interface)
         self._ffi = cffi.FFI()
         self._ffi.cdef(interface.cdef)
         self._library = _opened(self._ffi, library, interface.robot)
@@ -44,14 +47,21 @@ class CompiledFunctions:
         self._pointer = self._ffi.typeof(f"{interface.real} *")
         self._kernels = {name: _bound(interface, self._library, name) for name in interface.kernels}
         self._patterns = dict(interface.patterns)
-        self.joint_names = interface.joint_names
-        self.frame_names = interface.frame_names
         self.library = library
         self._more = more
         self._others: list[CompiledFunctions] = []  # whose libraries stay open as long as this one's
 
-    def call(self, function: Signature, inputs: Sequence[ArrayLike], theta_b: ArrayLike | None = None) -> Any:
-        """The output, or a named tuple of the outputs, of a function at these states."""
+    def call(
+        self,
+        function: Signature,
+        inputs: Sequence[ArrayLike],
+        theta_b: ArrayLike | None = None,
+        out: Any = None,
+    ) -> Any:
+        """The output, or a named tuple of the outputs, of a function at these states.
+
+        out  the array, or tuple of arrays, that results are written to and that is returned; None: new ones
+        """
         name = function.name
         kernel = self._kernel(name if theta_b is None else f"{name}_theta")
         arrays = [self._states(name, q, x) for q, x in zip(function.inputs, inputs, strict=True)]
@@ -60,8 +70,15 @@ class CompiledFunctions:
         lead, rows = self._rows(function, arrays)
         if theta_b is not None:
             rows.append(self._parameters(name, theta_b))
-        outs = [np.empty(lead + tail, self._dtype) for tail in kernel.tails]
+        shapes = [lead + tail for tail in kernel.tails]
+        kept = () if out is None else given_outputs.checked(function, out, shapes, self._dtype)
+        is_direct = bool(kept) and all(given_outputs.is_direct(array, rows) for array in kept)
+        outs = kept if is_direct else tuple(np.empty(shape, self._dtype) for shape in shapes)
         kernel.batch(math.prod(lead), *map(self._address, rows), *map(self._address, outs))
+        if kept and not is_direct:
+            for array, values in zip(kept, outs, strict=True):
+                array[...] = values
+        outs = kept or outs
         return outs[0] if len(outs) == 1 else results(function)(*outs)
 
     def pattern(self, name: str) -> tuple[Array, Array]:
@@ -86,11 +103,20 @@ class CompiledFunctions:
             self._others.append(other)
             self._kernels = other._kernels | self._kernels
             self._patterns = other._patterns | self._patterns
+            self._bind(other)
             found = self._kernels.get(name)
         if found is None:
             compiled = ", ".join(self._kernels)
             raise InputError(f"{self._robot}: {name} was not compiled", f"compiled are {compiled}")
         return found
+
+    def _bind(self, compiled: CompiledFunctions) -> None:
+        """Take over what is called without a detour through Python; here nothing is."""
+
+    def _address_of(self, function: str) -> int:
+        """Where the library has a kernel's batch function."""
+        symbol = batch_symbol(self._robot, function)
+        return int(self._ffi.cast("uintptr_t", self._ffi.addressof(self._library, symbol)))
 
     def _states(self, name: str, quantity: Quantity, values: ArrayLike) -> Array:
         array = real_array(f"{name}: {quantity.name}", values, self._dtype)

@@ -8,7 +8,7 @@ rendered or parsed again.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -32,6 +32,9 @@ class Interface:
     joint_names  n, from base to tip
     frame_names  the named frames
     units        parts of q, from an entry to before another, whose length must be one
+    limits       n rows: lower, upper, speed, acceleration, effort; infinite where unknown
+    gravity      3, m/s^2 in the base frame
+    theta_b      l base parameters; None while unknown
     kernels      name -> trailing axes of each of its results
     patterns     function -> (row, column) of the entries of its matrix that may differ from zero
     cdef         C declarations of the functions that are called
@@ -47,6 +50,9 @@ class Interface:
     joint_names: tuple[str, ...]
     frame_names: tuple[str, ...]
     units: tuple[tuple[int, int], ...]
+    limits: tuple[tuple[float, ...], ...]
+    gravity: tuple[float, ...]
+    theta_b: tuple[float, ...] | None
     kernels: Mapping[str, tuple[tuple[int, ...], ...]]
     patterns: Mapping[str, tuple[tuple[int, int], ...]]
     cdef: str
@@ -70,6 +76,9 @@ def interface_of(package: PackageView) -> Interface:
         joint_names=tuple(joint.name for joint in package.info.joints),
         frame_names=package.info.frames,
         units=package.info.units,
+        limits=tuple((j.lower, j.upper, j.speed, j.acceleration, j.effort) for j in package.info.joints),
+        gravity=package.info.gravity,
+        theta_b=_known([parameter.value for parameter in package.info.parameters]),
         kernels={kernel.name: tuple(output.shape for output in kernel.outputs) for kernel in package.kernels},
         patterns={pattern.function: pattern.places for pattern in patterns(package.functions)},
         cdef="".join(
@@ -79,6 +88,11 @@ def interface_of(package: PackageView) -> Interface:
             if prototype.symbol == batch_symbol(package.robot, kernel.name)
         ),
     )
+
+
+def _known(values: Sequence[float | None]) -> tuple[float, ...] | None:
+    known = tuple(value for value in values if value is not None)
+    return known if len(known) == len(values) else None
 
 
 def batch_symbol(robot: str, kernel: str) -> str:
@@ -109,6 +123,16 @@ def _from_plain(plain: dict[str, Any]) -> Interface:
     places = {
         name: tuple((row, column) for row, column in own) for name, own in plain.pop("patterns").items()
     }
+    limits, gravity = tuple(map(tuple, plain.pop("limits"))), tuple(plain.pop("gravity"))
+    values = plain.pop("theta_b")
     return Interface(
-        joint_names=joints, frame_names=frames, units=units, kernels=kernels, patterns=places, **plain
+        joint_names=joints,
+        frame_names=frames,
+        units=units,
+        limits=limits,
+        gravity=gravity,
+        theta_b=None if values is None else tuple(values),
+        kernels=kernels,
+        patterns=places,
+        **plain,
     )

@@ -11,13 +11,16 @@ from psdmc.program.signature import Quantity, Signature
 STUB = Path(__file__).with_name("call.pyi")
 
 _HEAD = """# Written by python -m psdmc.toolchain.stubs from psdmc/functions.
-from typing import Any, NamedTuple
+from typing import Generic, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from typing_extensions import TypeVar
 
 from psdmc.toolchain.compiled_functions import CompiledFunctions
 
-Array = NDArray[Any]
+RealT = TypeVar("RealT", bound=np.floating, default=np.float64)
 """
 
 
@@ -27,11 +30,16 @@ def arguments(function: Signature) -> tuple[str, ...]:
 
 
 def documentation(function: Signature) -> str:
-    """A method's docstring: the function's meaning, then the shapes of its outputs."""
+    """A method's docstring: the function's meaning, then the shapes of its inputs and outputs."""
+    given = ", ".join(f"{q.name} {_shape(q)}" for q in function.inputs)
+    theta = "; theta_b (l,) in place of the parameters compiled in" if function.theta else ""
     shapes = ", ".join(f"{output.name} {_shape(output)}" for output in function.outputs)
-    inputs = "".join(f"; {q.name} {_shape(q)}" for q in function.inputs if len(q.axes) != 1)
     failure = f"; NaN in states that have {function.positive.which}" if function.positive else ""
-    return f"{function.meaning}: {shapes}{inputs}{failure}."
+    written = "array" if len(function.outputs) == 1 else "tuple of arrays"
+    return (
+        f"{function.meaning}.\n\nTakes {given}{theta}.\nReturns {shapes}{failure}.\n"
+        f"out: the {written} to write to. nq = nv = n where every joint has one coordinate."
+    )
 
 
 def stub(functions: Iterable[Signature]) -> str:
@@ -39,7 +47,10 @@ def stub(functions: Iterable[Signature]) -> str:
     shown = tuple(functions)
     several = [line for function in shown if len(function.outputs) > 1 for line in _results(function)]
     methods = [line for function in shown for line in _method(function)]
-    return "\n".join([_HEAD, *several, "class CompiledRobot(CompiledFunctions):", *methods]) + "\n"
+    return (
+        "\n".join([_HEAD, *several, "class CompiledRobot(CompiledFunctions, Generic[RealT]):", *methods])
+        + "\n"
+    )
 
 
 def result_name(function: Signature) -> str:
@@ -48,20 +59,21 @@ def result_name(function: Signature) -> str:
 
 
 def _results(function: Signature) -> list[str]:
-    fields = [f"    {output.name}: Array" for output in function.outputs]
-    return [f"class {result_name(function)}(NamedTuple):", *fields, ""]
+    fields = [f"    {output.name}: NDArray[RealT]" for output in function.outputs]
+    return [f"class {result_name(function)}(NamedTuple, Generic[RealT]):", *fields, ""]
 
 
 def _method(function: Signature) -> list[str]:
     given = [f"{quantity.name}: ArrayLike" for quantity in function.inputs]
     given += ["theta_b: ArrayLike | None = None"] if function.theta else []
-    returns = "Array" if len(function.outputs) == 1 else result_name(function)
-    return [f"    def {function.name}(self, {', '.join(given)}) -> {returns}: ..."]
+    one = "NDArray[RealT] | None" if len(function.outputs) == 1 else "tuple[NDArray[RealT], ...] | None"
+    given += ["*", f"out: {one} = None"]
+    returns = "NDArray" if len(function.outputs) == 1 else result_name(function)
+    return [f"    def {function.name}(self, {', '.join(given)}) -> {returns}[RealT]: ..."]
 
 
 def _shape(quantity: Quantity) -> str:
-    words = {"nq": "n", "nv": "n"}
-    return f"({', '.join(('...', *(words.get(axis, axis) for axis in quantity.axes)))})"
+    return f"({', '.join(('...', *quantity.axes))})"
 
 
 if __name__ == "__main__":

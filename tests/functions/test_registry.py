@@ -70,7 +70,12 @@ def test_every_function_is_a_method_with_its_arguments_and_meaning() -> None:
         method = getattr(CompiledRobot, name)
         assert method.__name__ == name
         assert signature.meaning in method.__doc__
-        expected = ["self", *(q.name for q in signature.inputs), *(["theta_b"] if signature.theta else [])]
+        expected = [
+            "self",
+            *(q.name for q in signature.inputs),
+            *(["theta_b"] if signature.theta else []),
+            "out",
+        ]
         assert list(method.__signature__.parameters) == expected
 
 

@@ -22,10 +22,13 @@ KERNELS = arm_kernels()
 RANDOM = np.random.default_rng(11)
 
 
-@pytest.fixture(scope="module")
-def robot() -> CompiledRobot:
+@pytest.fixture(scope="module", params=["direct", "through cffi"])
+def robot(request: pytest.FixtureRequest) -> CompiledRobot:
+    """The same robot with direct calls and without: nothing but time may differ."""
     package = arm_package()
-    return CompiledRobot(interface_of(package), compiled(package, optimised=False))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PSDMC_DIRECT_CALLS", "1" if request.param == "direct" else "0")
+        return CompiledRobot(interface_of(package), compiled(package, optimised=False))
 
 
 @pytest.mark.parametrize("name", [name for name, kernel in KERNELS.items() if not kernel.theta])

@@ -1,0 +1,400 @@
+/* Calls a compiled function on NumPy arrays without a detour through Python: one type, DirectCall, for all robots.
+
+   A call whose arrays are exactly what C reads (of the robot's dtype, contiguous, of one leading shape) is made here. Any
+   other call, and every error, is left to the `slow` callable, which takes the same arguments. */
+#define PY_SSIZE_T_CLEAN
+#define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
+#include <Python.h>
+#include <structmember.h>
+#include <numpy/arrayobject.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+enum {
+    MOST_ARRAYS = 16,    /* inputs and outputs of one function */
+    MOST_AXES = 3,       /* trailing axes of one of them */
+    MOST_UNITS = 64,     /* quaternions, and cosines with their sines, in the inputs of one function */
+    RELEASE_FROM = 64    /* states from which the GIL is released: below, giving it up takes longer than the call */
+};
+
+typedef struct {
+    int axes;
+    npy_intp length[MOST_AXES];
+} Tail;
+
+/* Entries `from` to before `to` of a row of an input, whose length must be one. */
+typedef struct {
+    int input, from, to;
+} Unit;
+
+static const double UNIT_SLACK = 0.5e-6;    /* of a length's square: what is further off, Python looks at */
+
+typedef struct {
+    PyObject_HEAD
+    vectorcallfunc vectorcall;
+    PyObject *slow;      /* bound method of the robot, which keeps its library open */
+    PyObject *result;    /* class of the named tuple of several outputs, or NULL */
+    void (*batch)(void);
+    int inputs, outputs, type, can_fail, units;
+    Unit unit[MOST_UNITS];
+    Tail tails[MOST_ARRAYS];
+} DirectCall;
+
+static PyObject *out_word;    /* "out", interned */
+
+/* The functions' own pointers are to const or plain reals: all pointers to objects are passed alike on the machines that
+   psdmc.compile builds for. */
+#define ARRAYS_1 void *
+#define ARRAYS_2 ARRAYS_1, void *
+#define ARRAYS_3 ARRAYS_2, void *
+#define ARRAYS_4 ARRAYS_3, void *
+#define ARRAYS_5 ARRAYS_4, void *
+#define ARRAYS_6 ARRAYS_5, void *
+#define ARRAYS_7 ARRAYS_6, void *
+#define ARRAYS_8 ARRAYS_7, void *
+#define ARRAYS_9 ARRAYS_8, void *
+#define ARRAYS_10 ARRAYS_9, void *
+#define ARRAYS_11 ARRAYS_10, void *
+#define ARRAYS_12 ARRAYS_11, void *
+#define GIVEN_2 a[0], a[1]
+#define GIVEN_3 GIVEN_2, a[2]
+#define GIVEN_4 GIVEN_3, a[3]
+#define GIVEN_5 GIVEN_4, a[4]
+#define GIVEN_6 GIVEN_5, a[5]
+#define GIVEN_7 GIVEN_6, a[6]
+#define GIVEN_8 GIVEN_7, a[7]
+#define GIVEN_9 GIVEN_8, a[8]
+#define GIVEN_10 GIVEN_9, a[9]
+#define GIVEN_11 GIVEN_10, a[10]
+#define GIVEN_12 GIVEN_11, a[11]
+#define CASE(k) \
+    case k: \
+        if (can_fail) { \
+            (void)((size_t (*)(size_t, ARRAYS_##k))batch)(count, GIVEN_##k); \
+        } else { \
+            ((void (*)(size_t, ARRAYS_##k))batch)(count, GIVEN_##k); \
+        } \
+        break;
+
+enum { LEAST_CALLED = 2, MOST_CALLED = 12 };    /* arrays of the cases below */
+
+static void run(void (*batch)(void), int can_fail, size_t count, int arrays, void **a)
+{
+    switch (arrays) {
+    CASE(2) CASE(3) CASE(4) CASE(5) CASE(6) CASE(7) CASE(8) CASE(9) CASE(10) CASE(11) CASE(12)
+    default: break;
+    }
+}
+
+static int has_tail(PyArrayObject *array, int lead, const Tail *tail)
+{
+    const npy_intp *shape = PyArray_DIMS(array);
+    for (int i = 0; i < tail->axes; i++) {
+        if (shape[lead + i] != tail->length[i]) return 0;
+    }
+    return 1;
+}
+
+/* Whether an object is an array that C can read: `lead` axes and `shape` of them as given, then the tail's. */
+static int is_plain(PyObject *object, int type, int flags, const Tail *tail, int lead, const npy_intp *shape)
+{
+    if (!PyArray_CheckExact(object)) return 0;
+    PyArrayObject *array = (PyArrayObject *)object;
+    return PyArray_TYPE(array) == type && PyArray_CHKFLAGS(array, flags) && PyArray_ISNOTSWAPPED(array)
+        && PyArray_NDIM(array) == lead + tail->axes && (lead == 0 || memcmp(PyArray_DIMS(array), shape, (size_t)lead * sizeof *shape) == 0)
+        && has_tail(array, lead, tail);
+}
+
+static int overlap(PyArrayObject *a, PyArrayObject *b)
+{
+    const uintptr_t from = (uintptr_t)PyArray_DATA(a), other = (uintptr_t)PyArray_DATA(b);
+    return from < other + (uintptr_t)PyArray_NBYTES(b) && other < from + (uintptr_t)PyArray_NBYTES(a);
+}
+
+/* The outputs that a caller gave, borrowed, into arrays[inputs...]; 0 where Python must look at them. */
+static int take_outputs(const DirectCall *self, PyObject *out, int lead, const npy_intp *shape, PyArrayObject **arrays)
+{
+    if (self->outputs > 1 && (!PyTuple_Check(out) || PyTuple_GET_SIZE(out) != self->outputs)) return 0;
+    for (int k = 0; k < self->outputs; k++) {
+        PyObject *own = self->outputs > 1 ? PyTuple_GET_ITEM(out, k) : out;
+        const int place = self->inputs + k;
+        if (!is_plain(own, self->type, NPY_ARRAY_CARRAY, &self->tails[place], lead, shape)) return 0;
+        arrays[place] = (PyArrayObject *)own;
+        for (int i = 0; i < place; i++) {
+            if (overlap(arrays[i], arrays[place])) return 0;
+        }
+    }
+    return 1;
+}
+
+static PyObject *new_output(const DirectCall *self, int place, int lead, const npy_intp *shape)
+{
+    npy_intp whole[NPY_MAXDIMS];
+    const Tail *tail = &self->tails[place];
+    if (lead > 0) memcpy(whole, shape, (size_t)lead * sizeof *shape);
+    for (int i = 0; i < tail->axes; i++) whole[lead + i] = tail->length[i];
+    return PyArray_SimpleNew(lead + tail->axes, whole, self->type);
+}
+
+static PyObject *named(const DirectCall *self, PyObject *plain)
+{
+    PyObject *given = PyTuple_Pack(1, plain);
+    Py_DECREF(plain);
+    if (given == NULL) return NULL;
+    PyObject *found = PyTuple_Type.tp_new((PyTypeObject *)self->result, given, NULL);
+    Py_DECREF(given);
+    return found;
+}
+
+/* New outputs into arrays[inputs...]; what the call returns, or NULL with an exception. */
+static PyObject *make_outputs(const DirectCall *self, int lead, const npy_intp *shape, PyArrayObject **arrays)
+{
+    PyObject *made = self->outputs > 1 ? PyTuple_New(self->outputs) : NULL;
+    if (self->outputs > 1 && made == NULL) return NULL;
+    for (int k = 0; k < self->outputs; k++) {
+        PyObject *own = new_output(self, self->inputs + k, lead, shape);
+        if (own == NULL) {
+            Py_XDECREF(made);
+            return NULL;
+        }
+        arrays[self->inputs + k] = (PyArrayObject *)own;
+        if (made == NULL) return own;
+        PyTuple_SET_ITEM(made, k, own);
+    }
+    return named(self, made);
+}
+
+/* Whether every part of the inputs that must be of length one is; NaN is not. */
+static int are_units(const DirectCall *self, PyArrayObject **arrays, npy_intp count)
+{
+    for (int k = 0; k < self->units; k++) {
+        const Unit *unit = &self->unit[k];
+        const npy_intp row = self->tails[unit->input].length[0];
+        const void *data = PyArray_DATA(arrays[unit->input]);
+        for (npy_intp i = 0; i < count; i++) {
+            double square = 0.0;
+            for (npy_intp j = i * row + unit->from; j < i * row + unit->to; j++) {
+                const double entry = self->type == NPY_FLOAT ? (double)((const float *)data)[j] : ((const double *)data)[j];
+                square += entry * entry;
+            }
+            if (!(square >= 1.0 - UNIT_SLACK && square <= 1.0 + UNIT_SLACK)) return 0;
+        }
+    }
+    return 1;
+}
+
+static PyObject *call(PyObject *object, PyObject *const *args, size_t nargsf, PyObject *names)
+{
+    DirectCall *self = (DirectCall *)object;
+    PyObject *out = NULL;
+    PyArrayObject *arrays[MOST_ARRAYS];
+    if (PyVectorcall_NARGS(nargsf) != self->inputs) goto slow;
+    if (names != NULL && PyTuple_GET_SIZE(names) > 0) {
+        if (PyTuple_GET_SIZE(names) != 1 || PyTuple_GET_ITEM(names, 0) != out_word) goto slow;
+        if (args[self->inputs] != Py_None) out = args[self->inputs];
+    }
+    if (!PyArray_CheckExact(args[0])) goto slow;
+    const int lead = PyArray_NDIM((PyArrayObject *)args[0]) - self->tails[0].axes;
+    const npy_intp *shape = PyArray_DIMS((PyArrayObject *)args[0]);
+    if (lead < 0 || lead + MOST_AXES > NPY_MAXDIMS) goto slow;
+    for (int i = 0; i < self->inputs; i++) {
+        if (!is_plain(args[i], self->type, NPY_ARRAY_CARRAY_RO, &self->tails[i], lead, shape)) goto slow;
+        arrays[i] = (PyArrayObject *)args[i];
+    }
+    npy_intp count = 1;
+    for (int i = 0; i < lead; i++) count *= shape[i];
+    if (!are_units(self, arrays, count)) goto slow;
+    PyObject *result;
+    if (out == NULL) {
+        result = make_outputs(self, lead, shape, arrays);
+        if (result == NULL) return NULL;
+    } else {
+        if (!take_outputs(self, out, lead, shape, arrays)) goto slow;
+        result = self->outputs > 1 ? named(self, Py_NewRef(out)) : Py_NewRef(out);
+        if (result == NULL) return NULL;
+    }
+    void *data[MOST_ARRAYS];
+    const int all = self->inputs + self->outputs;
+    for (int i = 0; i < all; i++) data[i] = PyArray_DATA(arrays[i]);
+    if (count < RELEASE_FROM) {
+        run(self->batch, self->can_fail, (size_t)count, all, data);
+    } else {
+        Py_BEGIN_ALLOW_THREADS
+        run(self->batch, self->can_fail, (size_t)count, all, data);
+        Py_END_ALLOW_THREADS
+    }
+    return result;
+slow:
+    return PyObject_Vectorcall(self->slow, args, nargsf & ~PY_VECTORCALL_ARGUMENTS_OFFSET, names);
+}
+
+/* (numbers...) into a tail; 0 with an exception where they are none. */
+static int read_tail(PyObject *lengths, Tail *tail)
+{
+    if (!PyTuple_Check(lengths) || PyTuple_GET_SIZE(lengths) > MOST_AXES) {
+        PyErr_SetString(PyExc_ValueError, "a tail is a tuple of at most three lengths");
+        return 0;
+    }
+    tail->axes = (int)PyTuple_GET_SIZE(lengths);
+    for (int i = 0; i < tail->axes; i++) {
+        tail->length[i] = PyLong_AsSsize_t(PyTuple_GET_ITEM(lengths, i));
+        if (PyErr_Occurred()) return 0;
+    }
+    return 1;
+}
+
+static int read_tails(DirectCall *self, PyObject *inputs, PyObject *outputs)
+{
+    self->inputs = (int)PyTuple_GET_SIZE(inputs);
+    self->outputs = (int)PyTuple_GET_SIZE(outputs);
+    const int all = self->inputs + self->outputs;
+    if (self->inputs < 1 || self->outputs < 1 || all < LEAST_CALLED || all > MOST_CALLED) {
+        PyErr_Format(PyExc_ValueError, "%d arrays, expected %d to %d", all, LEAST_CALLED, MOST_CALLED);
+        return 0;
+    }
+    for (int i = 0; i < all; i++) {
+        PyObject *own = i < self->inputs ? PyTuple_GET_ITEM(inputs, i) : PyTuple_GET_ITEM(outputs, i - self->inputs);
+        if (!read_tail(own, &self->tails[i])) return 0;
+    }
+    return 1;
+}
+
+/* ((input, from, to), ...) */
+static int read_units(DirectCall *self, PyObject *units)
+{
+    const Py_ssize_t count = PyTuple_GET_SIZE(units);
+    if (count > MOST_UNITS) {
+        PyErr_Format(PyExc_ValueError, "%zd parts of length one, expected up to %d", count, MOST_UNITS);
+        return 0;
+    }
+    for (Py_ssize_t k = 0; k < count; k++) {
+        Unit *unit = &self->unit[k];
+        PyObject *own = PyTuple_GET_ITEM(units, k);
+        if (!PyTuple_Check(own) || !PyArg_ParseTuple(own, "iii", &unit->input, &unit->from, &unit->to)) {
+            if (!PyErr_Occurred()) PyErr_SetString(PyExc_TypeError, "a part of length one is three numbers");
+            return 0;
+        }
+        const int known = unit->input >= 0 && unit->input < self->inputs && self->tails[unit->input].axes == 1;
+        if (!known || unit->from < 0 || unit->from > unit->to || unit->to > self->tails[unit->input].length[0]) {
+            PyErr_SetString(PyExc_ValueError, "a part of length one lies in no input");
+            return 0;
+        }
+    }
+    self->units = (int)count;
+    return 1;
+}
+
+/* DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units) */
+static PyObject *new(PyTypeObject *type, PyObject *args, PyObject *named_args)
+{
+    PyObject *slow, *inputs, *outputs, *result, *units;
+    unsigned long long address;
+    int can_fail, is_single;
+    if (named_args != NULL && PyDict_GET_SIZE(named_args) > 0) {
+        PyErr_SetString(PyExc_TypeError, "DirectCall() takes no keyword arguments");
+        return NULL;
+    }
+    if (!PyArg_ParseTuple(args, "OKppO!O!OO!", &slow, &address, &can_fail, &is_single, &PyTuple_Type, &inputs,
+                          &PyTuple_Type, &outputs, &result, &PyTuple_Type, &units)) return NULL;
+    DirectCall *self = (DirectCall *)type->tp_alloc(type, 0);
+    if (self == NULL) return NULL;
+    self->vectorcall = call;
+    self->type = is_single ? NPY_FLOAT : NPY_DOUBLE;
+    self->can_fail = can_fail;
+    self->batch = (void (*)(void))(uintptr_t)address;
+    self->slow = Py_NewRef(slow);
+    self->result = result == Py_None ? NULL : Py_NewRef(result);
+    const int is_class = result == Py_None || (PyType_Check(result) && PyType_IsSubtype((PyTypeObject *)result, &PyTuple_Type));
+    if (!is_class || !read_tails(self, inputs, outputs) || !read_units(self, units) || (self->outputs > 1) != (self->result != NULL)) {
+        if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "several outputs have a class of tuples, one has none");
+        Py_DECREF(self);
+        return NULL;
+    }
+    return (PyObject *)self;
+}
+
+/* Nothing is cleared, as of a tuple: circles end at the robot's own dictionary, and `slow` keeps the library open until then. */
+static int traverse(PyObject *object, visitproc visit, void *arg)
+{
+    Py_VISIT(Py_TYPE(object));
+    Py_VISIT(((DirectCall *)object)->slow);
+    Py_VISIT(((DirectCall *)object)->result);
+    return 0;
+}
+
+static void dealloc(PyObject *object)
+{
+    DirectCall *self = (DirectCall *)object;
+    PyTypeObject *type = Py_TYPE(object);
+    PyObject_GC_UnTrack(object);
+    Py_XDECREF(self->slow);
+    Py_XDECREF(self->result);
+    type->tp_free(object);
+    Py_DECREF(type);
+}
+
+/* Attributes are those of the method that it stands for (name, documentation, robot, class): it is described, inspected and
+   pickled as that method. */
+static PyObject *getattro(PyObject *object, PyObject *name)
+{
+    PyObject *found = PyObject_GetAttr(((DirectCall *)object)->slow, name);
+    if (found != NULL || !PyErr_ExceptionMatches(PyExc_AttributeError)) return found;
+    PyErr_Clear();
+    return PyObject_GenericGetAttr(object, name);
+}
+
+static PyObject *repr(PyObject *object)
+{
+    return PyObject_Repr(((DirectCall *)object)->slow);
+}
+
+static PyMemberDef members[] = {
+    {"__vectorcalloffset__", T_PYSSIZET, offsetof(DirectCall, vectorcall), READONLY, NULL},
+    {NULL, 0, 0, 0, NULL},
+};
+
+static PyType_Slot slots[] = {
+    {Py_tp_doc, "A function of a compiled robot, called without a detour through Python."},
+    {Py_tp_new, new},
+    {Py_tp_call, PyVectorcall_Call},
+    {Py_tp_traverse, traverse},
+    {Py_tp_dealloc, dealloc},
+    {Py_tp_getattro, getattro},
+    {Py_tp_repr, repr},
+    {Py_tp_members, members},
+    {0, NULL},
+};
+
+static PyType_Spec spec = {
+    "psdmc_direct_call.DirectCall", sizeof(DirectCall), 0,
+    Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC | Py_TPFLAGS_HAVE_VECTORCALL | Py_TPFLAGS_IMMUTABLETYPE, slots,
+};
+
+static int fill(PyObject *module)
+{
+    if (PyArray_ImportNumPyAPI() < 0) return -1;
+    out_word = PyUnicode_InternFromString("out");
+    PyObject *type = PyType_FromSpec(&spec);
+    if (out_word == NULL || type == NULL) return -1;
+    const int failed = PyModule_AddObjectRef(module, "DirectCall", type);
+    Py_DECREF(type);
+    return failed;
+}
+
+static PyModuleDef_Slot module_slots[] = {
+    {Py_mod_exec, fill},
+#ifdef Py_GIL_DISABLED
+    {Py_mod_gil, Py_MOD_GIL_NOT_USED},
+#endif
+    {0, NULL},
+};
+
+static PyModuleDef module = {
+    PyModuleDef_HEAD_INIT, "psdmc_direct_call", NULL, 0, NULL, module_slots, NULL, NULL, NULL,
+};
+
+PyMODINIT_FUNC PyInit_psdmc_direct_call(void)
+{
+    return PyModuleDef_Init(&module);
+}

@@ -1,0 +1,97 @@
+"""The extension module that calls compiled functions without a detour through Python: compiled once a machine.
+
+It needs Python's C headers. Without them, or where it cannot be compiled or loaded, calls go through cffi and take some
+microseconds more; results are the same, bit for bit.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import sysconfig
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.machinery import ExtensionFileLoader
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from psdmc.errors import ToolchainError
+from psdmc.toolchain.cache import cache_key, cached
+from psdmc.toolchain.compiler_command import find_compiler, run
+
+MODULE = "psdmc_direct_call"
+SOURCE = Path(__file__).with_name("direct_call.c")
+PRODUCT = f"{MODULE}.so"
+
+VARIABLE = "PSDMC_DIRECT_CALLS"
+"""Environment variable: 0 turns direct calls off."""
+
+FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
+
+MOST_ARRAYS, MOST_UNITS = 12, 64
+"""Of one function, as the C source has them (MOST_CALLED, MOST_UNITS)."""
+
+
+@dataclass(frozen=True, slots=True)
+class DirectCalls:
+    """Whether direct calls are possible here.
+
+    make    the type DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units); None where they are not
+    reason  why not, for people; empty where they are
+    """
+
+    make: Callable[..., Any] | None
+    reason: str = ""
+
+
+def direct_calls() -> DirectCalls:
+    """The extension, compiled now where it was not before; never an error."""
+    if os.environ.get(VARIABLE, "").strip() == "0":
+        return DirectCalls(None, f"{VARIABLE} is 0")
+    return _found()
+
+
+@cache
+def _found() -> DirectCalls:
+    headers = Path(sysconfig.get_path("include"))
+    if sys.implementation.name != "cpython" or sys.platform == "win32":
+        return DirectCalls(None, f"not made for {sys.implementation.name} on {sys.platform}")
+    if not (headers / "Python.h").is_file():
+        return DirectCalls(None, f"no Python.h in {headers} (Debian: apt install python3-dev)")
+    try:
+        return DirectCalls(_loaded(_library(headers)).DirectCall)
+    except (ToolchainError, ImportError, OSError) as error:
+        return DirectCalls(None, str(error))
+
+
+def _library(headers: Path) -> Path:
+    """The compiled module, from the cache or compiled now."""
+    text = SOURCE.read_text(encoding="utf-8")
+    compiler = find_compiler()
+    words = [*compiler.command, *FLAGS, *_platform_flags(), f"-I{headers}", f"-I{np.get_include()}"]
+    parts = ("direct calls", sys.version, np.__version__, *words, *compiler.identity)
+
+    def build(folder: Path) -> None:
+        (folder / SOURCE.name).write_text(text, encoding="utf-8", newline="\n")
+        run([*words, SOURCE.name, "-o", PRODUCT], "direct calls", str(folder))
+
+    return cached(cache_key({SOURCE.name: text}, parts), build, [PRODUCT]) / PRODUCT
+
+
+def _platform_flags() -> tuple[str, ...]:
+    """An extension module takes Python's own functions from the process that loads it."""
+    return ("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()
+
+
+def _loaded(path: Path) -> Any:
+    loader = ExtensionFileLoader(MODULE, str(path))
+    spec = importlib.util.spec_from_file_location(MODULE, path, loader=loader)
+    if spec is None:
+        raise ImportError(f"{path} is no extension module")
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return module

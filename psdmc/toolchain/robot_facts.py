@@ -1,0 +1,133 @@
+"""What a compiled robot is: names, sizes, limits, gravity and base parameters, from its interface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.toolchain.interface import Interface
+
+MOST_NAMES = 8
+"""Names that a repr lists."""
+
+Vector = NDArray[np.float64]
+
+
+class JointLimits(NamedTuple):
+    """Limits of n joints as (n,) arrays, in rad or m and their rates, N m or N; infinite where the robot's file has none."""
+
+    lower: Vector
+    upper: Vector
+    speed: Vector
+    acceleration: Vector
+    effort: Vector
+
+
+class RobotFacts:
+    """The facts about a compiled robot. n joints, l base parameters."""
+
+    def __init__(self, interface: Interface) -> None:
+        self._interface = interface
+
+    @property
+    def name(self) -> str:
+        """The robot's name in C, the prefix of its functions there."""
+        return self._interface.robot
+
+    @property
+    def n(self) -> int:
+        """Number of joints that follow no other."""
+        return self._interface.n
+
+    @property
+    def nq(self) -> int:
+        """Length of q."""
+        return self._interface.nq
+
+    @property
+    def nv(self) -> int:
+        """Length of qd, qdd and tau."""
+        return self._interface.nv
+
+    @property
+    def l(self) -> int:  # noqa: E743  the paper's letter
+        """Number of base parameters."""
+        return self._interface.l
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """n names, from base to tip."""
+        return self._interface.joint_names
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of the frames that kinematic functions are about."""
+        return self._interface.frame_names
+
+    @property
+    def dtype(self) -> np.dtype[np.float64] | np.dtype[np.float32]:
+        """Of all results."""
+        single, double = np.dtype(np.float32), np.dtype(np.float64)
+        return single if self._interface.dtype == "float32" else double
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """Names of the functions that are compiled, without the variants that take theta_b."""
+        return tuple(name for name in self._interface.kernels if not name.endswith("_theta"))
+
+    @cached_property
+    def limits(self) -> JointLimits:
+        """The joints' limits, as the robot's file has them; nothing holds states to them."""
+        columns = np.array(self._interface.limits, np.float64).T
+        return JointLimits(*(_frozen(column) for column in columns))
+
+    @cached_property
+    def gravity_acceleration(self) -> Vector:
+        """(3,) m/s^2 in the base frame, compiled in; `gravity(q)` are the torques against it."""
+        return _frozen(self._interface.gravity)
+
+    @cached_property
+    def theta_b(self) -> Vector | None:
+        """(l,) base parameters compiled in, SI; None where they were unknown, so that functions want them given."""
+        values = self._interface.theta_b
+        return None if values is None else _frozen(values)
+
+    def __repr__(self) -> str:
+        return "\n  ".join([self._title, *self._facts()])
+
+    def _repr_html_(self) -> str:
+        facts = "".join(f"<li>{escape(fact)}</li>" for fact in self._facts())
+        return f"<div><p><b>{escape(self._title)}</b></p><ul>{facts}</ul></div>"
+
+    @property
+    def _title(self) -> str:
+        return f"CompiledRobot {self.name!r}: {self.n} joints, {self._interface.dtype}"
+
+    def _facts(self) -> list[str]:
+        lengths = [] if self.nq == self.nv == self.n else [f"nq = {self.nq}, nv = {self.nv}"]
+        gravity = " ".join(f"{value:g}" for value in self._interface.gravity)
+        compiled_in = "given in calls" if self._interface.theta_b is None else "compiled in"
+        return [
+            f"joints: {_listed(map(repr, self.joint_names))}",
+            *lengths,
+            f"gravity: {gravity} m/s^2 in the base frame",
+            f"l = {self.l} base parameters, {compiled_in}",
+            f"functions: {_listed(self.functions)}",
+        ]
+
+
+def _listed(names: Iterable[str]) -> str:
+    found = tuple(names)
+    more = len(found) - MOST_NAMES
+    return ", ".join(found[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _frozen(values: object) -> Vector:
+    array = np.array(values, np.float64)
+    array.setflags(write=False)
+    return array
