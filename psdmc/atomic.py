@@ -155,6 +155,27 @@ def lock(handle: int, wait: bool = True) -> bool:
     return True
 
 
+def can_lock(handle: int) -> bool:
+    """Whether files of this handle's file system can be locked at all: another process may hold this one."""
+    if sys.platform == "win32":
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    fcntl.flock(handle, fcntl.LOCK_UN)
+    return True
+
+
+def unlock(handle: int) -> None:
+    """Give a lock back, also for processes that were forked meanwhile and have the handle, too."""
+    if sys.platform != "win32":
+        with contextlib.suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_UN)
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files of processes that have ended, no other files; errors are ignored."""
     with contextlib.suppress(OSError):

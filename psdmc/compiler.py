@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
+from weakref import WeakValueDictionary
 
 from psdmc.emit.adapters import chosen, with_needed
 from psdmc.emit.info import package_info
@@ -25,7 +27,8 @@ from psdmc.errors import InputError
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.load import model_of
+from psdmc.model.load import load_bytes, model_of
+from psdmc.model.store import file_bytes
 from psdmc.progress import Progress, silent
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.target.native import NATIVE
@@ -34,6 +37,7 @@ from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.kept_kernels import lowered_once
 from psdmc.toolchain.kept_libraries import compiled_once
+from psdmc.toolchain.origin import Origin
 
 if TYPE_CHECKING:
     import numpy as np
@@ -217,26 +221,86 @@ def compile(
     Other options as of `emit_c`. Raises InputError for a target without functions for many states, which Python calls;
     ToolchainError for a target that the compiler does not know or this machine's CPU cannot run.
     """
-    model = model_of(model)
-    options = _options(lowering, real, trig, target)
-    machine = options.target
-    if not machine.has_batches:
-        raise InputError(
-            f"target {machine.name} has no functions for many states, which Python calls",
-            "emit a package for it: psdmc emit-c --target",
+    found = model_of(model)
+    names = (functions,) if isinstance(functions, str) else functions
+    kept = None if names is None else tuple(names)
+    chosen_names = wanted(kept, found.mechanism)
+    request = _Request(found, found.content_hash, chosen_names, lowering, kept, real, trig, target)
+    return request.compiled(progress)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Request:
+    """The arguments of `compile`: in the place of a compiled robot they go to other processes, which open the library from
+    their cache or compile it.
+
+    model       the model, or its file's content, which is read only where there is something to compile
+    model_hash  the model's content hash
+    names       of the functions to compile at once
+    """
+
+    model: DynamicsModel | bytes
+    model_hash: str
+    names: tuple[str, ...]
+    lowering: Lowering
+    functions: tuple[str, ...] | None
+    real: Real | None
+    trig: Trig | None
+    target: str | Target
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        filed = self.model if isinstance(self.model, bytes) else file_bytes(self.model)
+        others = (self.lowering, self.functions, self.real, self.trig, self.target)
+        return _Request, (filed, self.model_hash, self.names, *others)
+
+    @property
+    def key(self) -> str:
+        """The same for equal requests."""
+        parts = (self.model_hash, self.lowering, self.functions, self.real, self.trig, self.target)
+        return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+    def compiled(self, progress: Progress = silent) -> CompiledRobot[Any]:
+        """The robot that was asked for."""
+        options = _options(self.lowering, self.real, self.trig, self.target)
+        machine = options.target
+        if not machine.has_batches:
+            raise InputError(
+                f"target {machine.name} has no functions for many states, which Python calls",
+                "emit a package for it: psdmc emit-c --target",
+            )
+
+        def make() -> PackageView:
+            package = _package(self.opened(), self.lowering, self.functions, options, None, progress)
+            progress("compiling")
+            return package
+
+        parts = (self.model_hash, self.lowering, options.real, options.trig, *self.names)
+
+        def more(function: str) -> CompiledRobot[Any]:
+            return replace(self, functions=(function,), names=wanted((function,))).compiled(progress)
+
+        interface, library = compiled_once(parts, make, machine)
+        origin = Origin(_again, self, self.key)
+        robot: CompiledRobot[Any] = CompiledRobot(
+            interface, library, more if self.functions is None else None, origin
         )
+        _ROBOTS[self.key] = robot
+        return robot
 
-    def make() -> PackageView:
-        package = _package(model, lowering, functions, options, None, progress)
-        progress("compiling")
-        return package
+    def opened(self) -> DynamicsModel:
+        """The model."""
+        if isinstance(self.model, bytes):
+            return load_bytes(self.model, Path("(model of a pickled robot)"))
+        return self.model
 
-    parts = (model.content_hash, lowering, options.real, options.trig, *wanted(functions, model.mechanism))
 
-    def more(function: str) -> CompiledRobot[Any]:
-        return compile(model, lowering, [function], real, trig, progress, target)
+_ROBOTS: WeakValueDictionary[str, CompiledRobot[Any]] = WeakValueDictionary()
+"""Robots of this process by their requests' keys: what comes from another process is compared with them first."""
 
-    return CompiledRobot(*compiled_once(parts, make, machine), more if functions is None else None)
+
+def _again(request: _Request) -> CompiledRobot[Any]:
+    """The robot of a request that was pickled, here or in another process."""
+    return _ROBOTS.get(request.key) or request.compiled()
 
 
 def _package(

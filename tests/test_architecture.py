@@ -48,7 +48,7 @@ OUTSIDE = {
     "functions": {"numpy", "pinocchio"},
     "lower": {"numpy", "scipy"},
     "emit": {"jinja2", "numpy"},
-    "toolchain": {"cffi", "numpy"},
+    "toolchain": {"cffi", "numpy", "dask", "xarray"},
     "bench": {
         "numpy",
         "scipy",

@@ -15,7 +15,7 @@ from psdmc.model import equations, evaluate, glance, payload, recursive, store, 
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array, made_again
 from psdmc.robot.zeros import leading_rows
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ class DynamicsModel:
     mechanism: Mechanism
     certificate: Array
     provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    __reduce__ = made_again
 
     def __post_init__(self) -> None:
         n, l = len(self.mechanism), np.asarray(self.B).shape[0]

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.robot.mechanism import made_again
+
 if TYPE_CHECKING:
     from scipy import sparse
 
@@ -66,6 +68,8 @@ class Expansion:
     entries: Entries
     l: int
     _matrices: list[sparse.csr_array] = field(default_factory=list, init=False, repr=False)
+
+    __reduce__ = made_again
 
     def __post_init__(self) -> None:
         exponents = np.array(self.E, dtype=np.uint8, order="C")

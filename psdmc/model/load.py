@@ -52,8 +52,13 @@ def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
 def load(path: str | Path) -> DynamicsModel:
     """The model in a file; InputError where it is missing, damaged, forged, foreign or of a newer psdmc."""
     source = Path(path)
+    return load_bytes(_bytes_of(source), source)
+
+
+def load_bytes(data: bytes, source: Path) -> DynamicsModel:
+    """The model in a file's content; InputError, which names the file, as `load`."""
     try:
-        arrays, manifest = _read(source)
+        arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):
             raise BrokenArchiveError("its content does not match its hash")
         return model_from(arrays, _migrated(manifest))
@@ -63,9 +68,8 @@ def load(path: str | Path) -> DynamicsModel:
         raise _damaged(source, f"its parts do not fit together ({error})") from error
 
 
-def _read(source: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+def _read(data: bytes, source: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Arrays and manifest; the manifest is psdmc's and not of a newer schema."""
-    data = _bytes_of(source)
     try:
         archive = opened(data)
         manifest = json.loads(_manifest_text(archive, len(data)))

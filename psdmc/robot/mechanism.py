@@ -14,6 +14,7 @@ from psdmc.robot.joints import JointType
 from psdmc.robot.placement import Array as Array
 from psdmc.robot.placement import Placement as Placement
 from psdmc.robot.placement import frozen_array as frozen_array
+from psdmc.robot.placement import made_again as made_again
 
 PARAMETER_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz", "Im")
 """Standard parameters of one link, in the order of x; about the link frame, Im the joint's drive inertia."""
@@ -109,6 +110,8 @@ class Mechanism:
     tip_body: int = BASE
     coordinates: tuple[Coordinate, ...] = ()
     frames: tuple[NamedFrame, ...] = ()
+
+    __reduce__ = made_again
 
     def __post_init__(self) -> None:
         n = len(self.joints)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,11 @@ def frozen_array(values: object, shape: tuple[int, ...], what: str) -> Array:
     return array
 
 
+def made_again(value: Any) -> tuple[type[Any], tuple[Any, ...]]:
+    """For `__reduce__` of a dataclass: pickle and copy call its constructor, so that its arrays are read-only there, too."""
+    return type(value), tuple(getattr(value, field.name) for field in fields(value) if field.init)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
     """Where a frame sits in another: x_outer = rotation @ x_inner + translation.
@@ -31,6 +37,8 @@ class Placement:
 
     rotation: Array
     translation: Array
+
+    __reduce__ = made_again
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3), "rotation"))

@@ -2,8 +2,8 @@
 
 The key covers everything that the binary depends on: sources, flags, compiler, CPU features, psdmc's version and the
 platform. An entry is used while its files have the digests that they were sealed with, and is built again otherwise.
-Two processes may build the same entry: each builds in a folder of its own and renames it into place; the later one uses
-the earlier one's.
+Who comes while an entry is built waits and uses it. Each builds in a folder of its own and renames it into place, so that
+where files cannot be locked two may build the same entry: the later one uses the earlier one's.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from psdmc.errors import ToolchainError
 from psdmc.toolchain.cache_entry import is_sound, seal, touch
 from psdmc.toolchain.cache_place import cache_limit, open_cache, unusable
 from psdmc.toolchain.cache_room import hold, make_room, new_folder, remove, sweep
+from psdmc.toolchain.cache_turns import turn
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
@@ -49,7 +50,11 @@ def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()
     limit = cache_limit()
     try:
         sweep(place)
-        _build(place, final, build, products)
+        with turn(place, key):
+            if is_sound(final):  # made by another process meanwhile
+                touch(final)
+                return final
+            _build(place, final, build, products)
         make_room(place, final, limit)
     except OSError as error:
         raise unusable(place, error) from error

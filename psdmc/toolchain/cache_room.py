@@ -22,8 +22,9 @@ IN_USE = 600.0
 """Seconds after its last use during which an entry is kept whatever the limit: a process may be about to open it."""
 
 _KEY = re.compile(r"[0-9a-z]{64}")
-_PASSING = re.compile(r"\.(build|gone)-[0-9a-f]{16}|\.[0-9a-z]{16}-[0-9a-z_]{8}")
-"""Folders of builds under way and of entries being removed; the last form is that of psdmc 0.1."""
+_PASSING = re.compile(r"\.(build|gone|turn)-[0-9a-z]{16}|\.[0-9a-z]{16}-[0-9a-z_]{8}")
+"""Folders of builds under way and of entries being removed, files that say whose turn it is to
+build; the last form is that of psdmc 0.1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,11 +132,18 @@ def _entries(place: Path) -> list[tuple[float, int, Path]]:
     return known
 
 
+def _removed(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
 def _remove_if_dead(folder: Path) -> None:
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
         try:
             if lock(handle, wait=False):
-                shutil.rmtree(folder, ignore_errors=True)
+                _removed(folder)
         finally:
             os.close(handle)

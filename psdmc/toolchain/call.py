@@ -18,6 +18,7 @@ from psdmc.program.signature import Q, Signature
 from psdmc.toolchain.compiled_functions import CompiledFunctions, results
 from psdmc.toolchain.direct_calls import MOST_ARRAYS, MOST_UNITS, direct_calls
 from psdmc.toolchain.interface import Interface
+from psdmc.toolchain.origin import Origin
 from psdmc.toolchain.stubs import arguments, documentation
 
 
@@ -34,9 +35,13 @@ class CompiledRobot(CompiledFunctions):
     """
 
     def __init__(
-        self, interface: Interface, library: Path, more: Callable[[str], CompiledFunctions] | None = None
+        self,
+        interface: Interface,
+        library: Path,
+        more: Callable[[str], CompiledFunctions] | None = None,
+        origin: Origin | None = None,
     ) -> None:
-        super().__init__(interface, library, more)
+        super().__init__(interface, library, more, origin)
         self._bind(self)
 
     def _bind(self, compiled: CompiledFunctions) -> None:
@@ -62,7 +67,6 @@ class CompiledRobot(CompiledFunctions):
 
     __class_getitem__ = classmethod(GenericAlias)
     """For annotations such as CompiledRobot[np.float32]; call.pyi says what the argument is."""
-
 
     def _units_of(self, function: Signature) -> tuple[tuple[int, int, int], ...]:
         """Parts of inputs that must be of length one: the input's number, from an entry to before another."""

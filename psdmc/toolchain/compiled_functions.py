@@ -8,18 +8,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import cffi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
-from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.program.signature import WORDS, Q, Quantity, Signature
 from psdmc.real_arrays import real_array
 from psdmc.robot.unit_lengths import refuse_other_lengths
 from psdmc.toolchain import given_outputs
 from psdmc.toolchain.interface import Interface, batch_symbol
+from psdmc.toolchain.labelled_arrays import by_names, in_chunks, is_labelled, is_lazy
+from psdmc.toolchain.origin import Origin
 from psdmc.toolchain.robot_facts import RobotFacts
 from psdmc.toolchain.stubs import result_name
 
@@ -29,12 +31,17 @@ Array = NDArray[Any]
 class CompiledFunctions(RobotFacts):
     """The library of a compiled package, called by a function's signature.
 
-    more  compiles one function that the package does not have, by name, when it is first called; None: such a call is an
-          error
+    more    compiles one function that the package does not have, by name, when it is first called; None: such a call is
+            an error
+    origin  how another process has the same; None: it cannot be pickled
     """
 
     def __init__(
-        self, interface: Interface, library: Path, more: Callable[[str], CompiledFunctions] | None = None
+        self,
+        interface: Interface,
+        library: Path,
+        more: Callable[[str], CompiledFunctions] | None = None,
+        origin: Origin | None = None,
     ) -> None:
         super().__init__(interface)
         self._ffi = cffi.FFI()
@@ -49,7 +56,25 @@ class CompiledFunctions(RobotFacts):
         self._patterns = dict(interface.patterns)
         self.library = library
         self._more = more
+        self._origin = origin
         self._others: list[CompiledFunctions] = []  # whose libraries stay open as long as this one's
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What pickle keeps: the request that the robot was compiled for, its model included, no machine code."""
+        if self._origin is None:
+            raise TypeError(f"{self.name}: only robots from psdmc.compile can be pickled")
+        return self._origin.again, (self._origin.request,)
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Itself: nothing about a compiled robot can be changed."""
+        return self
+
+    def __dask_tokenize__(self) -> tuple[str, str]:
+        """By which Dask knows equal robots."""
+        return ("psdmc.CompiledRobot", self._origin.key if self._origin else str(self.library))
 
     def call(
         self,
@@ -62,6 +87,8 @@ class CompiledFunctions(RobotFacts):
 
         out  the array, or tuple of arrays, that results are written to and that is returned; None: new ones
         """
+        if any(is_labelled(given) or is_lazy(given) for given in inputs):
+            return self._foreign(function, inputs, theta_b, out)
         name = function.name
         kernel = self._kernel(name if theta_b is None else f"{name}_theta")
         arrays = [self._states(name, q, x) for q, x in zip(function.inputs, inputs, strict=True)]
@@ -95,6 +122,21 @@ class CompiledFunctions(RobotFacts):
             )
         rows, columns = np.array(self._patterns[name], dtype=np.intp).reshape(-1, 2).T
         return rows, columns
+
+    def _foreign(
+        self, function: Signature, inputs: Sequence[Any], theta_b: ArrayLike | None, out: Any
+    ) -> Any:
+        """The outputs as Dask's or xarray's arrays, as the inputs are."""
+        if out is not None:
+            raise InputError(f"{function.name}: out is for NumPy arrays", "leave it out")
+        self._kernel(function.name if theta_b is None else f"{function.name}_theta")
+        call = OnArrays(self, function.name, theta_b)
+        if any(map(is_labelled, inputs)):
+            found: tuple[Any, ...] = by_names(call, self, function, inputs)
+        else:
+            shapes = {word: getattr(self._sizes, word) for word in WORDS}
+            found = in_chunks(call, function, shapes, inputs, self._dtype)
+        return found[0] if len(found) == 1 else results(function)(*found)
 
     def _kernel(self, name: str) -> _Kernel:
         found = self._kernels.get(name)
@@ -176,6 +218,19 @@ class CompiledFunctions(RobotFacts):
 
     def _address(self, array: Array) -> Any:
         return self._ffi.from_buffer(self._pointer, array)
+
+
+@dataclass(frozen=True, slots=True)
+class OnArrays:
+    """A function of a robot, with theta_b where it is given, that goes to other processes with it."""
+
+    robot: CompiledFunctions
+    function: str
+    theta_b: ArrayLike | None
+
+    def __call__(self, *arrays: Any) -> Any:
+        parameters = {} if self.theta_b is None else {"theta_b": self.theta_b}
+        return getattr(self.robot, self.function)(*arrays, **parameters)
 
 
 def _opened(ffi: cffi.FFI, library: Path, robot: str) -> Any:

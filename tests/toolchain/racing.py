@@ -10,9 +10,11 @@ from psdmc.toolchain.cache import cached
 
 
 def race(barrier: Barrier, log: str, number: int) -> None:
-    """Build for one key at the same moment as all others, slowly, and note whose build won."""
+    """Build for one key at the same moment as all others, slowly, and note who built and whose build won."""
 
     def build(folder: Path) -> None:
+        with open(f"{log}-builds", "a", encoding="utf-8") as stream:
+            stream.write(f"{number}\n")
         time.sleep(0.2)
         (folder / "who").write_text(str(number))
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
+import multiprocessing.process
 import os
+import shutil
+import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -80,6 +84,72 @@ def test_processes_that_race_all_get_the_same_result(fresh_cache: Path, tmp_path
     assert len(winners) == 3
     assert len(set(winners)) == 1
     assert [path.name for path in fresh_cache.iterdir()] == ["r" * 64]
+    assert len((tmp_path / "log-builds").read_text().split()) == 1, "the others wait"
+
+
+def written(folder: Path) -> None:
+    (folder / "who").write_text("anybody")
+
+
+def test_threads_that_race_build_once(fresh_cache: Path) -> None:
+    built: list[Path] = []
+
+    def build(folder: Path) -> None:
+        built.append(folder)
+        time.sleep(0.1)
+        (folder / "who").write_text("one")
+
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda _: cached("t" * 64, build), range(4)))
+    assert len(built) == 1
+    assert found == [fresh_cache / ("t" * 64)] * 4
+
+
+def test_after_a_build_that_failed_the_next_one_builds(fresh_cache: Path) -> None:
+    tries: list[Path] = []
+
+    def build(folder: Path) -> None:
+        tries.append(folder)
+        time.sleep(0.05)
+        if len(tries) == 1:
+            raise ToolchainError("no")
+        (folder / "who").write_text("two")
+
+    with ThreadPoolExecutor(2) as pool:
+        both = [pool.submit(cached, "f" * 64, build) for _ in range(2)]
+    assert sorted(type(each.exception()).__name__ for each in both) == ["NoneType", "ToolchainError"]
+    assert [path.name for path in fresh_cache.iterdir()] == ["f" * 64]
+
+
+def test_nobody_waits_for_a_process_that_was_forked_during_a_build(fresh_cache: Path) -> None:
+    """It has a copy of the lock's handle and lives on."""
+    context = multiprocessing.get_context("fork")
+    idle = context.Event()
+
+    def build(folder: Path) -> None:
+        child = context.Process(target=idle.wait, daemon=True)
+        child.start()
+        children.append(child)
+        (folder / "who").write_text("one")
+
+    children: list[multiprocessing.process.BaseProcess] = []
+    try:
+        cached("a" * 64, build)
+        shutil.rmtree(fresh_cache / ("a" * 64))
+        begin = time.monotonic()
+        cached("a" * 64, written)
+        assert time.monotonic() - begin < 5.0
+    finally:
+        idle.set()
+        for child in children:
+            child.join(10)
+
+
+def test_a_turn_that_a_killed_process_left_is_swept(fresh_cache: Path) -> None:
+    fresh_cache.mkdir(mode=0o700, exist_ok=True)
+    (fresh_cache / f".turn-{'b' * 16}").touch()
+    cached("c" * 64, written)
+    assert [path.name for path in fresh_cache.iterdir()] == ["c" * 64]
 
 
 def test_a_cache_that_cannot_be_written_is_one_clear_error(

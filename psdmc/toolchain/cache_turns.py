@@ -1,0 +1,42 @@
+"""One builder at a time for each entry of the compile cache: others wait for it and use what it made."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from psdmc.atomic import can_lock, lock, unlock
+
+LONGEST = 600.0
+"""Seconds that one waits for another process: as long as a run of the compiler may take. Then one builds beside it."""
+BETWEEN = 0.02
+"""Seconds between two looks."""
+
+
+@contextlib.contextmanager
+def turn(place: Path, key: str) -> Iterator[None]:
+    """Hold the only right to build an entry, waiting for the process or thread that has it.
+
+    The lock is given back explicitly: a process that was forked meanwhile has a copy of the handle, which would keep it.
+    Where the file system cannot lock nobody waits.
+    """
+    path = place / f".turn-{key[:16]}"
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+    try:
+        _wait(handle)
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        unlock(handle)
+        os.close(handle)
+
+
+def _wait(handle: int) -> None:
+    if not can_lock(handle):
+        return
+    until = time.monotonic() + LONGEST
+    while not lock(handle, wait=False) and time.monotonic() < until:
+        time.sleep(BETWEEN)
