@@ -6,6 +6,7 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from psdmc.model import answers
 from psdmc.version import VERSION as __version__
 
 if TYPE_CHECKING:
@@ -57,6 +58,9 @@ if not TYPE_CHECKING:  # a type checker would take any name that there is none o
         found = getattr(import_module(_MODULES[name]), name)
         globals()[name] = found
         return found
+
+
+answers.provide(lambda: import_module("psdmc.model_functions").provider())
 
 
 def __dir__() -> list[str]:

@@ -26,6 +26,7 @@ MAY_IMPORT = {
     "emit": {"robot", "program", "model", "recipes", "functions", "target"},
     "toolchain": {"robot", "emit", "program", "functions", "target"},
 }
+MAY_IMPORT["model_functions"] = set(MAY_IMPORT) - {"derivation", "verification"}
 LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {
     "bench": LEFT_OF_TOOLS | {"lower"},
@@ -38,6 +39,7 @@ MAY_IMPORT |= {
 
 OUTSIDE = {
     "real_arrays": {"numpy"},
+    "model_functions": {"numpy"},
     "robot": {"numpy", "pinocchio", "defusedxml", "mujoco", "xacro"},
     "dynamics": {"numpy"},
     "model": {"numpy", "scipy", "pandas", "sympy"},

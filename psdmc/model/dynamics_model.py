@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError
 from psdmc.model import equations, evaluate, glance, payload, recursive, store, symbolic
+from psdmc.model.answers import Answers
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
@@ -26,10 +27,11 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DynamicsModel:
+class DynamicsModel(Answers):
     """Inverse dynamics as monomials times constants: tau[i] = y(state) @ P[i] @ theta_b.
 
-    n joints, p monomials, l base parameters.
+    n joints, p monomials, l base parameters. Functions that are not below, such as forward_dynamics, are those of compiled
+    robots (psdmc.functions), in NumPy.
 
     expansion    E and P; None where derived with --no-expand
     theta_b      (l,) float      base parameters, SI, units per entry; None while unknown
@@ -78,6 +80,11 @@ class DynamicsModel:
     @property
     def joint_names(self) -> tuple[str, ...]:
         return self.mechanism.joint_names
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of the frames that kinematic functions are about."""
+        return tuple(frame.name for frame in self.mechanism.frames)
 
     @property
     def n(self) -> int:

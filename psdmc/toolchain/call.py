@@ -5,7 +5,6 @@ Type checkers and editors read the methods' types from call.pyi, which `python -
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import GenericAlias, MethodType
@@ -15,11 +14,12 @@ import numpy as np
 
 from psdmc.functions import SIGNATURES
 from psdmc.program.signature import Q, Signature
+from psdmc.toolchain.call_arguments import bound_arguments, signature_of
 from psdmc.toolchain.compiled_functions import CompiledFunctions, results
 from psdmc.toolchain.direct_calls import MOST_ARRAYS, MOST_UNITS, direct_calls
 from psdmc.toolchain.interface import Interface
 from psdmc.toolchain.origin import Origin
-from psdmc.toolchain.stubs import arguments, documentation
+from psdmc.toolchain.stubs import documentation
 
 
 class CompiledRobot(CompiledFunctions):
@@ -81,34 +81,17 @@ def is_direct(function: Signature, units: Sequence[tuple[int, int]]) -> bool:
 
 
 def _method(function: Signature) -> Callable[..., Any]:
-    names = inspect.Signature(
-        [
-            inspect.Parameter(
-                name,
-                inspect.Parameter.POSITIONAL_OR_KEYWORD,
-                default=None if name == "theta_b" else inspect.Parameter.empty,
-            )
-            for name in ("self", *arguments(function))
-        ]
-        + [inspect.Parameter("out", inspect.Parameter.KEYWORD_ONLY, default=None)]
-    )
-
     count = len(function.inputs)
 
     def method(self: CompiledRobot, *given: Any, **named: Any) -> Any:
         if not named and len(given) == count:
             return self.call(function, given)
-        try:
-            bound = names.bind(self, *given, **named)
-        except TypeError as error:
-            raise TypeError(f"{function.name}(): {error}") from None
-        bound.apply_defaults()
-        _, *values, out = bound.arguments.values()
-        return self.call(function, values[:count], *values[count:], out=out)
+        inputs, theta_b, out = bound_arguments(function, given, named)
+        return self.call(function, inputs, theta_b, out)
 
     method.__name__, method.__doc__ = function.name, documentation(function)
     method.__qualname__ = f"{CompiledRobot.__name__}.{function.name}"
-    method.__signature__ = names  # type: ignore[attr-defined]
+    method.__signature__ = signature_of(function)  # type: ignore[attr-defined]
     return method
 
 

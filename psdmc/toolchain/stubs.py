@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from psdmc.functions import SIGNATURES
 from psdmc.program.signature import Quantity, Signature
 
 STUB = Path(__file__).with_name("call.pyi")
+MODEL = Path(__file__).parents[1] / "model"
+ANSWERS = MODEL / "answers.pyi"
 
 _HEAD = """# Written by python -m psdmc.toolchain.stubs from psdmc/functions.
 from typing import Generic, NamedTuple
@@ -21,6 +24,24 @@ from typing_extensions import TypeVar
 from psdmc.toolchain.compiled_functions import CompiledFunctions
 
 RealT = TypeVar("RealT", bound=np.floating, default=np.float64)
+"""
+
+
+_ANSWERS_HEAD = """# Written by python -m psdmc.toolchain.stubs from psdmc/functions.
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from psdmc.toolchain.call import (
+{imported})
+
+class Provider(NamedTuple):
+    names: Callable[[], Iterable[str]]
+    bound: Callable[[Any, str], Callable[..., Any]]
+
+def provide(provider: Callable[[], Provider]) -> None: ...
 """
 
 
@@ -63,11 +84,11 @@ def _results(function: Signature) -> list[str]:
     return [f"class {result_name(function)}(NamedTuple, Generic[RealT]):", *fields, ""]
 
 
-def _method(function: Signature) -> list[str]:
+def _method(function: Signature, with_out: bool = True) -> list[str]:
     given = [f"{quantity.name}: ArrayLike" for quantity in function.inputs]
     given += ["theta_b: ArrayLike | None = None"] if function.theta else []
     one = "NDArray[RealT] | None" if len(function.outputs) == 1 else "tuple[NDArray[RealT], ...] | None"
-    given += ["*", f"out: {one} = None"]
+    given += ["*", f"out: {one} = None"] if with_out else []
     returns = "NDArray" if len(function.outputs) == 1 else result_name(function)
     return [f"    def {function.name}(self, {', '.join(given)}) -> {returns}[RealT]: ..."]
 
@@ -76,5 +97,22 @@ def _shape(quantity: Quantity) -> str:
     return f"({', '.join(('...', *quantity.axes))})"
 
 
+def own_methods() -> set[str]:
+    """Names of the model's own methods. Its source is read: nothing here imports it."""
+    tree = ast.parse((MODEL / "dynamics_model.py").read_text(encoding="utf-8"))
+    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+def answers_stub(functions: Iterable[Signature]) -> str:
+    """The text of answers.pyi: what models answer besides their own methods."""
+    own = own_methods()
+    shown = [function for function in functions if function.name not in own]
+    several = sorted(result_name(function) for function in shown if len(function.outputs) > 1)
+    imported = "".join(f"    {name},\n" for name in several)
+    methods = [line.replace("[RealT]", "[np.float64]") for f in shown for line in _method(f, with_out=False)]
+    return "\n".join([_ANSWERS_HEAD.format(imported=imported), "class Answers:", *methods]) + "\n"
+
+
 if __name__ == "__main__":
     STUB.write_text(stub(SIGNATURES.values()), encoding="utf-8")
+    ANSWERS.write_text(answers_stub(SIGNATURES.values()), encoding="utf-8")

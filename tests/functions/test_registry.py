@@ -10,10 +10,11 @@ import pytest
 
 import psdmc.functions
 from psdmc.functions import DEFAULT, RECIPES, SIGNATURES
+from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.signature import WORDS
 from psdmc.recipes.recipe import Needs
 from psdmc.toolchain.call import CompiledRobot
-from psdmc.toolchain.stubs import STUB, stub
+from psdmc.toolchain.stubs import ANSWERS, STUB, answers_stub, own_methods, stub
 
 PACKAGE = Path(psdmc.functions.__file__).parents[1]
 
@@ -82,6 +83,8 @@ def test_every_function_is_a_method_with_its_arguments_and_meaning() -> None:
 def test_the_stub_is_what_the_signatures_say() -> None:
     """After a change: python -m psdmc.toolchain.stubs"""
     assert STUB.read_text(encoding="utf-8") == stub(SIGNATURES.values())
+    assert ANSWERS.read_text(encoding="utf-8") == answers_stub(SIGNATURES.values())
+    assert own_methods() & set(SIGNATURES) == set(SIGNATURES) & set(vars(DynamicsModel))
 
 
 def test_the_documents_table_has_every_function() -> None:

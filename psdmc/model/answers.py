@@ -1,0 +1,45 @@
+"""A model's functions beyond E, P and theta_b: those that compiled robots have, by the same names, in NumPy.
+
+Their arithmetic stands to the right of the model, which imports nothing that imports it: `psdmc` puts the answers in when
+it is imported. Type checkers read the methods from answers.pyi, which `python -m psdmc.toolchain.stubs` writes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+
+class Provider(NamedTuple):
+    """Where answers come from.
+
+    names  of all functions
+    bound  (model, name) -> the function of that model
+    """
+
+    names: Callable[[], Iterable[str]]
+    bound: Callable[[Any, str], Callable[..., Any]]
+
+
+_PROVIDERS: list[Callable[[], Provider]] = []
+
+
+def provide(provider: Callable[[], Provider]) -> None:
+    """Let models answer by what `provider` returns; it is called when a model is first asked."""
+    _PROVIDERS[:] = [provider]
+
+
+class Answers:
+    """The functions of compiled robots as methods."""
+
+    __slots__ = ()
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith("_") and _PROVIDERS:
+            provider = _PROVIDERS[0]()
+            if name in provider.names():
+                return provider.bound(self, name)
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(_PROVIDERS[0]().names() if _PROVIDERS else ())})

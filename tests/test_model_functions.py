@@ -1,0 +1,163 @@
+"""A model answers what a compiled robot answers: the same names, shapes, named tuples, refusals and NaN; Pinocchio's
+values."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bundled import bundled_model, bundled_robot
+
+import psdmc
+from psdmc.errors import InputError
+from psdmc.functions import RECIPES, SIGNATURES
+from psdmc.model.random_states import on_joints
+from psdmc.program.signature import Sizes
+from psdmc.robot.reference import reference
+
+RANDOM = np.random.default_rng(9)
+LIMIT = 1e-9
+"""Relative to each output's largest value: forward dynamics lose digits with the mass matrix's condition."""
+
+
+def states(name: str, *lead: int, robot: str = "scara") -> dict[str, np.ndarray]:
+    model = bundled_model(robot)
+    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.frame_names))
+    given = {
+        q.name: q.largest * RANDOM.uniform(-1.0, 1.0, (*lead, *sizes.shape(q.axes)))
+        for q in SIGNATURES[name].inputs
+    }
+    return given | {
+        "q": on_joints(model.mechanism, given["q"].reshape(-1, model.nq)).reshape(*lead, model.nq)
+    }
+
+
+def tuples(found: object) -> tuple[np.ndarray, ...]:
+    return found if isinstance(found, tuple) else (found,)
+
+
+@pytest.mark.parametrize("name", SIGNATURES)
+def test_every_function_has_pinocchios_values(name: str) -> None:
+    """Of the robot's file, read by Pinocchio itself."""
+    model, recipe = bundled_model("scara"), RECIPES[name]
+    given = states(name, 6)
+    if recipe.gradient or recipe.times_theta:
+        pytest.skip("Pinocchio has no such base parameters: compared times theta_b by psdmc check")
+    pinocchio = reference(bundled_robot("scara"))
+    if "tau" in given:
+        given["qdd"] = pinocchio.forward_dynamics(given["q"], given["qd"], given["tau"])
+    elif "qdd" in given:
+        given["tau"] = pinocchio.inverse_dynamics(given["q"], given["qd"], given["qdd"])
+    expected = recipe.pinocchio(pinocchio, given)
+
+    found = getattr(model, name)(*(given[q.name] for q in recipe.signature.inputs))
+
+    for output, values in zip(recipe.signature.outputs, tuples(found), strict=True):
+        scale = max(1e-3, float(np.abs(expected[output.name]).max()))
+        assert np.abs(values - expected[output.name].reshape(values.shape)).max() < 1e-6 * scale, output.name
+
+
+COMPILED = [
+    "forward_dynamics",
+    "coriolis_matrix",
+    "jacobian",
+    "forward_kinematics",
+    "regressor_slotine_li",
+    "mass_matrix_inverse",
+]
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return psdmc.compile(bundled_model("scara"), functions=COMPILED)
+
+
+@pytest.mark.parametrize("name", COMPILED)
+@pytest.mark.parametrize("lead", [(), (5,), (2, 3), (0,)], ids=str)
+def test_results_are_those_of_the_compiled_robot(robot, name: str, lead: tuple[int, ...]) -> None:
+    given = states(name, *lead).values()
+    found, expected = getattr(bundled_model("scara"), name)(*given), getattr(robot, name)(*given)
+    assert type(found) is type(expected)
+    for one, other in zip(tuples(found), tuples(expected), strict=True):
+        assert (one.shape, one.dtype) == (other.shape, other.dtype)
+        assert np.abs(one - other).max(initial=0.0) <= LIMIT * max(1.0, np.abs(other).max(initial=0.0))
+
+
+def test_states_broadcast_and_names_are_taken(robot) -> None:
+    model = bundled_model("scara")
+    q, qd, tau = RANDOM.normal(size=(3, 1, 4)), RANDOM.normal(size=(5, 4)), np.zeros(4)
+    assert model.forward_dynamics(q, qd, tau).shape == (3, 5, 4)
+    found = model.forward_dynamics(tau=tau, q=q, qd=qd)
+    assert np.allclose(found, robot.forward_dynamics(q, qd, tau), rtol=LIMIT, atol=LIMIT)
+
+
+def test_parameters_may_be_given(robot) -> None:
+    model = bundled_model("scara")
+    q, qd = RANDOM.normal(size=(2, 3, 4))
+    twice = 2.0 * model.theta_b
+    found = model.coriolis_matrix(q, qd, theta_b=twice)
+    assert np.allclose(found, robot.coriolis_matrix(q, qd, twice), rtol=LIMIT, atol=LIMIT)
+
+
+def test_states_without_solution_are_nan_and_leave_others_alone(robot) -> None:
+    """Parameters whose mass matrix is positive definite in some states alone."""
+    model = bundled_model("scara")
+    q, qd, tau = RANDOM.uniform(-2.0, 2.0, (3, 200, 4))
+    theta = model.theta_b * RANDOM.uniform(0.2, 1.8, (200, model.l))
+    for parameters in theta:
+        found, expected = (r.forward_dynamics(q, qd, tau, parameters) for r in (model, robot))
+        bad = np.isnan(expected).all(axis=1)
+        if 0 < bad.sum() < len(bad):
+            break
+    assert 0 < bad.sum() < len(bad), "the test wants both kinds of states"
+    assert np.array_equal(np.isnan(found).all(axis=1), bad)
+    with np.errstate(invalid="ignore"):
+        assert np.isfinite(found[~bad]).all()
+    broken = q.copy()
+    broken[3, 0] = np.nan
+    assert np.isnan(model.forward_dynamics(broken, qd, tau)[3]).all()
+    assert np.isfinite(np.delete(model.forward_dynamics(broken, qd, tau), 3, 0)).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: m.forward_dynamics(np.zeros(3), np.zeros(4), np.zeros(4)), r"forward_dynamics: q has shape \(3,\)"),
+        (lambda m: m.jacobian(1.0), r"jacobian: q has shape \(\)"),
+        (lambda m: m.jacobian(np.zeros(4, complex)), "jacobian: q has dtype complex128"),
+        (lambda m: m.coriolis_matrix(np.zeros((3, 4)), np.zeros((2, 4))), r"do not broadcast: q \(3, 4\), qd \(2, 4\)"),
+        (lambda m: m.coriolis_matrix(np.zeros(4), np.zeros(4), [1.0]), r"theta_b has shape \(1,\), expected \(8,\)"),
+        (lambda m: m.jacobian(np.zeros(4), out=np.zeros((6, 4))), "out is for compiled robots"),
+    ],
+)  # fmt: skip
+def test_wrong_input_is_refused_as_by_compiled_robots(call, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call(bundled_model("scara"))
+
+
+def test_what_a_model_cannot_have_is_refused_with_the_reason() -> None:
+    unknown = replace(bundled_model("scara"), theta_b=None)
+    with pytest.raises(InputError, match="base parameters of 'scara' are unknown"):
+        unknown.forward_dynamics(*np.zeros((3, 4)))
+    assert unknown.jacobian(np.zeros(4)).shape == (6, 4)
+    upside_down = replace(bundled_model("scara"), theta_b=-bundled_model("scara").theta_b)
+    with pytest.raises(InputError, match=r"no forward_dynamics: .*not positive definite"):
+        upside_down.forward_dynamics(*np.zeros((3, 4)))
+
+
+def test_a_misspelt_name_is_an_attribute_error() -> None:
+    model = bundled_model("scara")
+    with pytest.raises(AttributeError, match="'DynamicsModel' object has no attribute 'jacobean'"):
+        model.jacobean  # noqa: B018
+    assert not hasattr(model, "_repr_png_")
+    assert copy.copy(model).content_hash == model.content_hash
+
+
+def test_editors_see_them() -> None:
+    model = bundled_model("scara")
+    assert set(SIGNATURES) <= set(dir(model))
+    assert str(inspect.signature(model.forward_dynamics)) == "(q, qd, tau, theta_b=None, *, out=None)"
+    assert "Returns qdd (..., nv)" in model.forward_dynamics.__doc__
