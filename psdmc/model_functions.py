@@ -16,13 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.lower.admitted import require
+from psdmc.lower.kernels import refuse_wide
 from psdmc.model.answers import Provider
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.program.signature import QDD, TAU, Q, Signature, Sizes
+from psdmc.program.signature import QD, QDD, TAU, Q, Signature, Sizes
 from psdmc.real_arrays import real_array
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.mechanism import Array
+from psdmc.robot.unit_lengths import refuse_other_lengths, units_of
 from psdmc.toolchain.call_arguments import bound_arguments, signature_of
 from psdmc.toolchain.compiled_functions import results
 from psdmc.toolchain.stubs import documentation
@@ -63,8 +65,8 @@ def evaluated(
     signature = recipe.signature
     sizes = _sizes(model)
     lead, given = _states(signature, sizes, inputs)
-    if theta_b is None:
-        _admit(model, recipe.name)
+    _refuse_other_lengths(model, signature, given)
+    _admit(model, recipe.name, theta_b is None)
     theta = _parameters(model, signature, theta_b)
     robot = RobotOnArrays.of(model, theta)
     found = _values(recipe, robot, given, sizes)
@@ -72,10 +74,22 @@ def evaluated(
     return outputs[0] if len(outputs) == 1 else results(signature)(*outputs)
 
 
-@lru_cache(KEPT * len(RECIPES))
-def _admit(model: DynamicsModel, name: str) -> None:
+@lru_cache(2 * KEPT * len(RECIPES))
+def _admit(model: DynamicsModel, name: str, with_own_parameters: bool) -> None:
     """InputError where the model cannot have a function."""
-    require(model, [name])
+    if with_own_parameters:
+        require(model, [name])
+    else:
+        refuse_wide(model, (name,))
+
+
+def _refuse_other_lengths(model: DynamicsModel, signature: Signature, given: Mapping[str, Array]) -> None:
+    """InputError where a quaternion, or a cosine with its sine, is not of length one."""
+    robot = model.mechanism
+    units = units_of(robot.joints[i].type for i in robot.own_joints)
+    for quantity in signature.inputs:
+        if quantity.axes == Q.axes and not signature.normalizes:
+            refuse_other_lengths(f"{signature.name}: {quantity.name}", given[quantity.name], units)
 
 
 def _sizes(model: DynamicsModel) -> Sizes:
@@ -127,8 +141,10 @@ def _values(
     recipe: Recipe, robot: RobotOnArrays, given: Mapping[str, Array], sizes: Sizes
 ) -> Mapping[str, Array]:
     """All outputs, (k, ...); NaN in states whose mass matrix is not positive definite, where the function solves it."""
+    count = len(next(iter(given.values()), (None,)))
+    zeros = {quantity.name: np.zeros((count, *sizes.shape(quantity.axes))) for quantity in (Q, QD, QDD)}
     if recipe.signature.positive is None:
-        return recipe.reference(robot, given)
+        return recipe.reference(robot, zeros | dict(given))  # references take shapes from any of the three
     solvable = _solvable(robot, given[Q.name])
     chosen = {name: values[solvable] for name, values in given.items()}
     if TAU.name in chosen and QDD.name not in chosen:

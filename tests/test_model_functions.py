@@ -30,9 +30,11 @@ def states(name: str, *lead: int, robot: str = "scara") -> dict[str, np.ndarray]
         q.name: q.largest * RANDOM.uniform(-1.0, 1.0, (*lead, *sizes.shape(q.axes)))
         for q in SIGNATURES[name].inputs
     }
-    return given | {
-        "q": on_joints(model.mechanism, given["q"].reshape(-1, model.nq)).reshape(*lead, model.nq)
-    }
+    for q in SIGNATURES[name].inputs:
+        if q.axes == ("nq",):
+            rows = on_joints(model.mechanism, given[q.name].reshape(-1, model.nq))
+            given[q.name] = rows.reshape(*lead, model.nq)
+    return given
 
 
 def tuples(found: object) -> tuple[np.ndarray, ...]:
@@ -51,7 +53,7 @@ def test_every_function_has_pinocchios_values(name: str) -> None:
         given["qdd"] = pinocchio.forward_dynamics(given["q"], given["qd"], given["tau"])
     elif "qdd" in given:
         given["tau"] = pinocchio.inverse_dynamics(given["q"], given["qd"], given["qdd"])
-    expected = recipe.pinocchio(pinocchio, given)
+    expected = recipe.pinocchio(pinocchio, {"q": np.zeros((1, model.nq))} | given)
 
     found = getattr(model, name)(*(given[q.name] for q in recipe.signature.inputs))
 

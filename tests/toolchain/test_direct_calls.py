@@ -13,9 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled import robot_path
 from traced import N, arm_kernels, arm_package, arm_references
-from unoptimised import compiled
+from unoptimised import compiled, without_optimisation
 
+import psdmc
 from psdmc.emit.options import EmitOptions
 from psdmc.errors import InputError
 from psdmc.toolchain import direct_calls as module
@@ -297,3 +299,28 @@ def test_the_module_is_kept_and_sealed_like_any_library(compile_cache: Path) -> 
     library.write_bytes(good[: len(good) // 2])
     assert module._library(Path(sysconfig.get_path("include"))).read_bytes()[:4] == b"\x7fELF"
     assert len(library.read_bytes()) > len(good) // 2
+
+
+@pytest.fixture(scope="module")
+def floating() -> CompiledRobot:
+    with without_optimisation():
+        model = psdmc.derive(robot_path("rounded_arm"), floating=True)
+        return psdmc.compile(model, functions=["gravity", "difference"])
+
+
+def test_quaternions_of_length_one_are_direct_and_others_refused_as_ever(floating: CompiledRobot) -> None:
+    q = np.concatenate(
+        [RANDOM.normal(size=(5, 3)), [[0.0, 0.6, 0.0, 0.8]] * 5, RANDOM.normal(size=(5, floating.nq - 7))], 1
+    )
+    assert is_direct(floating.gravity)
+    assert np.array_equal(floating.gravity(q), slow(floating, "gravity")(q))
+    assert np.array_equal(floating.difference(q, q[::-1].copy()), slow(floating, "difference")(q, q[::-1]))
+    q[3, 3:7] *= 1.0 + 1e-5
+    for call in (floating.gravity, slow(floating, "gravity")):
+        with pytest.raises(InputError, match=r"gravity: q\[3:7\] of row 3 has length 1\.00001"):
+            call(q)
+    for bad in (np.nan, np.inf, 0.0):
+        with pytest.raises(InputError, match=r"gravity: q\[3:7\] has length"):
+            floating.gravity(np.where(np.arange(floating.nq) == 6, bad, q[0]))
+    with pytest.raises(InputError, match="difference: "):
+        floating.difference(q[0], q[3])
