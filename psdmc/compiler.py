@@ -21,6 +21,7 @@ from psdmc.emit.adapters import chosen, with_needed
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_files, package_view
+from psdmc.emit.reference_load import reference_load
 from psdmc.emit.reference_states import reference_states
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError
@@ -322,7 +323,10 @@ def _package(
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
     info = package_info(model, name, shown, payload)
-    return package_view(info, kernels, options, reference_states(model, names), adapters)
+    references = reference_states(model, names)
+    if payload:
+        references = replace(references, load=reference_load(model))
+    return package_view(info, kernels, options, references, adapters)
 
 
 def _options(

@@ -22,7 +22,7 @@ from psdmc.emit.reals import check_range
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.references import ReferenceView, reference_view
 from psdmc.emit.render import render
-from psdmc.emit.self_test import GivenVector, SelfCheck, given_vectors, labels, self_checks
+from psdmc.emit.self_test import TOLERANCES, GivenVector, SelfCheck, given_vectors, labels, self_checks
 from psdmc.emit.tables import Table, number, tables
 from psdmc.emit.trig import (
     ScalarTrig,
@@ -209,7 +209,13 @@ class PackageView:
     @property
     def checked_kernels(self) -> int:
         """Number of kernels whose values are compared."""
-        return len({check.kernel for check in self.self_checks if check.expected})
+        loads = 0 if self.references is None or self.references.load is None else len(self.payload_prototypes)
+        return len({check.kernel for check in self.self_checks if check.expected}) + loads
+
+    @property
+    def load_tolerance(self) -> str:
+        """Of the functions that add loads."""
+        return TOLERANCES[self.options.real]
 
     @property
     def given_vectors(self) -> tuple[GivenVector, ...]:

@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.emit.reference_load import ReferenceLoad
 from psdmc.functions import DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
@@ -48,6 +49,7 @@ class ReferenceStates:
     expected  Signature.label of an output (a kernel's name, where it has one) -> (k, its size), matrices row by row
     theta_b   (l,) the run-time parameters of the _theta kernels; not the robot's own, so that the test notices a kernel
               that ignores them
+    load      what a load adds to theta_b, where the package has functions that add loads
 
     Where M(q) is not positive definite at the states, forward dynamics has no entry.
     """
@@ -55,6 +57,7 @@ class ReferenceStates:
     given: Mapping[str, Array]
     expected: Mapping[str, Array]
     theta_b: Array
+    load: ReferenceLoad | None = None
 
     def __post_init__(self) -> None:
         if not self.given:

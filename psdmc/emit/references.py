@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.emit.reference_load import LoadView, load_view
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.self_test import GivenVector
 from psdmc.emit.tables import number
@@ -29,12 +30,14 @@ class ReferenceView:
     tables    the states' vectors, then each output's expected values
     expected  labels of the outputs that have such a table
     theta_b   the run-time parameters, one constant each; empty where no kernel takes any
+    load      a load and what it adds to theta_b, where the package has functions that add loads
     """
 
     count: int
     tables: tuple[ReferenceTable, ...]
     expected: tuple[str, ...]
     theta_b: tuple[str, ...]
+    load: LoadView | None = None
 
 
 def reference_view(
@@ -61,7 +64,9 @@ def reference_view(
     known = tuple(label for label in labels if label in references.expected)
     expected = [_table(f"{label}_expected", references.expected[label], real) for label in known]
     theta_b = tuple(number(value, real) for value in references.theta_b.tolist()) if takes_theta else ()
-    return ReferenceView(len(next(iter(references.given.values()))), (*given, *expected), known, theta_b)
+    load = None if references.load is None else load_view(references.load, real)
+    count = len(next(iter(references.given.values())))
+    return ReferenceView(count, (*given, *expected), known, theta_b, load)
 
 
 def _table(name: str, array: NDArray[np.float64], real: str) -> ReferenceTable:

@@ -7,12 +7,14 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from traced import arm_kernels, arm_package, arm_references
 from unoptimised import wrapper
 
+import psdmc
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_files
 from psdmc.emit.reference_states import ReferenceStates
@@ -181,6 +183,28 @@ def test_the_self_test_checks_whatever_was_emitted(tmp_path: Path) -> None:
         assert f"jacobian, {layout}: error" in report
     assert "gravity_theta, rows: error" in report
     assert "test_arm: 8 checks of 3 functions, 0 failed" in report
+
+
+@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.parametrize("real", ["float64", "float32"])
+def test_the_self_test_checks_functions_that_add_loads(real: Any, tmp_path: Path) -> None:
+    """At the tip and at every frame; a fault in the matrix of one frame is seen."""
+    _need("make")
+    robot = Path(__file__).parents[2] / "examples" / "robots" / "kr6.toml"
+    model = psdmc.derive(robot, expand=False, frames=["link6", "link3"], tool=(0.1, 0, 0.2, 0, 0.3, 0))
+    psdmc.emit_c(model, tmp_path / "arm", functions=["gravity"], real=real, payload=True, name="arm")
+
+    report = build_package(tmp_path / "arm")
+    assert "add_payload, at the tip: error" in report
+    assert "add_payload_at, every frame: error" in report
+    assert "arm: 7 checks of 4 functions, 0 failed" in report
+
+    source = tmp_path / "arm" / "src" / "payload.c"
+    text = source.read_text()
+    source.write_text(text.replace("load_map[frame + 1]", "load_map[frame]"))
+    assert source.read_text() != text
+    with pytest.raises(ToolchainError, match="add_payload_at, every frame: error"):
+        build_package(tmp_path / "arm", edited=True)
 
 
 def _with_a_fault(body: str) -> str:
