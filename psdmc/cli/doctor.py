@@ -32,6 +32,8 @@ OPTIONAL = (
     ("casadi", "bench", "emit-c --with casadi, in your own program; a rival in psdmc bench"),
     ("cmeel-cppadcodegen", "bench", "a rival in psdmc bench"),
     ("cmeel-eigen", "bench", "headers for the rival Pinocchio in psdmc bench"),
+    ("pandas", "notebook", "base_parameters.to_frame() in Python"),
+    ("sympy", "notebook", "torques as SymPy expressions in Python"),
     ("crocoddyl", "examples", "the example of trajectory optimisation"),
     ("cvxpy", "calibrate", "psdmc calibrate: physical consistency"),
     ("clarabel", "calibrate", "psdmc calibrate: its solver"),

@@ -333,7 +333,8 @@ def package_files(package: PackageView) -> dict[str, str]:
 
 
 C_SUFFIXES = (".c", ".h", ".hpp", ".inc")
-LICENCE = "/* SPDX-License-Identifier: 0BSD */\n"
+SPDX = "SPDX-License-Identifier"
+LICENCE = f"/* {SPDX}: 0BSD */\n"
 """First line of each C file: the code is its user's, without any obligation."""
 
 

@@ -107,7 +107,7 @@ def test_an_optional_part_that_is_missing_is_a_hint() -> None:
 
 
 def test_every_dependency_that_psdmc_declares_for_its_users_is_known_to_the_doctor() -> None:
-    users = ("bench", "calibrate", "examples", "mjcf", "xacro")
+    users = ("bench", "calibrate", "examples", "mjcf", "notebook", "xacro")
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))[
         "project"
     ]
