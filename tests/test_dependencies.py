@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parent.parent
 UNTESTED = {"build", "mypy", "pytest-cov", "reuse", "ruff"}
@@ -39,3 +44,23 @@ def test_a_wheel_holds_every_folder():
     named = set(project["tool"]["setuptools"]["packages"]) - {"psdmc.templates"}
     found = {".".join(file.parent.relative_to(ROOT).parts) for file in (ROOT / "psdmc").rglob("__init__.py")}
     assert named == found
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+@pytest.mark.parametrize("answer", [None, '{"info": {}}', "<html>a mirror</html>"])
+def test_an_audit_that_reaches_no_advisories_says_so_in_a_line(answer: str | None, tmp_path: Path):
+    """No answer, one of an index without advisories, and a page in place of one."""
+    page = tmp_path / "advisories"
+    if answer is not None:
+        page.write_text(answer)
+    words = ["make", "-s", f"VENV={sys.prefix}", "-o", f"{sys.prefix}/ready", f"ADVISORIES={page.as_uri()}"]
+
+    done = subprocess.run([*words, "audit"], cwd=ROOT, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 2
+    assert done.stdout.splitlines() == [
+        f"error: {page.as_uri()} gives no advisories: nothing is audited",
+        "hint: run make audit where the index of packages is reached",
+    ]
+    assert "Traceback" not in done.stderr
+    assert "pip_audit" not in done.stderr

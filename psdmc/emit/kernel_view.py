@@ -74,8 +74,10 @@ class KernelView:
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some outputs are written from registers and others are not."""
-        return self.direct and not all(output.direct for output in self.outputs)
+        """Whether some outputs are written from registers and others, or what must be positive, are not."""
+        return self.direct and (
+            self.positive is not None or not all(output.direct for output in self.outputs)
+        )
 
     @property
     def fails_alone(self) -> bool:

@@ -22,26 +22,43 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 from bundled import bundled_model  # noqa: E402
 from sanitizers import DYNAMIC, STATIC, Outcome, Tool, look  # noqa: E402
 
+from psdmc.compiler import derive  # noqa: E402
 from psdmc.emit.info import package_info  # noqa: E402
 from psdmc.emit.options import EmitOptions  # noqa: E402
 from psdmc.emit.package import PackageView, package_view  # noqa: E402
+from psdmc.functions import RECIPES  # noqa: E402
 from psdmc.lower.kernels import lower, wanted  # noqa: E402
+from psdmc.model.dynamics_model import DynamicsModel  # noqa: E402
 
-ROBOTS = ("two_link", "scara", "kr6")
-"""A small one, one with a sliding joint, six turning joints."""
+WALKER = "walker"
+ROBOTS = ("two_link", "scara", "kr6", WALKER)
+"""A small one, one with a sliding joint, six turning joints, a floating tree with a mimic joint."""
 OPTIONS = [
     EmitOptions(real, trig) for real in ("float64", "float32") for trig in ("inline", "freestanding", "libm")
 ]  # type: ignore[arg-type]
-LARGE = {"kr6": OPTIONS[::3]}
-"""Of a six-joint arm the inline code only, in both precisions: the other sines are the same text in every robot."""
+LARGE = {"kr6": OPTIONS[::3], WALKER: OPTIONS[::3]}
+"""Of larger robots the inline code only, in both precisions: the other sines are the same text in every robot."""
+
+
+def model_of(robot: str) -> DynamicsModel:
+    if robot == WALKER:
+        return derive(Path(__file__).with_name("walker.urdf"), floating=True)
+    return bundled_model(robot)
+
+
+def _had_by(model: DynamicsModel, functions: tuple[str, ...]) -> tuple[str, ...]:
+    """Those that robots with joints of several coordinates have, too, where this is one."""
+    if all(joint.about_z for joint in model.mechanism.types):
+        return functions
+    return tuple(name for name in functions if not RECIPES[name].of_axes)
 
 
 def packages(
     robots: tuple[str, ...], functions: tuple[str, ...], count: int
 ) -> Iterator[tuple[str, PackageView]]:
     for robot in robots:
-        model = bundled_model(robot)
-        kernels = lower(model, functions=functions)
+        model = model_of(robot)
+        kernels = lower(model, functions=_had_by(model, functions))
         for options in LARGE.get(robot, OPTIONS)[:count]:
             package = package_view(package_info(model), kernels, options)
             yield f"{robot} {options.real} {options.trig}", package

@@ -8,11 +8,18 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from bundled import bundled_model
 from c_warnings import EXTRA, STRICT
 from direct import write_sources
 from traced import arm_package
 
+from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
+from psdmc.emit.package import package_view
+from psdmc.functions import RECIPES
+from psdmc.lower.kernels import lower, wanted
+from psdmc.program.kernel import Kernel
+from psdmc.toolchain.kept_kernels import lowered_once
 
 COMPILERS = ["gcc", "clang"]
 NAMES = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian"]
@@ -64,6 +71,24 @@ def test_no_warnings(compiler: str, options: tuple[str, str], flag: str, tmp_pat
         checked = _checked(compiler, (options, flag) in OPTIMISED)
         words = [compiler, *STRICT, *EXTRA, *checked, flag, f"-I{tmp_path}/include", "-c"]
         _compile([*words, str(tmp_path / source), "-o", str(tmp_path / "x.o")])
+
+
+def every_kernel() -> dict[str, Kernel]:
+    """Of two_link."""
+    model, names = bundled_model("two_link"), tuple(RECIPES)
+    return lowered_once((model.content_hash, "every kernel", *names), lambda: lower(model, functions=names))
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_a_package_of_any_one_function_compiles(name: str, tmp_path: Path) -> None:
+    """Macros and helpers that one function needs do not come from another that happens to be there."""
+    _need("gcc")
+    names = wanted([name])
+    kernels = {key: kernel for key, kernel in every_kernel().items() if kernel.function.name in names}
+    package = package_view(package_info(bundled_model("two_link")), kernels, EmitOptions())
+    write_sources(package, tmp_path)
+    sources = [str(tmp_path / source) for source in package.sources]
+    _compile(["gcc", *STRICT, *EXTRA, f"-I{tmp_path}/include", "-fsyntax-only", *sources])
 
 
 PLAIN = {
