@@ -13,6 +13,7 @@ from psdmc.emit.store_groups import GROUP
 from psdmc.errors import InternalError
 from psdmc.program.cost import Cost, cost
 from psdmc.program.kernel import Kernel
+from psdmc.program.products import LARGE
 from psdmc.program.program import Program
 from psdmc.program.signature import Quantity, Signature, Sizes, in_order
 
@@ -66,6 +67,11 @@ class KernelView:
     def called(self) -> str:
         """Name of the kernel that its stages call, '' where it has a body."""
         return f"{self.function.calls}{'_theta' if self.theta else ''}" if self.function.calls else ""
+
+    @property
+    def by_state(self) -> bool:
+        """Whether its forms for many states take one after the other: lines for lanes would be too many."""
+        return any(product.shape.n >= LARGE for product in self.single_body.products)
 
     @property
     def direct(self) -> bool:
@@ -215,13 +221,13 @@ def function_views(
 
 def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
     function = _checked(kernel.function)
-    has_batches = options.target.has_batches
+    has_lanes = options.target.has_batches and not _is_by_state(kernel, sizes)
     outputs = tuple(
         OutputView(
             q.name,
             sizes.size(q),
             sizes.shape(q.axes),
-            has_batches and not function.calls and _is_direct(q, sizes),
+            has_lanes and not function.calls and _is_direct(q, sizes),
             _zero(q, kernel.single, sizes),
         )
         for q in function.outputs
@@ -229,7 +235,7 @@ def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) 
     if function.calls:
         single_body = lanes_body = Body((), ())
     else:
-        single_body, lanes_body = _bodies(kernel, outputs, options)
+        single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
     shared = single_body == lanes_body
     positive = _vector(function.positive.quantity, sizes) if function.positive else None
     return KernelView(
@@ -252,11 +258,17 @@ def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) 
     )
 
 
-def _bodies(kernel: Kernel, outputs: tuple[OutputView, ...], options: EmitOptions) -> tuple[Body, Body]:
+def _is_by_state(kernel: Kernel, sizes: Sizes) -> bool:
+    return kernel.before is not None and sizes.nv >= LARGE
+
+
+def _bodies(
+    kernel: Kernel, outputs: tuple[OutputView, ...], options: EmitOptions, has_lanes: bool
+) -> tuple[Body, Body]:
     """For one state and for lanes."""
     one, lanes = kernel.before or kernel.single, kernel.before or kernel.batch
     single = _body(kernel, one, outputs, options)
-    if not options.target.has_batches or lanes is one:
+    if not has_lanes or lanes is one:
         return single, single
     return single, _body(kernel, lanes, outputs, options)
 

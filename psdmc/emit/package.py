@@ -248,6 +248,12 @@ class PackageView:
         return any(body.has_roots for body in bodies)
 
     @property
+    def multiplies_lanes(self) -> bool:
+        """Whether such products are made of lanes, too."""
+        own = (kernel for kernel in self.kernels if kernel.single_body.products)
+        return self.target.has_batches and any(not kernel.by_state for kernel in own)
+
+    @property
     def leads_on(self) -> bool:
         """Whether q is longer than the rates, and the package has what leads from one q to another."""
         names = {function.name for function in self.functions}

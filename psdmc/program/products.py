@@ -10,6 +10,10 @@ from psdmc.program.program import Program, Slot
 from psdmc.program.replay import Value, replayed
 from psdmc.program.trace import Tracer
 
+LARGE = 12
+"""Rows from which products are always loops, over entries that are always zero too, and states go one after the other: each
+entry in a line takes gcc minutes (18 rows, written out for one state and for lanes: more than one, and 600 MiB)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Product:

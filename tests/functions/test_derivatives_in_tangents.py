@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from pinocchio_robots import path_of
+from unoptimised import without_optimisation
 from wide_robots import KINDS, is_pinocchios, wide_robot
 
+import psdmc
 from psdmc.functions import RECIPES
+from psdmc.model.random_states import states_of
+from psdmc.robot.reference import Reference
 
 EXACT, SOLVED = 1e-11, 1e-9
 """Of each block's largest entry; SOLVED where the mass matrix, of condition 1e5, is inverted."""
@@ -54,3 +60,22 @@ def test_columns_are_difference_quotients_along_integrate() -> None:
             own.model.inverse_dynamics(robot.integrate(q, sign * step), qd, qdd) for sign in (1.0, -1.0)
         )
         np.testing.assert_allclose(by_q[:, :, k], (ahead - behind) / 2e-6, atol=1e-7 * np.abs(by_q).max())
+
+
+def test_a_quadrupeds_in_c_one_state_after_the_other() -> None:
+    """Products with M^-1 in loops, and no code for lanes: as lines they would take gcc minutes."""
+    path = path_of("solo12")
+    model = psdmc.derive(path, floating=True)
+    oracle = Reference(pin.buildModelFromUrdf(path, pin.JointModelFreeFlyer()), "FL_FOOT")
+    with without_optimisation():
+        robot = psdmc.compile(model, functions=["forward_dynamics_derivatives"])
+    assert "MINUS_PRODUCT" in (robot.library.parent / "src/forward_dynamics_derivatives.inc").read_text(
+        "utf-8"
+    )
+    q, qd, qdd = states_of(model.mechanism, np.random.default_rng(2), 11)
+    tau = oracle.inverse_dynamics(q, qd, qdd)
+    expected = oracle.forward_dynamics_derivatives(q, qd, tau)
+    for theta_b in (None, model.theta_b):
+        found = robot.forward_dynamics_derivatives(q, qd, tau, theta_b)
+        for block, values in zip(found, expected, strict=True):
+            assert np.abs(block - values).max() <= SOLVED * np.abs(values).max()
