@@ -25,6 +25,9 @@ from psdmc.model.load import load
 from psdmc.toolchain.build_package import build_package
 
 FUNCTIONS = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian", "regressor"]
+BETWEEN = ["neutral", "integrate", "difference", "semi_implicit_euler", "forward_dynamics_derivatives"]
+"""What moves q, and what is along its tangent; the last takes many states one after the other."""
+
 COUNT = 21
 """States: whole blocks of lanes and some more."""
 
@@ -43,7 +46,7 @@ def model(tree: RandomTree) -> DynamicsModel:
 @pytest.fixture(scope="module")
 def package(model: DynamicsModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wide") / "tree"
-    compiler.emit_c(model, folder, functions=FUNCTIONS)
+    compiler.emit_c(model, folder, functions=[*FUNCTIONS, *BETWEEN])
     return folder
 
 
@@ -114,8 +117,8 @@ def test_python_takes_and_gives_arrays_of_these_shapes(tree: RandomTree, model: 
 
 
 def test_functions_of_one_coordinate_are_refused_when_they_are_asked_for(model: DynamicsModel) -> None:
-    with pytest.raises(InputError, match=r"no rk4_step: .*joint 'joint0' moves freely"):
-        psdmc.compile(model, functions=["gravity", "rk4_step"])
+    with pytest.raises(InputError, match=r"no rk4_step_derivatives: .*joint 'joint0' moves freely"):
+        psdmc.compile(model, functions=["gravity", "rk4_step_derivatives"])
 
 
 def test_a_model_file_keeps_the_joints(model: DynamicsModel, tmp_path: Path) -> None:
