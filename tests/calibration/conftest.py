@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from psdmc.calibration.calibrate import calibrate
 from psdmc.calibration.campaign import CampaignOptions, plan_campaign, write_campaign
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import Load
@@ -17,6 +19,8 @@ from psdmc.calibration.motions.excite import ExciteOptions
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.calibration.plant.virtual_robot import load_virtual_robot, simulate
+from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibration.verdict.record import Calibration
 from psdmc.derivation.derive import derive_model
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot
@@ -130,6 +134,29 @@ def campaign(arm: Arm) -> Path:
     """A written campaign without logs."""
     runs, found = plan_campaign(arm.model.chain, arm.regressor, arm.model.l, QUICK)
     return write_campaign(arm.folder / "campaign", runs, found, "npz")
+
+
+def calibrated(arm: Arm, campaign: Path, name: str, **variant: bool) -> tuple[Path, Calibration]:
+    """The campaign's folder with logs of a variant of the plant, and what they calibrate."""
+    folder = arm.folder / name
+    shutil.copytree(campaign.parent, folder, dirs_exist_ok=True)
+    simulate_campaign(arm.plant, folder, SimulateOptions(**variant))
+    return folder, calibrate(arm.unknown, folder, regressor=arm.regressor)
+
+
+@pytest.fixture(scope="session")
+def ideal(arm: Arm, campaign: Path) -> tuple[Path, Calibration]:
+    return calibrated(arm, campaign, "ideal", ideal_sensors=True)
+
+
+@pytest.fixture(scope="session")
+def noisy(arm: Arm, campaign: Path) -> tuple[Path, Calibration]:
+    return calibrated(arm, campaign, "noisy")
+
+
+@pytest.fixture(scope="session")
+def harness(arm: Arm, campaign: Path) -> tuple[Path, Calibration]:
+    return calibrated(arm, campaign, "harness", harness=True)
 
 
 def smooth_log(

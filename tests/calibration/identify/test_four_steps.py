@@ -19,29 +19,9 @@ from psdmc.calibration.motions.sweeps import SweepOptions, gravity_sweep
 from psdmc.calibration.plant.virtual_robot import Payload, load_virtual_robot, simulate
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.truth import compare
-from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
 from psdmc.model.load import load
 from psdmc.model.store import save
-
-
-def with_logs(arm, campaign: Path, name: str, **variant: bool) -> Path:
-    folder = arm.folder / name
-    shutil.copytree(campaign.parent, folder, dirs_exist_ok=True)
-    simulate_campaign(arm.plant, folder, SimulateOptions(**variant))
-    return folder
-
-
-@pytest.fixture(scope="module")
-def ideal(arm, campaign: Path) -> tuple[Path, Calibration]:
-    folder = with_logs(arm, campaign, "ideal", ideal_sensors=True)
-    return folder, calibrate(arm.unknown, folder, regressor=arm.regressor)
-
-
-@pytest.fixture(scope="module")
-def noisy(arm, campaign: Path) -> tuple[Path, Calibration]:
-    folder = with_logs(arm, campaign, "noisy")
-    return folder, calibrate(arm.unknown, folder, regressor=arm.regressor)
 
 
 def test_with_ideal_sensors_the_truth_comes_out(arm, ideal):
@@ -94,10 +74,8 @@ def test_physical_consistency_moves_a_sound_estimate_by_no_more_than_its_uncerta
     assert np.all(np.abs(moved) < 3 * np.array([row.std for row in plain.parameters]))
 
 
-def test_a_harness_that_the_model_lacks_is_noticed(arm, campaign: Path):
-    folder = with_logs(arm, campaign, "harness", harness=True)
-
-    record = calibrate(arm.unknown, folder, regressor=arm.regressor)
+def test_a_harness_that_the_model_lacks_is_noticed(harness):
+    record = harness[1]
 
     told = " ".join(record.warnings)
     assert "the residual is no noise" in told

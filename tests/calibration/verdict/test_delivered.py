@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shared_data import UR10_LOG
-from test_four_steps import with_logs
 from test_ur10 import model as ur10_model  # noqa: F401  a fixture
 from unoptimised import wrapper
 
@@ -99,10 +98,10 @@ def test_one_log(arm, log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 @pytest.mark.parametrize("variant", ["noisy", "harness"])
-def test_a_campaign(arm, campaign: Path, variant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    folder = with_logs(arm, campaign, f"delivered_{variant}", harness=variant == "harness")
-
-    record = calibrate(arm.unknown, folder, regressor=arm.regressor)
+def test_a_campaign(
+    variant: str, request: pytest.FixtureRequest, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    folder, record = request.getfixturevalue(variant)
 
     require_delivered(record, read_campaign(folder), tmp_path, capsys)
     require_package(record, tmp_path)
@@ -186,11 +185,10 @@ def test_physical_is_the_default_of_the_command(
 
 
 def test_a_campaign_that_shows_little_keeps_the_files_values(
-    arm, campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arm, noisy, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
     """The fast run moves the shoulder alone: what only the elbow's acceleration shows stays at the file's value."""
-    folder = with_logs(arm, campaign, "delivered_noisy")
-    runs = read_campaign(folder)
+    runs = read_campaign(noisy[0])
     poor = replace(runs, inertial=[InertialRun(runs.friction[0].log)])
     plain = CalibrateOptions()
     lugre = replace(plain.campaign.lugre, law="coulomb_viscous")
