@@ -10,18 +10,19 @@ import numpy as np
 import pytest
 from bundled import bundled_model, robot_path
 from command_line import files_in, status, typed
+from unoptimised import wrapper
 
 
 @pytest.fixture(scope="module")
 def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which the README's commands were typed, one after the other."""
-    folder = tmp_path_factory.mktemp("work")
+    folder, compiler = tmp_path_factory.mktemp("work"), wrapper(tmp_path_factory.mktemp("unoptimised"))
     for words in (
         ("derive", robot_path("scara"), "-o", "scara.npz"),
         ("emit-c", "scara.npz", "-o", "scara"),
         ("build", "scara"),
     ):
-        done = typed(*words, cwd=folder)
+        done = typed(*words, cwd=folder, CC=str(compiler))
         assert done.returncode == 0, done.stderr
         assert done.stdout.count("\n") >= 1
     return folder

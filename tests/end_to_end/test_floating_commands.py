@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from command_line import typed
+from command_line import status, typed
 from pinocchio_robots import path_of
+from unoptimised import without_optimisation, wrapper
 
 import psdmc
 from psdmc.model.dynamics_model import DynamicsModel
@@ -85,7 +86,7 @@ def test_its_package_is_built_and_passes_its_own_test(work: Path) -> None:
     root, hip = json.loads((work / "solo/manifest.json").read_text(encoding="utf-8"))["joints"][:2]
     assert (root["nq"], root["nv"], root["parent"]) == (7, 6, "universe")
     assert (hip["parent"], "nq" in hip) == ("base_link", False)
-    built = typed("build", "solo", cwd=work)
+    built = typed("build", "solo", cwd=work, CC=str(wrapper(work)))
     assert built.returncode == 0, built.stderr
     assert "self-test passed" in built.stdout
 
@@ -136,7 +137,8 @@ def test_a_c_program_moves_it_as_readme_says(work: Path, oracle: pin.Model) -> N
 
 def test_compiled_functions_are_pinocchios(model: DynamicsModel, oracle: pin.Model) -> None:
     assert list(oracle.names)[1:] == list(model.joint_names)
-    robot = psdmc.compile(model, functions=FUNCTIONS)
+    with without_optimisation():
+        robot = psdmc.compile(model, functions=FUNCTIONS)
     q, qd, qdd = states_of(model.mechanism, np.random.default_rng(1), COUNT)
     tau = of_pinocchio(oracle, pin.rnea, q, qd, qdd)
     found = robot.inverse_dynamics(q, qd, qdd)
@@ -171,14 +173,19 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("words", "status", "said"), REFUSED, ids=lambda value: str(value)[:40])
+@pytest.mark.parametrize(("words", "expected", "said"), REFUSED, ids=lambda value: str(value)[:40])
 def test_what_is_not_of_free_roots_is_refused_in_a_line(
-    work: Path, words: tuple[str, ...], status: int, said: str
+    work: Path,
+    words: tuple[str, ...],
+    expected: int,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(work)
     (work / "row.toml").write_text('name = "row"\nconvention = "standard"\n[[joint]]\na = 1.0\n', "utf-8")
     (work / "log.csv").write_text("t\n", "utf-8")
-    done = typed(*words, cwd=work)
-    assert done.returncode == status, done.stdout + done.stderr
-    lines = done.stderr.splitlines()
-    assert [line.split(":")[0] for line in lines] == ["error", "hint"], done.stderr
+    assert status(*words) == expected
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split(":")[0] for line in lines] == ["error", "hint"], lines
     assert said in lines[0]

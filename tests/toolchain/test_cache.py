@@ -7,13 +7,14 @@ import multiprocessing.process
 import os
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from racing import race
 from traced import arm_package
+from unoptimised import without_optimisation
 
 from psdmc.errors import ToolchainError
 from psdmc.toolchain.cache import cache_key, cached
@@ -25,9 +26,10 @@ from psdmc.toolchain.interface import interface_of
 
 
 @pytest.fixture
-def fresh_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def fresh_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path / "cache"))
-    return tmp_path / "cache"
+    with without_optimisation():
+        yield tmp_path / "cache"
 
 
 def test_the_same_package_is_compiled_once(fresh_cache: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from psdmc import compiler
 from psdmc.cli.boundary import run
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
+from psdmc.lower import kernels, search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.toolchain.build_package import build_package
@@ -27,6 +29,9 @@ from psdmc.toolchain.build_package import build_package
 FUNCTIONS = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian", "regressor"]
 BETWEEN = ["neutral", "integrate", "difference", "semi_implicit_euler", "forward_dynamics_derivatives"]
 """What moves q, and what is along its tangent; the last takes many states one after the other."""
+
+BUDGET = 12
+"""Programs that the search may trace: what it takes must be right, not cheap."""
 
 COUNT = 21
 """States: whole blocks of lanes and some more."""
@@ -46,7 +51,9 @@ def model(tree: RandomTree) -> DynamicsModel:
 @pytest.fixture(scope="module")
 def package(model: DynamicsModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wide") / "tree"
-    compiler.emit_c(model, folder, functions=[*FUNCTIONS, *BETWEEN])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "Search", partial(search.Search, budget=BUDGET))
+        compiler.emit_c(model, folder, functions=[*FUNCTIONS, *BETWEEN])
     return folder
 
 
@@ -96,6 +103,7 @@ def test_the_class_has_the_lengths_too(package: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.usefixtures("package")
 def test_python_takes_and_gives_arrays_of_these_shapes(tree: RandomTree, model: DynamicsModel) -> None:
     with without_optimisation():
         robot = psdmc.compile(model, functions=FUNCTIONS)
