@@ -52,14 +52,16 @@ campaign: $(READY) ## 10,000 random chains and 1,000 trees against Pinocchio and
 test-processes: $(READY) ## kill every command 50 times at random moments, and whatever else takes long
 	PSDMC_KILLS=50 $(RUN)/python -m pytest -q -rs tests/end_to_end/test_killed.py tests/end_to_end/test_full_disk.py
 
-test-demo: $(READY) ## the virtual Denso's whole campaign by the bounds of its test, three minutes; make test runs a short form
-	PSDMC_DEMO=whole $(RUN)/python -m pytest -q tests/calibration/test_demo.py
+test-demo: $(READY) ## the virtual Denso's whole campaigns and all seeds of coloured noise; make test runs a short form
+	PSDMC_DEMO=whole $(RUN)/python -m pytest -n $(JOBS) -q tests/calibration/test_demo.py tests/calibration/identify/test_coverage.py
 
-test-accuracy: $(READY) ## accuracy of every robot's and function's C as psdmc.compile builds it; make test optimises some
-	PSDMC_ACCURACY=whole $(RUN)/python -m pytest -n $(JOBS) -rP tests/end_to_end/test_accuracy_table.py tests/functions tests/derivation/test_nearly_parallel.py
+test-accuracy: $(READY) ## accuracy of every robot's, function's and sine's C as psdmc.compile builds it; make test takes some
+	PSDMC_ACCURACY=whole $(RUN)/python -m pytest -n $(JOBS) -rP tests/end_to_end/test_accuracy_table.py tests/end_to_end/test_random_chains.py tests/functions tests/trig/test_accuracy.py \
+	  tests/derivation/test_nearly_parallel.py tests/derivation/test_derived_torques.py tests/toolchain/test_footprint.py \
+	  tests/toolchain/test_target_machines.py tests/lower/test_expanded.py tests/bench/test_gate.py
 
 test-trees: $(READY) ## 20 whole robots, compiled, and 300 random trees against Pinocchio and MuJoCo, with figures; make test takes a few
-	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py
+	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py tests/dynamics
 
 TARGET_PROGRAMS := qemu-aarch64 qemu-s390x qemu-arm aarch64-linux-gnu-gcc s390x-linux-gnu-gcc arm-none-eabi-gcc
 test-targets: $(READY) ## self-tests of every function on 64-bit ARM, big-endian s390x and Cortex-M under qemu-user; minutes

@@ -3,6 +3,7 @@ are laid out and compared."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from itertools import product
 
@@ -47,6 +48,7 @@ PARALLEL = (0.0, 0.6, 1.0)
 """How probable it is that an axis is parallel to its parent's."""
 
 CHOICES = [Choices(*flags) for flags in product((False, True), repeat=4)]
+WHOLE = os.environ.get("PSDMC_TREES") == "whole"
 COUNT = 5
 """States."""
 
@@ -84,6 +86,7 @@ class RandomTree:
     def __init__(self, seed: int, parents: tuple[int, ...], kinds: str, parallel: float = 0.0) -> None:
         rng = np.random.default_rng(seed)
         self.parents, self.n = parents, len(parents)
+        self.kinds, self.parallel = kinds[: self.n], parallel
         self.types = [TYPES[kind] for kind in kinds[: self.n]]
         self.places = [self._place(rng, parallel) for _ in parents]
         self.parameters = np.array([_body(rng) for _ in parents])
@@ -94,6 +97,12 @@ class RandomTree:
         self.gravity = rng.normal(size=3) * 5.0
         self.model, self.joints = self._pinocchio()
         self.data = self.model.createData()
+
+    @property
+    def choices(self) -> list[Choices]:
+        """Arrangements to try on this tree: four, which are others on other trees; `make test-trees`: all sixteen."""
+        first = self.n + sum(map(len, self.kinds.split("R"))) + round(10 * self.parallel)
+        return CHOICES if WHOLE else CHOICES[first % 4 :: 4]
 
     @staticmethod
     def _place(rng: np.random.Generator, parallel: float) -> Placement:

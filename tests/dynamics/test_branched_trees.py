@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 import pytest
-from random_trees import CHOICES, COUNT, KINDS, TREES, RandomTree, assert_near, columns, on_trees
+from random_trees import COUNT, KINDS, TREES, RandomTree, assert_near, columns, on_trees
 
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.energy import first_moment, kinetic_energy, potential_energy
@@ -27,7 +27,7 @@ def test_inverse_dynamics_is_pinocchios_rnea_however_it_is_arranged(parents, kin
     tree = RandomTree(1, parents, kinds, parallel)
     q, qd, qdd = tree.states(COUNT, 3)
     expected = tree.each(pin.rnea, q, qd, qdd)
-    for choices in CHOICES:
+    for choices in tree.choices:
         states = (list(q.T), list(qd.T), list(qdd.T))
         found = inverse_dynamics(tree.frames, tree.bodies, tree.drives, *states, tree.up, choices)
         assert_near(columns(found), expected)
@@ -118,7 +118,7 @@ def test_two_velocities_that_are_equal_give_what_one_gives(parents, kinds, paral
     q, qd, qdd = tree.states(COUNT, 3)
     states = (list(q.T), list(qd.T), list(qdd.T))
     one = inverse_dynamics(tree.frames, tree.bodies, tree.drives, *states, tree.up)
-    for choices in CHOICES:
+    for choices in tree.choices:
         same = inverse_dynamics(
             tree.frames, tree.bodies, tree.drives, *states, tree.up, choices, qd_r=states[1]
         )

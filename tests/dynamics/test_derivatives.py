@@ -40,7 +40,7 @@ def test_the_derivatives_are_pinocchios_however_they_are_arranged(parents, kinds
     tree = RandomTree(11, parents, kinds, parallel)
     states = tree.states(COUNT, 3)
     expected = pinocchios(tree, states)
-    for choices in CHOICES:
+    for choices in tree.choices:
         assert_blocks_near(found_in(tree, states, choices), expected)
 
 
@@ -49,7 +49,7 @@ def test_chains_too(parents, kinds, parallel) -> None:
     tree = RandomTree(12, parents, kinds, parallel)
     states = tree.states(COUNT, 3)
     expected = pinocchios(tree, states)
-    for choices in CHOICES:
+    for choices in tree.choices:
         assert_blocks_near(found_in(tree, states, choices), expected)
 
 

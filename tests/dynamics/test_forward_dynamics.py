@@ -31,7 +31,7 @@ def test_accelerations_are_pinocchios_however_they_are_arranged(parents, kinds, 
     q, qd, tau = tree.motion(COUNT)
     expected = tree.each(pin.aba, q, qd, tau)
     allowed = 1e-15 * max(condition(tree, q), 1e3) * np.abs(expected).max()
-    for choices in CHOICES:
+    for choices in tree.choices:
         states = (list(q.T), list(qd.T), list(tau.T))
         found, _ = forward_dynamics(tree.frames, tree.bodies, tree.drives, *states, tree.up, choices)
         np.testing.assert_allclose(columns(found), expected, rtol=0, atol=allowed)

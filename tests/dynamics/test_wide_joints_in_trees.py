@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from random_trees import CHOICES, COUNT, TREES, RandomTree, assert_near, columns, on_trees
+from random_trees import COUNT, TREES, RandomTree, assert_near, columns, on_trees
 
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
@@ -33,7 +33,7 @@ def test_torques_are_pinocchios_however_they_are_arranged(parents, kinds, parall
     tree = RandomTree(1, parents, kinds, parallel)
     states = tree.motion(COUNT)
     expected = tree.each(pin.rnea, *states)
-    for choices in CHOICES:
+    for choices in tree.choices:
         found = inverse_dynamics(tree.frames, tree.bodies, tree.drives, *lists(*states), tree.up, choices)
         assert_near(columns(found), expected)
 

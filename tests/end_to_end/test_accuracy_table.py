@@ -31,11 +31,11 @@ FEW = 100
 """States at which generic robots' other functions are evaluated from E and P: theirs are the largest."""
 
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
-LIKE_ANOTHER = ("UR10", "Z1", "generic 7R")
-"""Robots that differ from UR5, kr6 and generic 6R in lengths or in their count of joints alone."""
+LIKE_ANOTHER = ("UR10", "Z1", "Kinova", "Panda", "denso_floor", "generic 7R")
+"""Robots that differ from UR5, kr6, lbr7, denso_wall and generic 6R in lengths, gravity or their count of joints alone."""
 
 SHOWN = NAMES if WHOLE else tuple(name for name in NAMES if name not in LIKE_ANOTHER)
-OPTIMISED = NAMES if WHOLE else ("kr6", "scara")
+OPTIMISED = NAMES if WHOLE else ("two_link", "scara")
 """Robots whose C is compiled with optimisation. What the C of the others says is compiled without, in a fifth of the
 time."""
 

@@ -26,7 +26,7 @@ from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_columns, write_log
 from psdmc.model.load import load
 
-FEW = {"derive": 4, "emit-c": 3, "build": 1, "calibrate": 3, "excite": 1}
+FEW = {"derive": 2, "emit-c": 2, "build": 1, "calibrate": 2, "excite": 1}
 MANY = os.environ.get("PSDMC_KILLS")
 KILLS = {name: int(MANY or few) for name, few in FEW.items()}
 LATEST = 0.9

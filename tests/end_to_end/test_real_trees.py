@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import os
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from real_trees import ROBOTS, RealTree, error
+from unoptimised import without_optimisation
 
 import psdmc
 from psdmc.derivation.derive import derive_model
@@ -122,7 +124,8 @@ def test_mujoco_says_the_same(tree) -> None:
 @pytest.mark.parametrize("name", ROBOTS if WHOLE else COMPILED)
 def test_compiled_functions(name: str) -> None:
     robot = RealTree(name)
-    compiled = psdmc.compile(derive_model(robot.loaded.mechanism), functions=FUNCTIONS)
+    with nullcontext() if WHOLE else without_optimisation():
+        compiled = psdmc.compile(derive_model(robot.loaded.mechanism), functions=FUNCTIONS)
     q, qd, qdd = robot.q, robot.qd, robot.qdd
     figures = torque_errors(robot, compiled)
     figures["kinetic"] = error(compiled.kinetic_energy(q, qd), robot.kinetic)

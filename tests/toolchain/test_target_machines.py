@@ -26,7 +26,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS, NATIVE
-from psdmc.target.presets import AARCH64, CORTEX_M4F, CORTEX_M7, PRESETS, SCALAR, X86_64_V3, preset
+from psdmc.target.presets import CORTEX_M4F, CORTEX_M7, PRESETS, SCALAR, X86_64_V3, preset
 from psdmc.target.target import Target
 from psdmc.toolchain import compile, compiler_command
 from psdmc.toolchain.build_package import build_package
@@ -39,6 +39,24 @@ FEW = ["inverse_dynamics", "forward_dynamics", "mass_matrix"]
 WHOLE = os.environ.get("PSDMC_TARGETS") == "whole"
 """Every function, optimised, and nothing skipped: make test-targets."""
 FUNCTIONS = ["all"] if WHOLE else FEW
+LOOKED_AT = "x86-64-v3"
+"""The target whose C gcc looks at while it optimises; clang says all by reading."""
+
+ACCURACY = WHOLE or os.environ.get("PSDMC_ACCURACY") == "whole"
+EMULATED = {
+    name: [
+        ("two_link", preset(name)),
+        *([("kr6", preset(name))] if ACCURACY or name in ("neon", "cortex-m4f") else []),
+    ]
+    for name in ("neon", "native", "cortex-m4f", "cortex-m7")
+}
+"""Robot and target under qemu: `make test-accuracy` takes both robots on each, `make test` KR6 on one of each kind."""
+
+
+def emulated(*names: str) -> pytest.MarkDecorator:
+    pairs = [pair for name in names for pair in EMULATED[name]]
+    ids = [f"{target.name}-{robot}" for robot, target in pairs]
+    return pytest.mark.parametrize(("robot", "target"), pairs, ids=ids)
 
 
 @pytest.fixture(scope="module")
@@ -202,22 +220,13 @@ def test_no_targets_c_is_warned_of(name: str, compiler: str, tmp_path: Path) -> 
     options = EmitOptions(target.real, target.trig, target)
     package = arm_package(options=options, names=["inverse_dynamics", "forward_dynamics", "regressor"])
     write_sources(package, tmp_path)
+    checked = ["-fsyntax-only"] if compiler == "clang" else ["-O1" if name == LOOKED_AT else "-O0", "-c"]
     for source in package.sources:
-        run(
-            compiler,
-            *STRICT,
-            *EXTRA,
-            "-O1",
-            f"-I{tmp_path}/include",
-            "-c",
-            tmp_path / source,
-            "-o",
-            tmp_path / "x.o",
-        )
+        words = [*STRICT, *EXTRA, *checked, f"-I{tmp_path}/include", "-o", tmp_path / "x.o"]
+        run(compiler, *words, tmp_path / source)
 
 
-@pytest.mark.parametrize("robot", ["two_link", "kr6"])
-@pytest.mark.parametrize("target", [CORTEX_M4F, CORTEX_M7], ids=lambda target: target.name)
+@emulated("cortex-m4f", "cortex-m7")
 def test_the_self_test_passes_compiled_for_a_microcontroller(
     robot: str, target: Target, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
@@ -242,8 +251,7 @@ def undefined(library: Path) -> set[str]:
     return needed - {line[-1] for line in words if len(line) == 3} - {"memcpy", "memset"}
 
 
-@pytest.mark.parametrize("robot", ["two_link", "kr6"])
-@pytest.mark.parametrize("target", [AARCH64, NATIVE], ids=lambda target: target.name)
+@emulated("neon", "native")
 def test_the_self_test_passes_compiled_for_64_bit_arm(
     robot: str, target: Target, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
