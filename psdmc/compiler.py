@@ -134,6 +134,7 @@ def emit_c(
     payload: bool = False,
     adapters: Sequence[str] | str = (),
     target: str | Target = NATIVE,
+    friction: bool = False,
 ) -> list[str]:
     """Write the model's C package; returns the paths of the files that changed.
 
@@ -153,6 +154,8 @@ def emit_c(
     adapters   names in psdmc.emit.adapters.ADAPTERS, or one name: other programs that the package is also for;
                functions that they need are generated besides `functions`
     target     the machine that the package is for, by its name in psdmc.target.presets
+    friction   whether the package has a function of the joints' friction; InputError where the model was not calibrated from
+               plain logs
     """
     model = model_of(model)
     options = _options(lowering, real, trig, target)
@@ -162,7 +165,8 @@ def emit_c(
             f"target {options.target.name} has no shared libraries, which {adapters[0]} loads",
             "leave --with out, or emit another package for it",
         )
-    package = _package(model, lowering, functions, options, name, progress, payload, chosen(adapters))
+    more = chosen(adapters)
+    package = _package(model, lowering, functions, options, name, progress, payload, more, friction)
     progress("writing")
     return write_package(directory, package_files(package), force)
 
@@ -313,6 +317,7 @@ def _package(
     progress: Progress,
     payload: bool = False,
     adapters: Sequence[str] = (),
+    friction: bool = False,
 ) -> PackageView:
     names = wanted(with_needed(wanted(functions, model.mechanism), adapters), model.mechanism)
     require(model, names)
@@ -322,7 +327,7 @@ def _package(
         lambda: lower(model, lowering, names, progress, costs=costs),
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
-    info = package_info(model, name, shown, payload)
+    info = package_info(model, name, shown, payload, friction)
     references = reference_states(model, names)
     if payload:
         references = replace(references, load=reference_load(model))

@@ -67,7 +67,7 @@ def calibrated_actuators(
     if missing:
         raise InputError(
             f"{robot}: no LuGre friction was identified for joint(s) {', '.join(missing)}",
-            "calibrate with friction runs of every joint",
+            "calibrate with friction runs of every joint; friction of one log's fit is in `psdmc emit-c --friction`",
         )
     constants = {row["joint"]: row["value"] for row in calibration["motors"]}
     return ActuatorView(

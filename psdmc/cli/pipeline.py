@@ -187,6 +187,9 @@ def emit_c(
     name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
     payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
+    friction: Annotated[
+        bool, typer.Option("--friction", help="also R_friction: of a model that was calibrated from plain logs")
+    ] = False,
     adapters: Annotated[
         list[str] | None,
         typer.Option("--with", metavar="NAME,...", help="also a library for another program: casadi"),
@@ -223,6 +226,7 @@ def emit_c(
             payload,
             names(adapters),
             target,
+            friction,
         )
     print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
     asked = name or found.mechanism.name

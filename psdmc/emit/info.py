@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
+from psdmc.model.linear_friction import LinearFriction, linear_friction
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import Mechanism
@@ -57,6 +58,7 @@ class PackageInfo:
     payload     (l, 10) maps of a load to the change of theta_b, at the tip and, where there are others, at each named
                 frame; empty where the package has no function for loads
     units       parts of q, from an entry to before another, whose length must be one
+    friction    what a calibration from plain logs found; None where the package has no function for it
     followers   sentences about joints that follow others, untrusted text: they are not among `joints`
     """
 
@@ -73,6 +75,7 @@ class PackageInfo:
     payload: tuple[NDArray[np.float64], ...] = ()
     followers: tuple[str, ...] = ()
     units: tuple[tuple[int, int], ...] = ()
+    friction: LinearFriction | None = None
 
     def __post_init__(self) -> None:
         if not self.joints:
@@ -120,9 +123,11 @@ def package_info(
     name: str | None = None,
     options: Mapping[str, str] | None = None,
     payload: bool = False,
+    friction: bool = False,
 ) -> PackageInfo:
-    """Metadata of a MODEL. `name` replaces the robot's own. With `payload` it has what functions for loads need;
-    InputError where the model's assumptions do not admit every load."""
+    """Metadata of a MODEL. `name` replaces the robot's own. With `payload` it has what functions for loads need, with
+    `friction` what the one for friction needs; InputError where the model's assumptions do not admit every load, or it was
+    not calibrated from plain logs."""
     chain = model.mechanism
     joints = tuple(
         JointInfo(
@@ -158,6 +163,7 @@ def package_info(
         payload=_load_maps(model) if payload else (),
         followers=tuple(_followers(chain)),
         units=units_of(chain.joints[i].type for i in chain.own_joints),
+        friction=linear_friction(model) if friction else None,
     )
 
 

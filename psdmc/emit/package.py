@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from psdmc.emit.adapters import ADAPTERS, chosen
 from psdmc.emit.cpp import CppClass, cpp_classes
 from psdmc.emit.describe import description, uses_frames
+from psdmc.emit.friction import FrictionView
 from psdmc.emit.info import PackageInfo
 from psdmc.emit.kernel_view import FunctionView, KernelView, function_views
 from psdmc.emit.lanes import VectorWidth, vector_widths
@@ -17,7 +18,7 @@ from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
 from psdmc.emit.patterns import Pattern, patterns
 from psdmc.emit.products import Shape
-from psdmc.emit.prototypes import Prototype, payload_prototypes
+from psdmc.emit.prototypes import Prototype, friction_prototype, payload_prototypes
 from psdmc.emit.reals import check_range
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.references import ReferenceView, reference_view
@@ -169,7 +170,18 @@ class PackageView:
     def sources(self) -> tuple[str, ...]:
         """C files of the library, relative to the package."""
         payload = ("src/payload.c",) if self.info.payload else ()
-        return ("src/tables.c", *(f"src/{function.name}.c" for function in self.functions), *payload)
+        friction = ("src/friction.c",) if self.info.friction else ()
+        functions = (f"src/{function.name}.c" for function in self.functions)
+        return ("src/tables.c", *functions, *payload, *friction)
+
+    @property
+    def friction(self) -> FrictionView | None:
+        """The calibrated friction, where the package has its function."""
+        return FrictionView(self.info.friction, self.real) if self.info.friction else None
+
+    @property
+    def friction_prototype(self) -> Prototype:
+        return friction_prototype(self.robot, self.real)
 
     @property
     def payload_prototypes(self) -> tuple[Prototype, ...]:
@@ -295,6 +307,7 @@ class PackageView:
             for kernel in function.kernels:
                 lines += [prototype.text for prototype in kernel.prototypes.values()]
         lines += [prototype.text for prototype in self.payload_prototypes]
+        lines += [self.friction_prototype.text] if self.info.friction else []
         return "".join(f"{line};\n" for line in lines)
 
 
@@ -311,6 +324,11 @@ def package_view(
     if info.l == 0:
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
     check_range(info, kernels, options.c_real)
+    if info.friction and options.trig == "freestanding":
+        raise InputError(
+            f"{info.name}: friction needs tanh, which is libm's, and the package is freestanding",
+            "emit it with --trig inline, or leave --friction out",
+        )
     robot = identifier(info.name)
     functions = function_views(kernels, info.sizes, robot, options)
     package = PackageView(robot, info, options, functions, None, chosen(adapters))
@@ -386,6 +404,8 @@ def library_files(package: PackageView) -> dict[str, str]:
                 files[f"src/{file}"] = render("body.inc.jinja", body=body)
     if package.info.payload:
         files["src/payload.c"] = render("payload.c.jinja", package=package)
+    if package.info.friction:
+        files["src/friction.c"] = render("friction.c.jinja", package=package)
     return files
 
 

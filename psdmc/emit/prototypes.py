@@ -58,6 +58,11 @@ def payload_prototypes(robot: str, real: str) -> tuple[Prototype, Prototype]:
     )
 
 
+def friction_prototype(robot: str, real: str) -> Prototype:
+    """The function of the joints' friction."""
+    return Prototype("void", f"{robot}_friction", (f"const {real} *qd", f"{real} *tau_f"))
+
+
 def _returns(function: Signature, variant: Variant) -> str:
     """C's return type. A function that can fail returns which entry failed (one state), or which row (many)."""
     if function.positive is None:

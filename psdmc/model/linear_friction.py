@@ -1,0 +1,101 @@
+"""Friction of a model that was calibrated from one log: Coulomb, viscous terms and a constant, per joint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import frozen_array
+
+Array = NDArray[np.float64]
+
+MOST_TERMS = 8
+"""Viscous terms of a joint: fits have one or two."""
+LARGEST_EXPONENT = 8.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearFriction:
+    """Friction torque of n joints:  tanh(v / sign_speed) (coulomb + sum over k of viscous[k] |v|^exponents[k]) + offset.
+
+    coulomb, offset  (n,)    N m (N)
+    viscous          (n, k)  N m (s/rad)^d
+    exponents        k of them, not negative
+    sign_speed       rad/s (m/s) over which friction changes sign, so that it is smooth
+    """
+
+    coulomb: Array
+    viscous: Array
+    offset: Array
+    exponents: tuple[float, ...]
+    sign_speed: float
+
+    def __post_init__(self) -> None:
+        n = len(self.coulomb)
+        object.__setattr__(self, "coulomb", frozen_array(self.coulomb, (n,), "coulomb"))
+        object.__setattr__(self, "offset", frozen_array(self.offset, (n,), "offset"))
+        shape = (n, len(self.exponents))
+        object.__setattr__(self, "viscous", frozen_array(self.viscous, shape, "viscous"))
+
+    def torque(self, qd: ArrayLike) -> Array:
+        """(..., n) N m (N) at speeds (..., n), to be added to what the rigid bodies take."""
+        v = np.asarray(qd, dtype=np.float64)
+        size = self.coulomb + sum(self.viscous[:, k] * np.abs(v) ** d for k, d in enumerate(self.exponents))
+        return np.asarray(np.tanh(v / self.sign_speed) * size + self.offset)
+
+
+def linear_friction(model: DynamicsModel) -> LinearFriction:
+    """The friction that the model's calibration found; InputError where it was not calibrated from plain logs, or what its
+    file says of friction is damaged."""
+    name = shown(model.mechanism.name)
+    kept = model.provenance.get("calibration")
+    if not isinstance(kept, Mapping):
+        raise InputError(f"{name}: not calibrated: its friction is unknown", "run `psdmc calibrate` first")
+    if kept.get("prediction", {}).get("law") != "linear":
+        raise InputError(
+            f"{name}: calibrated by a campaign: its friction is LuGre's, with a state",
+            "`psdmc calibrate --actuators DIR` writes it as C",
+        )
+    if model.mechanism.has_followers:
+        raise InputError(f"{name}: friction is of joints that follow no other", "lock those that do")
+    try:
+        return _read(kept, model.joint_names)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{name}: the friction in the model file is damaged: {error}", "calibrate again"
+        ) from None
+
+
+def _read(kept: Mapping[str, Any], joints: tuple[str, ...]) -> LinearFriction:
+    values = {(row["joint"], row["name"]): _finite(row["value"], row["name"]) for row in kept["friction"]}
+    law = kept["prediction"]
+    exponents = tuple(_finite(d, "an exponent") for d in law["exponents"])
+    speed = _finite(law["sign_speed"], "sign_speed")
+    if not speed > 0.0 or len(exponents) > MOST_TERMS:
+        raise ValueError(f"sign_speed {speed:g}, {len(exponents)} exponents")
+    if any(not 0.0 <= d <= LARGEST_EXPONENT for d in exponents):
+        raise ValueError(f"exponents {exponents}")
+    names = ["viscous" if k == 0 else f"viscous^{d:g}" for k, d in enumerate(exponents)]
+    return LinearFriction(
+        coulomb=np.array([values[joint, "coulomb"] for joint in joints]),
+        viscous=np.array([[values[joint, name] for name in names] for joint in joints]).reshape(
+            len(joints), -1
+        ),
+        offset=np.array([values.get((joint, "offset"), 0.0) for joint in joints]),
+        exponents=exponents,
+        sign_speed=speed,
+    )
+
+
+def _finite(value: object, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{what} is {shown(value)}")
+    return float(value)

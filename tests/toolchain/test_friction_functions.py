@@ -1,0 +1,158 @@
+"""emit-c --friction: what one log's fit found, in C and C++, against its formula; and a log's way from the fit to there."""
+
+from __future__ import annotations
+
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bundled import bundled_model, bundled_robot
+from direct import Direct, shared_library, write_sources
+
+from psdmc.calibration.api import calibrate
+from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_files import write_log
+from psdmc.cli.boundary import run
+from psdmc.compiler import emit_c
+from psdmc.emit.info import package_info
+from psdmc.emit.options import EmitOptions
+from psdmc.emit.package import PackageView, package_view
+from psdmc.errors import InputError
+from psdmc.lower.kernels import lower
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.load import load
+from psdmc.robot.reference import reference
+from psdmc.toolchain.build_package import build_package
+
+COULOMB, VISCOUS, CURVED, OFFSET = np.array([3.0, 1.5]), np.array([0.8, 0.3]), np.array([0.2, 0.0]), np.array([-0.4, 0.7])
+SIGN_SPEED = 0.03
+
+
+def formula(v: np.ndarray) -> np.ndarray:
+    """Of the documents, with a second viscous term of |v|^1.5."""
+    return np.tanh(v / SIGN_SPEED) * (COULOMB + VISCOUS * np.abs(v) + CURVED * np.abs(v) ** 1.5) + OFFSET
+
+
+def with_friction(model: DynamicsModel, **law: object) -> DynamicsModel:
+    """The model with those numbers in its provenance, where a calibration writes them."""
+    terms = {"coulomb": COULOMB, "viscous": VISCOUS, "viscous^1.5": CURVED, "offset": OFFSET}
+    rows = [
+        {"joint": joint, "name": name, "value": float(values[k])}
+        for name, values in terms.items()
+        for k, joint in enumerate(model.joint_names)
+    ]
+    prediction = {"law": "linear", "exponents": [1.0, 1.5], "sign_speed": SIGN_SPEED, **law}
+    return replace(model, provenance={**model.provenance, "calibration": {"friction": rows, "prediction": prediction}})
+
+
+@pytest.fixture(scope="module")
+def arm() -> DynamicsModel:
+    return with_friction(bundled_model("two_link_full"))
+
+
+def package(model: DynamicsModel, real: str = "float64") -> PackageView:
+    kernels = lower(model, "factored", ["kinetic_energy"])
+    return package_view(package_info(model, "arm", friction=True), kernels, EmitOptions(real=real))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("real", "limit"), [("float64", 1e-14), ("float32", 2e-6)])
+def test_c_is_the_formula(arm: DynamicsModel, real: str, limit: float, tmp_path: Path) -> None:
+    library = Direct(package(arm, real), shared_library(package(arm, real), tmp_path, ["-O1"]))
+    for v in np.vstack([np.zeros(2), np.random.default_rng(0).normal(size=(20, 2)), [[1e-3, -1e-3]]]):
+        qd, tau_f = v.astype(real), np.empty(2, real)
+        library("friction", qd, tau_f)
+        assert np.abs(tau_f - formula(qd.astype(float))).max() < limit * 4.0
+        library("friction", qd, qd)
+        assert np.array_equal(qd, tau_f)
+
+
+MAIN = """
+#include <cstdio>
+#include "arm/arm.hpp"
+int main()
+{
+    for (double value : arm::Description::friction({0.5, -0.01})) std::printf("%.17g ", value);
+    return 0;
+}
+"""
+
+
+def test_the_cpp_class_has_it_too(arm: DynamicsModel, tmp_path: Path) -> None:
+    write_sources(package(arm), tmp_path)
+    (tmp_path / "main.cpp").write_text(MAIN)
+    strict = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-Iinclude"]
+    subprocess.run(["gcc", "-c", "-std=c99", *strict, "src/friction.c"], cwd=tmp_path, check=True)
+    words = ["-std=c++17", *strict, "main.cpp", "friction.o", "-lm"]
+    subprocess.run(["g++", *words, "-o", "main"], cwd=tmp_path, check=True)
+    found = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert np.allclose([float(word) for word in found.split()], formula(np.array([0.5, -0.01])), rtol=1e-14)
+
+
+def test_one_log_s_friction_reaches_a_built_package(tmp_path: Path, capsys) -> None:
+    """A log of Pinocchio's torques and that friction, calibrated, emitted, built; the self-test compares it."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 30.0, 0.005)
+    rates, starts = rng.uniform(1.0, 5.0, (5, 2)), rng.uniform(0.0, 6.0, (5, 2))
+    turning = np.einsum("t,kj->tkj", time, rates) + starts
+    q, qd = 0.22 * np.sin(turning).sum(axis=1), 0.22 * (rates * np.cos(turning)).sum(axis=1)
+    qdd = -0.22 * (rates**2 * np.sin(turning)).sum(axis=1)
+    plain = np.tanh(qd / SIGN_SPEED) * (COULOMB + VISCOUS * np.abs(qd)) + OFFSET
+    torque = reference(bundled_robot("two_link_full")).inverse_dynamics(q, qd, qdd) + plain
+    torque += rng.normal(scale=0.05, size=torque.shape)
+    model = bundled_model("two_link_full")
+    log = Log("log", model.joint_names, time, q, qd, torque, "motor_torque")
+    write_log(log, tmp_path / "log.csv")
+    found = calibrate(model, tmp_path / "log.csv")
+    values = {(row.joint, row.name): row for row in found.friction}
+    for k, joint in enumerate(model.joint_names):
+        for name, truth in (("coulomb", COULOMB), ("viscous", VISCOUS), ("offset", OFFSET)):
+            row = values[joint, name]
+            assert abs(row.value - truth[k]) < 3.0 * row.std + 2e-3
+    found.model.save(tmp_path / "calibrated.npz")
+    calibrated = load(tmp_path / "calibrated.npz")
+    with pytest.raises(SystemExit) as left:
+        run(["emit-c", str(tmp_path / "calibrated.npz"), "-o", str(tmp_path / "c"), "--functions", "gravity", "--friction"])
+    assert not left.value.code
+    build_package(tmp_path / "c")
+    header = (tmp_path / "c" / "include" / "two_link_full" / "two_link_full.h").read_text()
+    assert "void two_link_full_friction(const double *qd, double *tau_f);" in header
+    assert "check_friction" in (tmp_path / "c" / "test" / "self_test.c").read_text()
+    damaged = tmp_path / "c" / "src" / "friction.c"
+    damaged.write_text(damaged.read_text().replace("tanh(", "0.99 * tanh("))
+    from psdmc.errors import ToolchainError
+
+    with pytest.raises(ToolchainError, match="friction"):
+        build_package(tmp_path / "c", edited=True)
+    capsys.readouterr()
+    with pytest.raises(SystemExit):
+        run(["show", str(tmp_path / "calibrated.npz")])
+    said = capsys.readouterr().out
+    for word in ("log: log.csv", "6,000 rows", "R^2 held out", "coulomb [Nm]", "+-"):
+        assert word in said
+    assert calibrated.theta_b is not None
+
+
+def test_what_has_no_such_friction_is_refused(arm: DynamicsModel, tmp_path: Path) -> None:
+    bare = bundled_model("two_link_full")
+    with pytest.raises(InputError, match="not calibrated"):
+        emit_c(bare, tmp_path / "c", functions=["gravity"], friction=True)
+    with pytest.raises(InputError, match="its friction is LuGre's"):
+        emit_c(with_friction(bare, law="lugre"), tmp_path / "c", functions=["gravity"], friction=True)
+    with pytest.raises(InputError, match="freestanding"):
+        emit_c(arm, tmp_path / "c", functions=["gravity"], friction=True, trig="freestanding")
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    "law", [{"sign_speed": 0.0}, {"sign_speed": "fast"}, {"exponents": [1.0, "inf"]}, {"exponents": [1.0, 99.0]}]
+)
+def test_forged_numbers_are_refused(law: dict[str, object], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="damaged"):
+        emit_c(with_friction(bundled_model("two_link_full"), **law), tmp_path / "c", functions=["gravity"], friction=True)
+
+
+def test_packages_without_it_say_nothing(tmp_path: Path) -> None:
+    emit_c(bundled_model("scara"), tmp_path / "c", functions=["gravity"])
+    assert not [path for path in (tmp_path / "c").rglob("*") if path.is_file() and "friction(" in path.read_text()]
