@@ -11,6 +11,7 @@ from psdmc.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from psdmc.calibration.api import calibrate
+    from psdmc.calibration.payload import identify_payload
     from psdmc.compiler import compile, derive, emit_c
     from psdmc.errors import DerivationError, InputError, InternalError, PsdmcError, ToolchainError
     from psdmc.export.export_urdf import export_urdf
@@ -33,6 +34,7 @@ __all__ = [
     "derive",
     "emit_c",
     "export_urdf",
+    "identify_payload",
     "load",
     "save",
 ]
@@ -43,6 +45,7 @@ _MODULES |= dict.fromkeys(("compile", "derive", "emit_c"), "psdmc.compiler")
 _MODULES |= {
     "calibrate": "psdmc.calibration.api",
     "export_urdf": "psdmc.export.export_urdf",
+    "identify_payload": "psdmc.calibration.payload",
     "DynamicsModel": "psdmc.model.dynamics_model",
     "load": "psdmc.model.load",
     "save": "psdmc.model.store",

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from psdmc.cli.exporting import export_urdf
+from psdmc.cli.loads import payload
 from psdmc.cli.measuring import bench, calibrate, excite, simulate
 from psdmc.cli.pipeline import build, cache, check, derive, emit_c
 from psdmc.cli.showing import show
@@ -49,6 +50,7 @@ COMMANDS = (
     (excite, "plan a calibration campaign"),
     (simulate, "write a campaign's logs from a virtual robot"),
     (calibrate, "identify a model's parameters from logs"),
+    (payload, "identify a load from logs with it"),
     (export_urdf, "write a model as a robot file"),
     (cache, "show or clear the compile cache"),
     (doctor, "say what is installed, and what for"),

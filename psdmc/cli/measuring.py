@@ -10,11 +10,11 @@ import typer
 from psdmc.bench.defaults import ROUNDS
 from psdmc.calibration.motions.excite_options import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
 from psdmc.cli import interrupt
-from psdmc.cli.lists import assignments
 from psdmc.cli.next_step import quoted, say_next, say_next_line
 from psdmc.cli.one_line import one_line
 from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
+from psdmc.cli.torque_constants import parsed_torque_constants
 from psdmc.errors import InputError
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def calibrate(
             output,
             report,
             CalibrateOptions(physical=physical is not False, linear=_linear(cutoff, logs)),
-            _torque_constants(torque_constants),
+            parsed_torque_constants(torque_constants),
             actuators,
             progress,
             keep=keep,
@@ -210,20 +210,3 @@ def _linear(cutoff: float | None, logs: list[Path]) -> LinearOptions:
     if campaigns:
         raise InputError(f"--cutoff is for plain logs, {campaigns[0]} is a campaign", "leave it out")
     return LinearOptions(filter=FilterOptions(cutoff=cutoff))
-
-
-def _torque_constants(given: list[str] | None) -> dict[str, float] | None:
-    """'joint=36.1,...' as a dict; None where nothing is given."""
-    found: dict[str, float] = {}
-    for word in assignments(given):
-        name, _, value = word.rpartition("=")
-        try:
-            constant = float(value)
-        except ValueError:
-            raise InputError(f"--torque-constants: {word!r}", "write JOINT=NUMBER,JOINT=NUMBER") from None
-        name = name.strip()
-        if not name or name in found:
-            what = f"joint {name!r} twice" if name else f"{word!r} names no joint"
-            raise InputError(f"--torque-constants: {what}", "write JOINT=NUMBER,JOINT=NUMBER")
-        found[name] = constant
-    return found or None

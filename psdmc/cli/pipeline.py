@@ -188,7 +188,8 @@ def emit_c(
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
     payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
     friction: Annotated[
-        bool, typer.Option("--friction", help="also R_friction: of a model that was calibrated from plain logs")
+        bool,
+        typer.Option("--friction", help="also R_friction: of a model that was calibrated from plain logs"),
     ] = False,
     adapters: Annotated[
         list[str] | None,

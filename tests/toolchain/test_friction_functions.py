@@ -26,7 +26,12 @@ from psdmc.model.load import load
 from psdmc.robot.reference import reference
 from psdmc.toolchain.build_package import build_package
 
-COULOMB, VISCOUS, CURVED, OFFSET = np.array([3.0, 1.5]), np.array([0.8, 0.3]), np.array([0.2, 0.0]), np.array([-0.4, 0.7])
+COULOMB, VISCOUS, CURVED, OFFSET = (
+    np.array([3.0, 1.5]),
+    np.array([0.8, 0.3]),
+    np.array([0.2, 0.0]),
+    np.array([-0.4, 0.7]),
+)
 SIGN_SPEED = 0.03
 
 
@@ -44,7 +49,9 @@ def with_friction(model: DynamicsModel, **law: object) -> DynamicsModel:
         for k, joint in enumerate(model.joint_names)
     ]
     prediction = {"law": "linear", "exponents": [1.0, 1.5], "sign_speed": SIGN_SPEED, **law}
-    return replace(model, provenance={**model.provenance, "calibration": {"friction": rows, "prediction": prediction}})
+    return replace(
+        model, provenance={**model.provenance, "calibration": {"friction": rows, "prediction": prediction}}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +120,17 @@ def test_one_log_s_friction_reaches_a_built_package(tmp_path: Path, capsys) -> N
     found.model.save(tmp_path / "calibrated.npz")
     calibrated = load(tmp_path / "calibrated.npz")
     with pytest.raises(SystemExit) as left:
-        run(["emit-c", str(tmp_path / "calibrated.npz"), "-o", str(tmp_path / "c"), "--functions", "gravity", "--friction"])
+        run(
+            [
+                "emit-c",
+                str(tmp_path / "calibrated.npz"),
+                "-o",
+                str(tmp_path / "c"),
+                "--functions",
+                "gravity",
+                "--friction",
+            ]
+        )
     assert not left.value.code
     build_package(tmp_path / "c")
     header = (tmp_path / "c" / "include" / "two_link_full" / "two_link_full.h").read_text()
@@ -146,13 +163,21 @@ def test_what_has_no_such_friction_is_refused(arm: DynamicsModel, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    "law", [{"sign_speed": 0.0}, {"sign_speed": "fast"}, {"exponents": [1.0, "inf"]}, {"exponents": [1.0, 99.0]}]
+    "law",
+    [{"sign_speed": 0.0}, {"sign_speed": "fast"}, {"exponents": [1.0, "inf"]}, {"exponents": [1.0, 99.0]}],
 )
 def test_forged_numbers_are_refused(law: dict[str, object], tmp_path: Path) -> None:
     with pytest.raises(InputError, match="damaged"):
-        emit_c(with_friction(bundled_model("two_link_full"), **law), tmp_path / "c", functions=["gravity"], friction=True)
+        emit_c(
+            with_friction(bundled_model("two_link_full"), **law),
+            tmp_path / "c",
+            functions=["gravity"],
+            friction=True,
+        )
 
 
 def test_packages_without_it_say_nothing(tmp_path: Path) -> None:
     emit_c(bundled_model("scara"), tmp_path / "c", functions=["gravity"])
-    assert not [path for path in (tmp_path / "c").rglob("*") if path.is_file() and "friction(" in path.read_text()]
+    assert not [
+        path for path in (tmp_path / "c").rglob("*") if path.is_file() and "friction(" in path.read_text()
+    ]

@@ -1,0 +1,134 @@
+"""A load's ten parameters from logs with it, by a model that is known without it: one linear fit, friction refitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.least_squares import Estimate, Prior, estimate_rows
+from psdmc.calibration.identify.linear_fit import LinearOptions, LinearProblem, linear_problem
+from psdmc.calibration.identify.linear_rows import Block
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
+from psdmc.calibration.logs.filter import smoothed_rows, stretches
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.progress import Progress
+
+LOAD = 10
+LOAD_NAMES = ("mass", "m x", "m y", "m z", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+"""Of the vector's first ten: mass, first moment and inertia about the origin of the frame that carries the load."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadRegressor:
+    """Torque per load parameter: Y map, (..., n, 10)."""
+
+    model: Regressor
+    map: Array
+
+    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+        return np.asarray(self.model.regressor(q, qd, qdd) @ self.map)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadFit:
+    """One vector: the load's ten parameters, then each joint's friction and offset.
+
+    estimate   without constraints; its standard deviations include those of the model's theta_b
+    problem    the columns; its torque is the measured one
+    rigid      (N, n) what the model takes without the load and without friction
+    prior      no load, and the model's friction
+    """
+
+    estimate: Estimate
+    problem: LinearProblem
+    rigid: Array
+    prior: Prior
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*LOAD_NAMES, *self.problem.names[LOAD:])
+
+    @property
+    def never_negative(self) -> NDArray[np.bool_]:
+        return self.problem.never_negative
+
+    def predicted(self, values: Array) -> Array:
+        """(N, n) torques of the whole vector."""
+        return np.concatenate([block.columns @ values for block in self.problem.rows]) + self.rigid
+
+
+def fit_load(
+    model: DynamicsModel,
+    regressor: Regressor,
+    onto_theta: Array,
+    logs: Sequence[AnyLog],
+    options: LinearOptions,
+    motors: Motors,
+    friction: Array | None,
+    theta_std: Array,
+    progress: Progress,
+) -> LoadFit:
+    """The load and the friction that explain what the model without the load leaves of checked logs' torques.
+
+    onto_theta  (l, 10) theta_b that a load adds (psdmc.model.payload.load_map)
+    friction    (n, f) the model's own, in the order of friction_names; None: unknown
+    theta_std   (l,) standard deviations of the model's theta_b, taken as independent; zero where it has none
+    """
+    chain = model.mechanism
+    load = LoadRegressor(regressor, onto_theta)
+    problem, _ = linear_problem(chain, load, LOAD, logs, options, motors, progress)
+    known = _known_columns(regressor, logs, options)
+    rigid = known @ model.known_theta_b()
+    used = np.flatnonzero(theta_std > 0.0)
+    blocks = _considering(problem, known[:, :, used])
+    sizes = torque_sizes(problem.torque[~problem.held_out])
+    width = len(problem.friction)
+    own = np.zeros((len(chain), width)) if friction is None else friction
+    prior = Prior(
+        np.concatenate([np.zeros(LOAD), own.reshape(-1)]),
+        np.concatenate([base_parameter_scale(chain, load, sizes, None), np.repeat(sizes, width)]),
+    )
+    kept = np.repeat(~problem.held_out[:, None], len(chain), axis=1)
+    covariance = np.diag(theta_std[used] ** 2) if len(used) else None
+    solved = estimate_rows(blocks, problem.torque - rigid, options.fit, covariance, kept, prior)
+    return LoadFit(solved, problem, rigid, prior)
+
+
+def _known_columns(regressor: Regressor, logs: Sequence[AnyLog], options: LinearOptions) -> Array:
+    """(N, n, l) the model's own regressor at the problem's samples, filtered like the torque; InputError where no joint
+    moves by more than its sensor's noise."""
+    found, moves = [], False
+    for log in logs:
+        for stretch in stretches(log, options.filter, options.check, options.stretch):
+            states = stretch.states
+            moves = moves or not states.still.all()
+
+            def rows(own: slice, states=states) -> Array:  # type: ignore[no-untyped-def]
+                return regressor.regressor(states.q[own], states.qd[own], states.qdd[own])
+
+            found.append(smoothed_rows(states, stretch.at, rows))
+    if not moves:
+        names = ", ".join(log.name for log in logs)
+        raise InputError(
+            f"{names}: no joint moves by more than its sensor's noise: a load does not show",
+            "record a motion that turns the load about several axes",
+        )
+    return np.concatenate(found)
+
+
+def _considering(problem: LinearProblem, consider: Array) -> list[Block]:
+    """The problem's blocks with what theta_b's uncertainty does to their torques."""
+    blocks, first = [], 0
+    for block in problem.rows:
+        own = consider[first : first + len(block)]
+        blocks.append(Block(block.columns, block.noise, own if own.shape[2] else None))
+        first += len(block)
+    return blocks

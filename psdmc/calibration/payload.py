@@ -1,0 +1,248 @@
+"""`psdmc.identify_payload`: the load in logs of a robot whose model without it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.calibration.identify.least_squares import Estimate
+from psdmc.calibration.identify.linear_fit import LinearOptions, friction_names
+from psdmc.calibration.identify.load_fit import LOAD, LOAD_NAMES, LoadFit, fit_load
+from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
+from psdmc.calibration.identify.physical import require_cvxpy
+from psdmc.calibration.identify.physical_load import about_centre, nearest_load
+from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
+from psdmc.calibration.identify.quality import qualities
+from psdmc.calibration.identify.visibility import IDENTIFIED, WEAK, Visibility, visibility
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.open_log import open_log
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.payload_found import PayloadFound, load_numbers
+from psdmc.calibration.verdict.delivered import delivered
+from psdmc.calibration.verdict.verdict import JointFigures, Verdict
+from psdmc.calibration.verdict.verdict_limits import VerdictOptions
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.payload import carrying_frame, load_map
+from psdmc.progress import Progress, silent
+from psdmc.robot.derivable import require_axes
+from psdmc.robot.inertia import six_of, standard_parameters
+
+SURE = 3.0
+"""Standard deviations from zero at which a mass is there, or is negative."""
+
+
+def identify_payload(
+    model: DynamicsModel,
+    logs: str | Path | Sequence[str | Path],
+    frame: str | None = None,
+    options: LinearOptions | None = None,
+    torque_constants: Mapping[str, float] | None = None,
+    regressor: Regressor | None = None,
+    progress: Progress = silent,
+) -> PayloadFound:
+    """Mass, centre of mass and inertia of a rigid load that logs were recorded with, and the verdict on them.
+
+    model             without the load; calibrated, or with all inertias and its joints' friction unknown
+    frame             in which the load's numbers are given: the tip's (None) or another of the model's frames
+    options           of the fit; None: filter and friction law of the model's calibration
+    torque_constants  N m/A by joint name, for logs that hold currents; None: the model's
+
+    Raises InputError where a log cannot be used, nothing moves, or the model's theta_b is unknown.
+    """
+    require_axes(model.mechanism, "payload identification")
+    if model.mechanism.has_followers:
+        raise InputError("payload identification is of joints that follow no other", "lock those that do")
+    require_cvxpy()
+    model.known_theta_b()
+    known, own, friction, constants = _of_calibration(model)
+    settings = options or own
+    place = carrying_frame(model.mechanism, frame)
+    paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    if not paths:
+        raise InputError("no log to identify a load from", "give a log that was recorded with it")
+    progress("reading logs")
+    read = [open_log(Path(path), progress) for path in paths]
+    checked_logs = [checked(log, model.mechanism, settings.filter.cutoff, settings.check) for log in read]
+    given = torque_constants or (constants if one_quantity(checked_logs) == "current" else None)
+    motors = motors_of_logs(model.joint_names, checked_logs, given)
+    progress("fitting the load")
+    same_law = friction is not None and friction.shape[1] == len(
+        friction_names(settings.exponents, settings.offset)
+    )
+    found = fit_load(
+        model,
+        regressor or ChainRegressor(model),
+        load_map(model.mechanism, model.B, place),
+        checked_logs,
+        settings,
+        motors,
+        friction if same_law else None,
+        known,
+        progress,
+    )
+    return _result(model, place.name, found, checked_logs, known)
+
+
+def _of_calibration(
+    model: DynamicsModel,
+) -> tuple[Array, LinearOptions, Array | None, Mapping[str, float] | None]:
+    """Of the model's calibration: theta_b's standard deviations, the fit's options, friction (n, f), torque constants."""
+    kept = model.provenance.get("calibration")
+    if not isinstance(kept, Mapping):
+        return np.zeros(model.l), LinearOptions(), None, None
+    found = delivered(model)
+    rows = kept.get("base_parameters", [])
+    std = np.zeros(model.l)
+    if len(rows) == model.l:
+        std = np.array([0.0 if row["std"] is None else float(row["std"]) for row in rows])
+    law = found.prediction
+    if law.law != "linear":
+        step = law.steps["inertial"]
+        return std, replace(LinearOptions(), filter=step.filter), None, found.constants or None
+    names = friction_names(law.exponents, law.offset)
+    friction = np.array([[found.friction[joint, name] for name in names] for joint in model.joint_names])
+    options = LinearOptions(
+        filter=law.steps["all"].filter, exponents=law.exponents, sign_speed=law.sign_speed, offset=law.offset
+    )
+    return std, options, friction, found.constants or None
+
+
+def _result(
+    model: DynamicsModel, frame: str, found: LoadFit, logs: Sequence[AnyLog], known: Array
+) -> PayloadFound:
+    solved = found.estimate
+    vector = nearest_load(solved.values, solved.whitening, found.never_negative)
+    mass, com, inertia = about_centre(vector[:LOAD])
+    if mass < SURE * float(solved.std[0]):  # what a load that is not there is made of says nothing
+        com, inertia = np.zeros(3), np.zeros((3, 3))
+    six = six_of(inertia)
+    whole = standard_parameters(mass, com, six)
+    delivered_vector = np.concatenate([whole, vector[LOAD:]])
+    seen = visibility(
+        found.names,
+        delivered_vector,
+        solved.std,
+        solved.unseen,
+        ["no load"] * LOAD + ["the model's"] * (len(vector) - LOAD),
+    )
+    stds = _standard_deviations(solved, delivered_vector[:LOAD], seen)
+    words = dict(zip(LOAD_NAMES, seen.words, strict=False))
+    verdict = _verdict(found, delivered_vector, words, model)
+    return PayloadFound(
+        robot=model.mechanism.name,
+        frame=frame,
+        mass=mass,
+        com=com,
+        inertia=six,
+        mass_std=float(stds[0]),
+        com_std=stds[1:4],
+        inertia_std=stds[4:],
+        visible=words,
+        verdict=verdict,
+        notes=_notes(
+            model,
+            words,
+            logs,
+            known,
+            np.abs(vector[:LOAD] - solved.values[:LOAD]) / _finite(solved.std[:LOAD]),
+        ),
+    )
+
+
+def _finite(std: Array) -> Array:
+    return np.where(np.isfinite(std) & (std > 0.0), std, np.inf)
+
+
+def _standard_deviations(solved: Estimate, load: Array, seen: Visibility) -> Array:
+    """(10,) of mass, com and inertia about it, by their slopes in the linear parameters; infinite where a slope leads to a
+    parameter that the logs do not fix."""
+    own = solved.total_covariance[:LOAD, :LOAD] + solved.prior_covariance[:LOAD, :LOAD]
+    fixed = seen.determined[:LOAD]
+    result = np.full(LOAD, np.inf)
+    result[0] = float(np.sqrt(own[0, 0])) if fixed[0] else np.inf
+    if not load[0] > 0.0 or not load[0] > SURE * result[0]:
+        return result
+    slopes = np.empty((LOAD, LOAD))
+    for k in range(LOAD):
+        step = STEP * max(abs(load[k]), STEP * load[0])
+        ahead, behind = load.copy(), load.copy()
+        ahead[k] += step
+        behind[k] -= step
+        slopes[:, k] = (load_numbers(ahead) - load_numbers(behind)) / (2.0 * step)
+    for k in range(1, LOAD):
+        leads = np.abs(slopes[k]) > LEADS * np.abs(slopes[k]).max()
+        if fixed[leads].all():
+            result[k] = float(np.sqrt(max(slopes[k] @ own @ slopes[k], 0.0)))
+    return result
+
+
+STEP = 1e-4
+"""Share of a parameter by which it is changed for a slope."""
+LEADS = 1e-9
+"""Share of the largest slope below which a number does not depend on a parameter."""
+
+
+def _verdict(found: LoadFit, vector: Array, words: Mapping[str, str], model: DynamicsModel) -> Verdict:
+    """Usable where the log shows the mass, a mass is not negative, and the torque is followed on held-out data."""
+    limits, solved, problem = VerdictOptions(), found.estimate, found.problem
+    predicted, out = found.predicted(vector), problem.held_out
+    held = qualities(problem.torque[out], predicted[out])
+    samples = int((~out).sum()) * len(model.mechanism) / max(solved.rank, 1)
+    reasons, doubts = [], []
+    if samples < limits.fewest_samples:
+        reasons.append(
+            f"{samples:.3g} independent samples per unknown, expected at least {limits.fewest_samples:g}"
+        )
+    elif samples < limits.few_samples:
+        doubts.append(f"{samples:.3g} independent samples per unknown")
+    std = float(solved.std[0])
+    if words["mass"] not in (IDENTIFIED, WEAK):
+        reasons.append(f"the log does not show the load's mass: {words['mass']}")
+    elif solved.values[0] < -SURE * std:
+        reasons.append(
+            f"the mass comes out at {solved.values[0]:.3g} +- {std:.2g} kg: is the model that of the robot without "
+            "its load, and has the log's torque the same sign?"
+        )
+    elif solved.values[0] < SURE * std:
+        doubts.append(
+            f"no mass is seen: {solved.values[0]:.3g} +- {std:.2g} kg; centre and inertia mean nothing"
+        )
+    for joint, both in zip(model.joint_names, held, strict=True):
+        if both.r2 < limits.poor_r2:
+            reasons.append(f"joint {joint}: held-out R^2 {both.r2:.3f} of the whole torque")
+        elif both.r2 < limits.fair_r2:
+            doubts.append(f"joint {joint}: held-out R^2 {both.r2:.3f} of the whole torque")
+    hidden = [name for name in LOAD_NAMES[1:] if words[name] not in (IDENTIFIED, WEAK)]
+    if hidden:
+        doubts.append(f"not shown by the log: {', '.join(hidden)} about the frame's origin")
+    nothing = float("nan")
+    joints = tuple(
+        JointFigures(joint, both.r2, both.rmse, nothing, nothing, False, nothing, nothing, nothing, nothing)
+        for joint, both in zip(model.joint_names, held, strict=True)
+    )
+    return Verdict(tuple(reasons), tuple(doubts), (), joints, samples)
+
+
+def _notes(
+    model: DynamicsModel, words: Mapping[str, str], logs: Sequence[AnyLog], known: Array, moved: Array
+) -> tuple[str, ...]:
+    notes = [note for log in logs for note in log.notes]
+    if "calibration" not in model.provenance:
+        notes.append(
+            "the model is not calibrated: standard deviations take its theta_b as exact, and its friction as unknown"
+        )
+    elif not known.all():
+        notes.append(
+            f"{int((known == 0.0).sum())} of {model.l} base parameters of the model are not fixed by its own "
+            "calibration: what is wrong with them is not in the standard deviations"
+        )
+    kept = {name: word for name, word in words.items() if word not in (IDENTIFIED, WEAK)}
+    notes += [f"{name} about the frame's origin: {word}" for name, word in kept.items()]
+    if moved.max(initial=0.0) > 1.0:
+        notes.append(f"to be a body the load was moved by up to {moved.max():.2g} standard deviations")
+    return tuple(notes)

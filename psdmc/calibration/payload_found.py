@@ -1,0 +1,146 @@
+"""An identified load: its numbers with standard deviations, its verdict, and its file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from psdmc.atomic import write_whole
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.toml_tables import read_toml
+from psdmc.calibration.verdict.verdict import Verdict
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.inertia import INERTIA_NAMES, inertia_matrix, six_of
+
+WHAT = "a load's file (.toml), as psdmc payload writes one"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PayloadFound:
+    """A load on a frame of a robot; standard deviations are infinite where the logs do not fix a number by itself.
+
+    mass, com, inertia   kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass (xx, xy, yy, xz, yz, zz)
+    visible              what the logs show of each of the ten linear parameters, in words
+    notes                what was kept, moved or noticed
+    """
+
+    robot: str
+    frame: str
+    mass: float
+    com: Array
+    inertia: Array
+    mass_std: float
+    com_std: Array
+    inertia_std: Array
+    visible: Mapping[str, str]
+    verdict: Verdict
+    notes: tuple[str, ...]
+
+    def added_to(self, model: DynamicsModel) -> DynamicsModel:
+        """The model with this load on it."""
+        return model.with_payload(self.mass, self.com, inertia_matrix(self.inertia), self.frame)
+
+    def lines(self) -> list[str]:
+        """The load as lines of text: what R_add_payload takes, with standard deviations."""
+        rows = [f"mass     {_with_std(self.mass, self.mass_std)} kg"]
+        rows += [
+            f"com {axis}    {_with_std(value, std)} m"
+            for axis, value, std in zip("xyz", self.com, self.com_std, strict=True)
+        ]
+        return rows + [
+            f"I{name}      {_with_std(value, std)} kg m^2 about the centre of mass"
+            for name, value, std in zip(INERTIA_NAMES, self.inertia, self.inertia_std, strict=True)
+        ]
+
+    def as_toml(self) -> str:
+        """The file's text. Standard deviations that do not exist are inf."""
+        return "\n".join(
+            [
+                "# A load that psdmc payload identified. Lengths in m in the frame, inertia about the centre of mass:",
+                "# Ixx Ixy Iyy Ixz Iyz Izz, kg m^2, the order of R_add_payload. inf: not fixed by the logs alone.",
+                f"frame = {_text(self.frame)}",
+                f"robot = {_text(self.robot)}",
+                f"verdict = {_text(self.verdict.word)}",
+                f"mass = {self.mass!r}",
+                f"com = {_list(self.com)}",
+                f"inertia = {_list(self.inertia)}",
+                "",
+                "[std]",
+                f"mass = {self.mass_std!r}",
+                f"com = {_list(self.com_std)}",
+                f"inertia = {_list(self.inertia_std)}",
+                "",
+            ]
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the file, whole or not at all."""
+        write_whole(path, self.as_toml())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadFile:
+    """What a load's file says; fields as of PayloadFound."""
+
+    frame: str
+    mass: float
+    com: Array
+    inertia: Array
+
+    def added_to(self, model: DynamicsModel) -> DynamicsModel:
+        """The model with this load on it; InputError where no body has these numbers or the frame is another robot's."""
+        return model.with_payload(self.mass, self.com, inertia_matrix(self.inertia), self.frame)
+
+
+def read_load(path: str | Path) -> LoadFile:
+    """A load from its file; InputError names what is wrong with it."""
+    content = read_toml(Path(path), WHAT)
+    numbers = {
+        name: _numbers(content.get(name), count) for name, count in (("mass", 1), ("com", 3), ("inertia", 6))
+    }
+    frame = content.get("frame")
+    missing = [name for name, value in numbers.items() if value is None]
+    if missing or not isinstance(frame, str):
+        wrong = ", ".join([*missing, *([] if isinstance(frame, str) else ["frame"])])
+        raise InputError(f"{path}: {wrong}: missing or no such numbers", f"expected {WHAT}")
+    mass, com, inertia = (np.asarray(value) for value in numbers.values())
+    return LoadFile(frame, float(mass[0]), com, inertia)
+
+
+def _numbers(value: Any, count: int) -> Array | None:
+    values = [value] if count == 1 else value
+    if not isinstance(values, list) or len(values) != count:
+        return None
+    if not all(isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v) for v in values):
+        return None
+    return np.array(values, dtype=np.float64)
+
+
+def load_numbers(load: Array) -> Array:
+    """(10,) mass, com, inertia about it, of ten linear parameters: what standard deviations are carried over to."""
+    mass, h = float(load[0]), load[1:4]
+    com = h / mass
+    inertia = inertia_matrix(load[4:10]) - mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return np.concatenate([[mass], com, six_of(inertia)])
+
+
+def _with_std(value: float, std: float) -> str:
+    return f"{value:9.5g} +- {std:.2g}" if math.isfinite(std) else f"{value:9.5g}, not fixed by the logs"
+
+
+def _list(values: Array) -> str:
+    return "[" + ", ".join(repr(float(v)) for v in values) + "]"
+
+
+def _text(text: str) -> str:
+    """A TOML basic string, whatever the name holds."""
+    escaped = "".join(
+        f"\\u{ord(c):04x}" if ord(c) < 0x20 or ord(c) == 0x7F else f"\\{c}" if c in '"\\' else c for c in text
+    )
+    return f'"{escaped}"'

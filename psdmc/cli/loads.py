@@ -1,0 +1,70 @@
+"""The command that finds what a robot carries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psdmc.cli import interrupt
+from psdmc.cli.next_step import say_next
+from psdmc.cli.output import check_output
+from psdmc.cli.progress import steps
+from psdmc.cli.torque_constants import parsed_torque_constants
+
+
+def payload(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="model file without the load, calibrated best")
+    ],
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="logs that were recorded with the load")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="LOAD.toml", help="write the load")
+    ] = None,
+    loaded: Annotated[
+        Path | None, typer.Option("--loaded", metavar="MODEL.npz", help="write the model with the load on it")
+    ] = None,
+    frame: Annotated[
+        str | None, typer.Option(metavar="NAME", help="frame of the load's numbers; default: the tip's")
+    ] = None,
+    torque_constants: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT=KT,...", help="N m/A, for logs that hold currents; default: the model's"),
+    ] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="write the files even where the verdict is: not usable")
+    ] = False,
+) -> None:
+    """Identify a load's mass, centre of mass and inertia from logs with it; the verdict comes first, exit 6: not usable."""
+    with interrupt.at_once():
+        from psdmc.calibration.payload import identify_payload
+        from psdmc.cli.show_checks import print_verdict
+        from psdmc.cli.tables import print_line
+        from psdmc.model.load import load
+
+    check_output(output, model, *logs)
+    check_output(loaded, model, *logs, *([output] if output else []))
+    known, constants = load(model), parsed_torque_constants(torque_constants)
+    with steps() as progress:
+        found = identify_payload(known, logs, frame, torque_constants=constants, progress=progress)
+    print_verdict(found.verdict)
+    print_line(f"on {found.frame!r} of {found.robot!r}:")
+    for line in found.lines():
+        print(f"  {line}")
+    for note in found.notes:
+        print_line(f"note: {note}")
+    written = found.verdict.usable or keep
+    if written and output is not None:
+        found.save(output)
+    if written and loaded is not None:
+        found.added_to(known).save(loaded)
+    for path in (output, loaded):
+        if path is not None:
+            print(f"{path}: {'written' if written else 'not written; --keep writes it all the same'}")
+    if not found.verdict.usable:
+        raise typer.Exit(found.verdict.exit_status)
+    if loaded is not None:
+        say_next("emit-c", loaded, "-o", loaded.stem)
