@@ -2,7 +2,7 @@
 
 PYTHON ?= python3
 VENV ?= .venv
-EXTRAS ?= test,bench,calibrate,docs
+EXTRAS ?= test,bench,calibrate,xacro,docs
 JOBS ?= auto
 RUN := $(VENV)/bin
 READY := $(VENV)/ready

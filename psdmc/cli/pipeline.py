@@ -83,7 +83,7 @@ def derive(
     from psdmc import compiler
     from psdmc.robot.lock import parsed as parsed_lock
 
-    target = output or Path(robot.stem + ".npz")
+    target = output or Path(Path(robot.name.removesuffix(".xacro")).stem + ".npz")
     check_output(target, robot)
     with steps() as progress:
         model = compiler.derive(

@@ -42,6 +42,18 @@ def test_where_parameters_are_unknown_a_campaign_is_next(tmp_path: Path) -> None
     assert next_words(done.stderr) == ["psdmc", "excite", "unknown.npz", "-o", "unknown_campaign"]
 
 
+def test_a_xacro_files_model_is_called_as_its_robot(tmp_path: Path) -> None:
+    pytest.importorskip("xacro")
+    body = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    text = f"""<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="base"/><link name="arm">{body}</link>
+    <joint name="j" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint></robot>"""
+    (tmp_path / "arm.urdf.xacro").write_text(text, encoding="utf-8")
+
+    done = typed("derive", "arm.urdf.xacro", cwd=tmp_path)
+
+    assert next_words(done.stderr) == ["psdmc", "check", "arm.npz"]
+
+
 def test_nothing_is_suggested_after_a_failure(tmp_path: Path) -> None:
     done = typed("show", tmp_path / "missing.npz")
 
