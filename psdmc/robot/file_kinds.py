@@ -12,6 +12,9 @@ from psdmc.robot.load_options import LoadOptions
 ROBOT_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf", ".toml")
 """Endings of files that `psdmc show` reads as a robot; all others are models."""
 
+MACRO = "<xacro:"
+"""What a file has that xacro must expand. What xacro made of one still declares its namespace, and is a URDF."""
+
 SourceFormat = Literal["urdf", "dh"]
 
 
@@ -30,7 +33,7 @@ def as_source(file: Path, text: str, options: LoadOptions) -> tuple[str, SourceF
         )
     if tag == "mujoco":
         return _from_mjcf(file, options)
-    if file.suffix.lower() == ".xacro" or "xmlns:xacro" in text:
+    if file.suffix.lower() == ".xacro" or MACRO in text:
         from psdmc.robot.xacro_file import expanded
 
         return expanded(file, file.name), "urdf", options

@@ -92,3 +92,20 @@ def test_an_sdf_is_told(name: str, tmp_path: Path) -> None:
 )
 def test_the_first_element(text: str, tag: str) -> None:
     assert root_tag(text) == tag
+
+
+def test_what_xacro_has_expanded_is_a_urdf(tmp_path: Path) -> None:
+    """xacro leaves its namespace in what it writes, as in most URDFs of ROS packages: it is not asked again."""
+    text = TWO_LINKS.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1)
+    (tmp_path / "expanded.urdf").write_text(text, encoding="utf-8")
+    assert load_robot(tmp_path / "expanded.urdf").mechanism.joint_names == ("turn",)
+
+
+TWO_LINKS = """
+<robot name="x">
+  <link name="base"/>
+  <link name="arm"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+  <joint name="turn" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint>
+</robot>
+"""
