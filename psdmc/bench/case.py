@@ -19,6 +19,14 @@ from psdmc.robot.small import times
 LONGEST_INPUT = 256
 """Positions of the largest robot that the loops take: LONGEST_INPUT of rivals/loops.hpp."""
 
+BENCHED = tuple(name for name, recipe in RECIPES.items() if recipe.benched)
+"""The functions that the benchmark measures."""
+
+DIFFERENTIATED = ("_derivatives", "_vjp")
+MOST_DIFFERENTIATED = 20
+"""Rates up to which functions with these endings are measured: a humanoid's matrices take every contestant minutes to
+compile."""
+
 JOINTS = ("RZ", "PZ", "FreeFlyer")
 """Pinocchio's short words for the types that rivals' models have: pinocchio_model.hpp and serial_joints.hpp."""
 
@@ -69,10 +77,18 @@ class Case:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """The functions that the benchmark measures on this robot: those that differentiate by q are of joints with one
-        coordinate each."""
-        benched = {name: recipe for name, recipe in RECIPES.items() if recipe.benched}
-        return tuple(name for name, recipe in benched.items() if not (self.is_wide and recipe.of_axes))
+        """The functions that the benchmark measures on this robot."""
+        return tuple(name for name in BENCHED if name not in self.left_out)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Derivatives of a robot with more rates than MOST_DIFFERENTIATED, and of several coordinates what is of one."""
+        large = self.chain.nv > MOST_DIFFERENTIATED
+        return tuple(
+            name
+            for name in BENCHED
+            if (large and name.endswith(DIFFERENTIATED)) or (self.is_wide and RECIPES[name].of_axes)
+        )
 
     @property
     def is_wide(self) -> bool:

@@ -85,7 +85,7 @@ def operations(case: Case) -> dict[str, dict[str, float]]:
 
 
 def _add_instructions(table: dict[str, dict[str, float]], case: Case) -> None:
-    contestants = psdmc_c.factored(case, counted_flags())
+    contestants = psdmc_c.contestants(case, "factored", case.functions, counted_flags())
     found = instructions(contestants, case.chain)
     for one in contestants:
         value = found[str(one.library), one.symbol]

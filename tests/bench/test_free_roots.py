@@ -19,7 +19,6 @@ from psdmc.bench.run import Settings, checked, run
 from psdmc.bench.states import States
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
-from psdmc.functions import RECIPES
 from psdmc.robot.joints import FREE
 from psdmc.robot.load import load_robot_text
 
@@ -57,10 +56,17 @@ def test_states_have_quaternions_of_length_one(states: States) -> None:
     assert not np.array_equal(states.q[0, 3:7], states.q[1, 3:7])
 
 
-def test_functions_that_differentiate_by_q_are_left_out(bird: Case) -> None:
-    assert "inverse_dynamics" in bird.functions
-    assert not any(RECIPES[name].of_axes for name in bird.functions)
-    assert bird.functions == tuple(n for n in psdmc_c.FUNCTIONS if not RECIPES[n].of_axes)
+def test_derivatives_of_large_robots_are_left_out_and_said(
+    bird: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert bird.functions == psdmc_c.FUNCTIONS
+    monkeypatch.setattr("psdmc.bench.case.MOST_DIFFERENTIATED", bird.chain.nv - 1)
+    assert bird.functions == tuple(n for n in psdmc_c.FUNCTIONS if not n.endswith(("_derivatives", "_vjp")))
+    monkeypatch.setattr(psdmc_c, "contestants", lambda *given: [])
+    (answer,) = psdmc_c.factored(bird, ())
+    assert isinstance(answer, Unavailable)
+    assert "inverse_dynamics_derivatives" in answer.rival
+    assert "this has 8" in answer.reason
 
 
 def test_every_layout_is_right(bird: Case) -> None:
@@ -113,9 +119,9 @@ def test_rivals_read_the_free_joint(bird: Case) -> None:
 
 def test_ways_that_differentiate_by_coordinates_are_not_compared(bird: Case, two_link: Case) -> None:
     name = "inverse_dynamics_derivatives"
-    both = {name: (f"{name}_jacobian", f"{name}_recursion"), **SYMBOLS}
-    assert name not in ways_of(bird, both)
-    assert ways_of(two_link, both | {name: both[name]})
+    both = SYMBOLS | {name: (f"{name}_jacobian", f"{name}_recursion")}
+    assert ways_of(bird, both)[name] == (f"{name}_recursion",)
+    assert ways_of(two_link, both)[name] == both[name]
 
 
 def test_a_robot_whose_joints_follow_others_is_refused_to_rivals_with_the_reason() -> None:

@@ -8,7 +8,7 @@ from itertools import accumulate
 from pathlib import Path
 
 from psdmc.bench.build import built, cxx, produced
-from psdmc.bench.case import Case
+from psdmc.bench.case import BENCHED, MOST_DIFFERENTIATED, Case
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
@@ -22,8 +22,8 @@ from psdmc.program.signature import Signature, Sizes
 from psdmc.recipes.recipe import Polynomials
 from psdmc.toolchain.compiler_command import find_compiler, run
 
-FUNCTIONS = tuple(name for name, recipe in RECIPES.items() if recipe.benched)
-"""The functions that the benchmark measures on arms; see Case.functions."""
+FUNCTIONS = BENCHED
+"""The functions that the benchmark measures; see Case.functions."""
 
 EXPANDED = tuple(
     name for name in FUNCTIONS if RECIPES[name].polynomials in (Polynomials.TORQUE, Polynomials.SOLVED)
@@ -35,9 +35,11 @@ EXPANDED_LIMIT = 30_000
 """Monomials p up to which the expanded form is measured: beyond, lowering and compiling it takes many minutes."""
 
 
-def factored(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
+def factored(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
     """The factored lowering, which users get."""
-    return contestants(case, "factored", case.functions, flags)
+    found = contestants(case, "factored", case.functions, flags)
+    reason = f"not measured where a robot has more than {MOST_DIFFERENTIATED} rates, this has {case.chain.nv}"
+    return [*found, *([Unavailable(", ".join(case.left_out), reason)] if case.left_out else [])]
 
 
 def expanded(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:
