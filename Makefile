@@ -87,11 +87,12 @@ test-pages: $(READY) ## bench, calibration and site pages in Chromium at three w
 	@mkdir -p $(GENERATED)/pages
 	PSDMC_SCREENSHOTS=$(abspath $(GENERATED)/pages) $(RUN)/python -m pytest -q -rs tests/pages
 
-ADVISORIES ?= https://pypi.org/pypi/pip/json
-ASK := import json, sys, urllib.request; json.load(urllib.request.urlopen(sys.argv[1], timeout=20))["vulnerabilities"]
+ADVISORIES ?= https://pypi.org/pypi
+ASK := import json, sys, urllib.request as u; \
+  json.load(u.urlopen(f"{sys.argv[1]}/numpy/{sys.argv[2]}/json", timeout=20))["vulnerabilities"]
 audit: $(READY) ## ask the advisory databases about every installed dependency (pip-audit; needs the network)
-	@$(RUN)/python -c '$(ASK)' $(ADVISORIES) 2>/dev/null \
-	  || { echo "error: $(ADVISORIES) gives no advisories: nothing is audited"; echo "hint: run make audit where the index of packages is reached"; exit 2; }
+	@$(RUN)/python -c '$(ASK)' $(ADVISORIES) $$($(RUN)/python -c 'import numpy; print(numpy.__version__)') 2>/dev/null \
+	  || { echo "error: $(ADVISORIES) gives no advisories of numpy: nothing is audited"; echo "hint: run make audit where the index of packages is reached"; exit 2; }
 	@test -x $(AUDIT)/bin/pip-audit || { $(PYTHON) -m venv $(AUDIT) && $(AUDIT)/bin/python -m pip install --quiet --disable-pip-version-check pip-audit; }
 	$(RUN)/python -m pip freeze --exclude-editable > $(AUDIT)/installed.txt
 	$(AUDIT)/bin/pip-audit --requirement $(AUDIT)/installed.txt --no-deps --disable-pip --strict

@@ -9,6 +9,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -50,16 +51,18 @@ def test_a_wheel_holds_every_folder():
 @pytest.mark.parametrize("answer", [None, '{"info": {}}', "<html>a mirror</html>"])
 def test_an_audit_that_reaches_no_advisories_says_so_in_a_line(answer: str | None, tmp_path: Path):
     """No answer, one of an index without advisories, and a page in place of one."""
-    page = tmp_path / "advisories"
+    page = tmp_path / "numpy" / numpy.__version__ / "json"
+    page.parent.mkdir(parents=True)
     if answer is not None:
         page.write_text(answer)
-    words = ["make", "-s", f"VENV={sys.prefix}", "-o", f"{sys.prefix}/ready", f"ADVISORIES={page.as_uri()}"]
+    index = tmp_path.as_uri()
+    words = ["make", "-s", f"VENV={sys.prefix}", "-o", f"{sys.prefix}/ready", f"ADVISORIES={index}"]
 
     done = subprocess.run([*words, "audit"], cwd=ROOT, capture_output=True, text=True, check=False)
 
     assert done.returncode == 2
     assert done.stdout.splitlines() == [
-        f"error: {page.as_uri()} gives no advisories: nothing is audited",
+        f"error: {index} gives no advisories of numpy: nothing is audited",
         "hint: run make audit where the index of packages is reached",
     ]
     assert "Traceback" not in done.stderr

@@ -39,23 +39,15 @@ def links_together(robot: Scaled) -> NDArray[np.int64]:
 
     Whatever a link does to the joints before it, the link that carries it could do: where that one has all its parameters,
     nothing is left for later links there, and links are gone through one by one. Links that hang on one with fewer
-    parameters, or that joints of the same coordinate move, are another's equal: what little one of them has alone, another
-    may have in full.
+    parameters are each other's equal: what little one of them has alone, another may have in full.
     """
     parents = [frame.parent for frame in robot.frames]
     own = robot.leads[robot.leads % PARAMETERS_PER_LINK != DRIVE] // PARAMETERS_PER_LINK
     is_full = np.bincount(own, minlength=len(parents)) == BODY_PARAMETERS
-    followed = [(frame.follows[0], k) for k, frame in enumerate(robot.frames) if frame.follows is not None]
-    meets = {k for pair in followed for k in pair} | {k for k in parents if parents.count(k) > 1}
-    pairs = []
-    for k, above in enumerate(parents):
-        if above != BASE and above in meets and not is_full[above]:
-            pairs.append((above, k))
-            meets.add(k)
     first = np.arange(len(parents))
-    for one, other in (*followed, *pairs):
-        low, high = sorted((first[one], first[other]))
-        first[first == high] = low
+    for k, above in enumerate(parents):
+        if above != BASE and not is_full[above] and (parents.count(above) > 1 or first[above] != above):
+            first[k] = first[above]
     return first
 
 

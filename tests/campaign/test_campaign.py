@@ -19,6 +19,7 @@ from campaign_trees import FEWEST, MOST, random_tree
 from unoptimised import without_optimisation
 
 from psdmc.derivation.derive import derive_model
+from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.lower.search import BUDGET, Search
 from psdmc.program.interpret import interpret
@@ -56,11 +57,12 @@ def test_robots_that_the_campaign_found(seed: int) -> None:
     assert failures(found.errors) == {}
 
 
-@pytest.mark.parametrize("seed", [FIRST_TREE + 160, FIRST_TREE + 180])
+@pytest.mark.parametrize("seed", [FIRST_TREE + 160, FIRST_TREE + 180, FIRST_TREE + 303])
 def test_trees_that_the_campaign_found(seed: int) -> None:
     """160: two base parameters of joints that follow others, of an effect of 1e-10, were left out: torques off by 7e-11.
     180: a trunk without a body, whose branches share its torque: the tiny effect of one was a pivot for all of the other's,
-    coefficients of 2e10, an InternalError."""
+    coefficients of 2e10, an InternalError. 303: among joints that follow others, an effect of 7e-15 was a pivot before
+    larger ones."""
     found = measured(seed, STATES, lowered=False)
     assert found.refused == {}
     assert failures(found.errors) == {}
@@ -172,7 +174,7 @@ def test_an_option_that_psdmc_forgets_is_seen(
     robots = map(random_tree, range(FIRST_TREE, FIRST_TREE + 300))
     robot = next(r for r in robots if forgotten[-1] in r.options and not r.follows)
     monkeypatch.setattr("campaign_measure.load_robot_text", read)
-    with pytest.raises(AssertionError):
+    with pytest.raises((AssertionError, InputError), match="coordinates|shape"):
         measured(robot.seed, STATES, lowered=False)
 
 
