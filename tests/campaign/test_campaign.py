@@ -174,7 +174,7 @@ def test_an_option_that_psdmc_forgets_is_seen(
     robots = map(random_tree, range(FIRST_TREE, FIRST_TREE + 300))
     robot = next(r for r in robots if forgotten[-1] in r.options and not r.follows)
     monkeypatch.setattr("campaign_measure.load_robot_text", read)
-    with pytest.raises((AssertionError, InputError), match="coordinates|shape"):
+    with pytest.raises((AssertionError, InputError), match=r"coordinates|shape"):
         measured(robot.seed, STATES, lowered=False)
 
 
