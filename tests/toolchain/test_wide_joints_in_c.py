@@ -146,4 +146,5 @@ def test_the_command_shows_such_a_model(
     assert not ended.value.code
     shown = capsys.readouterr().out
     for word in ("free", "spherical", "planar", "translation"):
-        assert re.search(rf"joint\d\W.*\W{word}\W.*\de[-+]\d\d", shown), word
+        assert re.search(rf"^joint\d  link\d .* {word} ", shown, re.MULTILINE), word
+    assert len(re.findall(r"^joint\d .*\d\.\de[-+]\d\d$", shown, re.MULTILINE)) == len(model.joint_names)
