@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from random_trees import COUNT, TREES, RandomTree, assert_near, columns, on_trees
+from test_derivatives import assert_blocks_near, found_in, pinocchios
 
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
 from psdmc.dynamics.energy import first_moment, kinetic_energy, potential_energy
 from psdmc.dynamics.kinematics import forward_kinematics, jacobian
 from psdmc.dynamics.momentum import total_momentum
@@ -146,12 +146,13 @@ def test_energies_and_momentum_are_pinocchios(parents, kinds, parallel) -> None:
     np.testing.assert_allclose(first_moment(tree.frames, tree.bodies, q), mass * centre, atol=1e-11)
 
 
-def test_derivatives_are_of_joints_of_one_coordinate() -> None:
-    tree = RandomTree(1, TREES["a fork"], "FRR")
-    with pytest.raises(ValueError, match="several coordinates"):
-        inverse_dynamics_derivatives(
-            tree.frames, tree.bodies, tree.drives, *lists(*tree.motion(COUNT)), tree.up
-        )
+@trees
+def test_derivatives_are_pinocchios_in_the_tangent_space(parents, kinds, parallel) -> None:
+    tree = RandomTree(12, parents, kinds, parallel)
+    states = tree.motion(COUNT)
+    expected = pinocchios(tree, states)
+    for choices in tree.choices:
+        assert_blocks_near(found_in(tree, states, choices), expected)
 
 
 def test_vectors_of_another_length_are_refused() -> None:

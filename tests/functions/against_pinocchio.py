@@ -39,7 +39,7 @@ SLIDING = {"sliding": (5, "RPRP"), "first slides": (8, "PRPR")}
 SINGLE = ("scara", "kr6", "sliding")
 """Robots that are compiled in float32 too."""
 
-COMPILED = {(name, "float64") for name in ("two_link", "scara", "kr6", "sliding")} | {("sliding", "float32")}
+COMPILED = {("scara", "float64"), ("kr6", "float64"), ("sliding", "float64"), ("sliding", "float32")}
 """Robots and precisions whose long functions are compiled; of other robots their PROGRAMs are interpreted."""
 
 OPTIMISED = COMPILED if WHOLE else {("two_link", "float64"), ("scara", "float32")}
