@@ -34,6 +34,9 @@ OPTIONAL = (
     ("cmeel-eigen", "bench", "headers for the rival Pinocchio in psdmc bench"),
     ("pandas", "notebook", "base_parameters.to_frame() in Python"),
     ("sympy", "notebook", "torques as SymPy expressions in Python"),
+    ("dask", "cluster", "functions of compiled robots over Dask's arrays"),
+    ("distributed", "cluster", "the same on a cluster"),
+    ("xarray", "cluster", "functions of compiled robots over named dimensions"),
     ("crocoddyl", "examples", "the example of trajectory optimisation"),
     ("cvxpy", "calibrate", "psdmc calibrate: physical consistency"),
     ("clarabel", "calibrate", "psdmc calibrate: its solver"),
@@ -80,6 +83,7 @@ def findings() -> tuple[Finding, ...]:
         ),
         _compiler(),
         _cache(),
+        _direct_calls(),
         *(_package(name, "", purpose) for name, purpose in NEEDED),
         *(_program(*row) for row in PROGRAMS),
         *(_package(name, extra, purpose) for name, extra, purpose in OPTIONAL),
@@ -117,6 +121,16 @@ def _compiler() -> Finding:
     return Finding(
         "C compiler", " ".join([*compiler.command, number[0] if number else ""]), True, purpose, ""
     )
+
+
+def _direct_calls() -> Finding:
+    """Whether compiled robots are called without a detour through Python, or why not."""
+    from psdmc.toolchain.direct_calls import direct_calls
+
+    found, purpose = direct_calls(), "one state from Python in less than a microsecond"
+    if found.make is None:
+        return Finding("direct calls", "", False, f"{purpose}: {found.reason}", found.remedy)
+    return Finding("direct calls", "yes", False, purpose, "")
 
 
 def _cache() -> Finding:

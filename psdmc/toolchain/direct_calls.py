@@ -42,16 +42,18 @@ class DirectCalls:
 
     make    the type DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units); None where they are not
     reason  why not, for people; empty where they are
+    remedy  how to have them
     """
 
     make: Callable[..., Any] | None
     reason: str = ""
+    remedy: str = ""
 
 
 def direct_calls() -> DirectCalls:
     """The extension, compiled now where it was not before; never an error."""
     if os.environ.get(VARIABLE, "").strip() == "0":
-        return DirectCalls(None, f"{VARIABLE} is 0")
+        return DirectCalls(None, f"{VARIABLE} is 0", f"unset {VARIABLE}")
     return _found()
 
 
@@ -59,13 +61,16 @@ def direct_calls() -> DirectCalls:
 def _found() -> DirectCalls:
     headers = Path(sysconfig.get_path("include"))
     if sys.implementation.name != "cpython" or sys.platform == "win32":
-        return DirectCalls(None, f"not made for {sys.implementation.name} on {sys.platform}")
+        reason = f"not made for {sys.implementation.name} on {sys.platform}"
+        return DirectCalls(None, reason, "use CPython on Linux or macOS")
     if not (headers / "Python.h").is_file():
-        return DirectCalls(None, f"no Python.h in {headers} (Debian: apt install python3-dev)")
+        return DirectCalls(None, f"no Python.h in {headers}", "apt install python3-dev")
     try:
         return DirectCalls(_loaded(_library(headers)).DirectCall)
     except (ToolchainError, ImportError, OSError) as error:
-        return DirectCalls(None, str(error))
+        return DirectCalls(
+            None, str(error), getattr(error, "hint", None) or "set CC to a compiler that works here"
+        )
 
 
 def _library(headers: Path) -> Path:

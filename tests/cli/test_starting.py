@@ -106,8 +106,15 @@ def test_an_optional_part_that_is_missing_is_a_hint() -> None:
     assert "error: numpy: pip install numpy" in done.stdout
 
 
+def test_the_doctor_says_whether_calls_are_direct_and_why_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PSDMC_DIRECT_CALLS", "0")
+    (found,) = (part for part in findings() if part.part == "direct calls")
+    assert (found.found, found.needed, found.remedy) == ("", False, "unset PSDMC_DIRECT_CALLS")
+    assert found.purpose.endswith("PSDMC_DIRECT_CALLS is 0")
+
+
 def test_every_dependency_that_psdmc_declares_for_its_users_is_known_to_the_doctor() -> None:
-    users = ("bench", "calibrate", "examples", "mjcf", "notebook", "xacro")
+    users = ("bench", "calibrate", "cluster", "examples", "mjcf", "notebook", "xacro")
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))[
         "project"
     ]

@@ -269,7 +269,8 @@ def test_without_headers_everything_works(
     module._found.cache_clear()
     robot = new_robot()
     assert direct_calls().make is None
-    assert direct_calls().reason == f"no Python.h in {tmp_path} (Debian: apt install python3-dev)"
+    assert direct_calls().reason == f"no Python.h in {tmp_path}"
+    assert direct_calls().remedy == "apt install python3-dev"
     assert not is_direct(robot.gravity)
     assert np.array_equal(robot.gravity(np.ones(N)), expected)
 
