@@ -13,7 +13,6 @@ from psdmc.functions import RECIPES
 from psdmc.model.random_states import on_joints
 from psdmc.program.signature import Quantity, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
-from psdmc.robot.joints import FREE
 from psdmc.robot.mechanism import Array, Mechanism
 from psdmc.robot.mujoco_reading import force_from_mujoco, to_mujoco
 
@@ -145,7 +144,7 @@ class States:
 
     @property
     def has_free_root(self) -> bool:
-        return self.chain.types[0] == FREE
+        return self.chain.has_free_root
 
     def more(self, function: str) -> int:
         """Reals per state of the function's further input, 0 where it has none."""

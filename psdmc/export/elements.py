@@ -9,7 +9,6 @@ from psdmc.export.bodies import WORLD, Body, Written
 from psdmc.export.friction import JointFriction
 from psdmc.export.numbers import exact, roll_pitch_yaw_of
 from psdmc.robot.inertia import INERTIA_NAMES
-from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.mechanism import Limits, NamedFrame, Placement
 
 MUJOCO = {
@@ -21,8 +20,6 @@ MUJOCO = {
 }
 """What MuJoCo must be told in a URDF so that links without <inertial> get no mass from their shapes; other readers pass
 over it."""
-ROUND = "continuous"
-"""Type of a joint that turns without position limits."""
 
 
 def inertial_element(body: Body) -> Element | None:
@@ -66,14 +63,10 @@ LARGEST = 1e30
 
 
 def joint_word(body: Body) -> str:
-    """URDF's type: a joint that turns without limits is continuous."""
-    if (
-        body.joint.type is REVOLUTE
-        and math.isinf(body.joint.limits.lower)
-        and math.isinf(body.joint.limits.upper)
-    ):
-        return ROUND
-    return body.joint.type.urdf_words[0]
+    """URDF's type; of two words the last is for a joint without position limits."""
+    limits = body.joint.limits
+    endless = math.isinf(limits.lower) and math.isinf(limits.upper)
+    return body.joint.type.urdf_words[-1 if endless else 0]
 
 
 def fixed_link(robot: Element, frame: NamedFrame, parent: str) -> None:

@@ -21,9 +21,8 @@ from psdmc.export.read_back import LIMIT, Reading, read_mjcf_back, read_urdf_bac
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_axes
-from psdmc.robot.joints import FREE
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import BASE, DRIVE
+from psdmc.robot.mechanism import DRIVE
 
 MJCF_SUFFIX = ".xml"
 STANDARD = (0.0, 0.0, -9.81)
@@ -90,8 +89,9 @@ def export_urdf(
 def _require_exportable(model: DynamicsModel) -> None:
     """InputError where a joint is of a kind that is not written: all but one of one coordinate, and a free root."""
     chain = model.mechanism
-    free = chain.types[0] is FREE and chain.parents[0] == BASE
-    if not all(kind.about_z for kind in chain.types[1:]) or not (free or chain.types[0].about_z):
+    if not all(kind.about_z for kind in chain.types[1:]) or not (
+        chain.has_free_root or chain.types[0].about_z
+    ):
         require_axes(chain, "a written URDF")
     model.known_theta_b()
 

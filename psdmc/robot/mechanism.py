@@ -29,6 +29,9 @@ DRIVE = BODY_PARAMETERS
 BASE = -1
 """Parent of a body that hangs on the base."""
 
+FREE_RATES = 6
+"""Rates of a joint that lets a body move in every way."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -168,6 +171,11 @@ class Mechanism:
     def is_serial(self) -> bool:
         """Whether each body hangs on the one before, the first on the base, and the tip is on the last."""
         return self.parents == serial_parents(len(self)) and self.tip_body == len(self) - 1
+
+    @property
+    def has_free_root(self) -> bool:
+        """Whether the first body may move in every way against the base."""
+        return self.types[0].nv == FREE_RATES and self.parents[0] == BASE
 
     @property
     def own_joints(self) -> tuple[int, ...]:

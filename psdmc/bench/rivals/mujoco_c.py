@@ -15,9 +15,8 @@ from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import inertia_matrix, joint_frame_map
 from psdmc.errors import InputError, ToolchainError
-from psdmc.robot.joints import FREE
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import BASE, DRIVE, Array, Mechanism
+from psdmc.robot.mechanism import BASE, DRIVE, FREE_RATES, Array, Mechanism
 
 RIVAL = "MuJoCo"
 FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")
@@ -101,7 +100,7 @@ def _refuse_moved_root(chain: Mechanism) -> None:
     """MuJoCo's free joints are on the world, and their positions are the body's in the world."""
     for joint, parent in zip(chain.joints, chain.parents, strict=True):
         placed = np.any(joint.placement.translation) or np.any(joint.placement.rotation != np.eye(3))
-        if joint.type == FREE and (parent != BASE or placed):
+        if joint.type.nv == FREE_RATES and (parent != BASE or placed):
             raise InputError(
                 f"its free joints are on the world, and {shown(joint.name)} is elsewhere", "leave it out"
             )

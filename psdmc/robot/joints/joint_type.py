@@ -43,7 +43,7 @@ class JointType:
     coordinates, from which `rotation` and `way` give the frame's place. Rates are along the moved frame's own axes.
 
     word           in robot files, model files and tables
-    urdf_words     types of a URDF's <joint> that move so
+    urdf_words     types of a URDF's <joint> that move so, the last for one without position limits
     follows_axis   whether its frame's z is along a URDF's <axis>; else its frame is the child link's
     only_axis      the only direction that a URDF's <axis> may have, in the child link; None: any
     nq, nv         numbers of coordinates and of rates
