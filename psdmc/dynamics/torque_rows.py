@@ -57,8 +57,7 @@ def torque_rows(frames: Sequence[Frame], link_frames: Sequence[Placed], up: Vect
     places: list[NDArray[np.int64]] = []
     used = 0
     for k, (frame, place, part) in enumerate(zip(frames, link_frames, own, strict=True)):
-        turned = np.array(frame.rotation, dtype=np.longdouble)
-        fixed = moving_map(turned, np.array(frame.translation, dtype=np.longdouble))
+        fixed = moving_map(_axes_at_rest(frame), np.array(frame.translation, dtype=np.longdouble))
         is_first = frame.parent == BASE
         above = np.zeros((0, BODY_PARAMETERS), np.longdouble) if is_first else carried[frame.parent]
         before, own_rows = len(above), np.arange(used, used + len(part))
@@ -69,6 +68,16 @@ def torque_rows(frames: Sequence[Frame], link_frames: Sequence[Placed], up: Vect
         rows[places[k], first : first + BODY_PARAMETERS] = times(carried[k], about_link)
         rows[places[k][before:], first + DRIVE] = part[:, DRIVE]
     return rows
+
+
+def _axes_at_rest(frame: Frame) -> Long:
+    """(3, 3): a frame's axes in its parent's where its joint has not moved. Only what slides shows its turn there: about a
+    joint that turns, all directions are alike to what its torque does not depend on."""
+    s, c = np.sin(np.longdouble(frame.offset)), np.cos(np.longdouble(frame.offset))
+    for _ in range(frame.quarters):
+        s, c = c, -s
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], np.longdouble)
+    return np.asarray(times(np.array(frame.rotation, np.longdouble), turn))
 
 
 def _own_torques(frames: Sequence[Frame], up: Vector) -> list[Long]:

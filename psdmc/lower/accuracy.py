@@ -20,6 +20,9 @@ LIMIT = 2e-12
 """Error of an arrangement that may be taken: a fifth of what is promised, as these states are few. Robots of one scale
 have 1e-16 to 1e-13."""
 
+WRONG = 1e-8
+"""Error that no rounding makes: an arrangement of another robot. The largest seen of robots that are admitted is 1e-10."""
+
 
 class Accuracy:
     """Errors of a model's arrangements, by inverse dynamics: it runs the arithmetic of all other functions.

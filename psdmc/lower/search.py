@@ -16,7 +16,8 @@ import numpy as np
 
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.motion import Choices
-from psdmc.lower.accuracy import LIMIT, Accuracy
+from psdmc.errors import InternalError
+from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy
 from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace
 from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
 from psdmc.lower.geometry import LARGE, Geometry
@@ -110,13 +111,18 @@ class Search:
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function. `start` is one found for another function, whose geometry is
-        kept. Where the cheapest is not accurate enough, the search is made again among those that are."""
+        kept. Where the cheapest is not accurate enough, the search is made again among those that are; InternalError where
+        all are beyond what rounding does."""
         found = self._descended(recipe, scoring, start)
         accuracy = self._accuracy
         if accuracy is None or accuracy.error(found) <= LIMIT:
             return found
         firsts = [start] if start else [next(self.starts(feet)) for feet in self.geometry.feet]
-        return self._descended(recipe, scoring, start, self._accurate(firsts, accuracy))
+        found = self._descended(recipe, scoring, start, self._accurate(firsts, accuracy))
+        error = accuracy.error(found)
+        if error > WRONG:
+            raise InternalError(f"{recipe.name}: the torques of its arrangement are off by {error:.1e}")
+        return found
 
     def _descended(
         self,
