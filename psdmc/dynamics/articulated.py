@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.frames import Frame, Rotation, Turn
+from psdmc.dynamics.frames import Frame, Rotation, Turn, handed_on, handed_vector
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, multiply, transpose
 
 Six = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
@@ -62,6 +62,13 @@ def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
         own + (near[i][j] + far[j][i]) for own, (i, j) in zip(inertia.angular, _PLACES, strict=True)
     )
     return Articulated(inertia.linear, mixed, angular)
+
+
+def handed(frame: Frame, inertia: Articulated) -> Articulated:
+    """What a frame's parent gets, about the parent's frame: the sum over all limbs that the frame stands for."""
+    rows = tuple(handed_vector(frame, row) for row in inertia.mixed)
+    linear, angular = (tuple(handed_on(frame, part)) for part in (inertia.linear, inertia.angular))
+    return Articulated(linear, rows, angular)  # type: ignore[arg-type]
 
 
 def along_parent(frame: Frame, inertia: Articulated) -> Articulated:

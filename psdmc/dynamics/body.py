@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from psdmc.dynamics.frames import Frame, Rotation, Turn, to_previous
+from psdmc.dynamics.frames import Frame, Rotation, Turn, handed_on, handed_vector, to_previous
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector, add, multiply, rotated_tensor, transform, transpose
 
 
@@ -116,3 +116,9 @@ def joined(a: Body, b: Body) -> Body:
     """Two bodies about one frame as one."""
     second = tuple(x + y for x, y in zip(a.second, b.second, strict=True))
     return Body(a.mass + b.mass, add(a.moment, b.moment), second)
+
+
+def handed_body(frame: Frame, body: Body) -> Body:
+    """What a frame's parent gets of a body about the parent's frame: the sum over all limbs that the frame stands for."""
+    (mass,), moment = handed_on(frame, [body.mass]), handed_vector(frame, body.moment)
+    return Body(mass, moment, tuple(handed_on(frame, body.second)))

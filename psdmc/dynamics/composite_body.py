@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psdmc.dynamics.body import Body, in_previous, joined, shifted, turned
+from psdmc.dynamics.body import Body, handed_body, in_previous, joined, shifted, turned
 from psdmc.dynamics.following import both_summed, on_coordinates
 from psdmc.dynamics.frames import (
     BASE,
@@ -51,9 +51,8 @@ def mass_matrix(
         if parent != BASE:
             double = _double(frames[i], own[i]) if choices.fold_double_angle else None
             before = turned(composites[i], turns[i], double)
-            composites[parent] = joined(
-                composites[parent], shifted(in_previous(frames[i], before), offsets[i])
-            )
+            moved = shifted(in_previous(frames[i], before), offsets[i])
+            composites[parent] = joined(composites[parent], handed_body(frames[i], moved))
     return tuple(tuple(row) for row in rows)
 
 

@@ -17,6 +17,7 @@ from psdmc.dynamics.articulated import (
     before_turn,
     both,
     from_rows,
+    handed,
     moved_to,
     rigid,
     rows_of,
@@ -128,7 +129,7 @@ class _Inward:
         frame, state = self.frames[i], self.forward.states[i]
         if not self.forward.folded[i]:
             inertia = before_turn(inertia, state.turn)
-        inertia = moved_to(along_parent(frame, inertia), state.offset)
+        inertia = handed(frame, moved_to(along_parent(frame, inertia), state.offset))
         known = self.beyond.get(frame.parent)
         self.beyond[frame.parent] = inertia if known is None else both(known, inertia)
 

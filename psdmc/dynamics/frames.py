@@ -9,7 +9,7 @@ and cosine exactly and cost nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -42,6 +42,8 @@ class Frame:
     offset       rad, turn about z at q = 0, beside
     quarters     whole quarter turns, 0 to 3
     follows      leader, ratio and offset where its joint's q is that of another: ratio q_leader + offset (following.py)
+    limbs        of a limb's first frame that stands for those of several limbs at once: gives the sum over them of a scalar
+                 that is one for each; None: it stands for itself
 
     Made of these: whether its axis has the direction of the joint's that it hangs on (`is_parallel`), and the rotation and
     its transpose without their zeros (`inward_rows`, `outward_rows`).
@@ -51,9 +53,10 @@ class Frame:
     parent: int
     rotation: Matrix
     translation: Vector
-    offset: float = 0.0
+    offset: Scalar = 0.0
     quarters: int = 0
     follows: tuple[int, float, float] | None = None
+    limbs: Callable[[Scalar], Scalar] | None = None
     is_parallel: bool = field(init=False, compare=False)
     inward_rows: Fixed = field(init=False, compare=False)
     outward_rows: Fixed = field(init=False, compare=False)
@@ -216,6 +219,17 @@ def joint_offset(frame: Frame, q: Scalar) -> Vector:
     x, y, z = frame.translation
     slide = (frame.rotation[0][2] * way, frame.rotation[1][2] * way, frame.rotation[2][2] * way)
     return (x + slide[0], y + slide[1], z + slide[2])
+
+
+def handed_on(frame: Frame, values: Iterable[Scalar]) -> Iterator[Scalar]:
+    """What a frame's parent gets, from what the frame gives: the same, or the sums over all limbs that it stands for."""
+    return iter(values) if frame.limbs is None else map(frame.limbs, values)
+
+
+def handed_vector(frame: Frame, v: Vector) -> Vector:
+    """The same of a vector."""
+    x, y, z = handed_on(frame, v)
+    return (x, y, z)
 
 
 def to_previous(frame: Frame, v: Vector) -> Vector:

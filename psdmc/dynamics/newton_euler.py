@@ -7,7 +7,16 @@ from types import MappingProxyType
 
 from psdmc.dynamics.body import Body, turned
 from psdmc.dynamics.following import on_coordinates, summed
-from psdmc.dynamics.frames import BASE, Frame, Rotation, Turn, inward, joint_angle, to_previous
+from psdmc.dynamics.frames import (
+    BASE,
+    Frame,
+    Rotation,
+    Turn,
+    handed_vector,
+    inward,
+    joint_angle,
+    to_previous,
+)
 from psdmc.dynamics.motion import PLAIN, Choices, Forward, LinkMotion, sweep_outward
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, transform
 from psdmc.dynamics.slices import flat, positions, rates
@@ -124,12 +133,14 @@ def sweep_inward(
         if forward.joins[i]:
             group_turn = forward.compound_turns[parent if forward.folded[i] else i]
             x, y, _ = inward(group_turn, moment)
-            gathered[parent] = add(gathered[parent], (gathered[i][0] + x, gathered[i][1] + y, 0.0))
+            across = (gathered[i][0] + x, gathered[i][1] + y, 0.0)
+            gathered[parent] = add(gathered[parent], handed_vector(frame, across))
             carried: Vector = (0.0, 0.0, moment[2])
         else:
             turn = None if forward.folded[i] else forward.compound_turns[i]
             carried = to_previous(frame, add(inward(turn, moment), gathered[i]))
-        carried = add(carried, cross(state.offset, force))
+        carried = handed_vector(frame, add(carried, cross(state.offset, force)))
+        force = handed_vector(frame, force)
         forces[parent], moments[parent] = add(forces[parent], force), add(moments[parent], carried)
     return tuple(flat(torques))
 

@@ -123,6 +123,7 @@ def make_body(
     stores_early: bool,
     in_groups: Collection[str] = (),
     products: Sequence[Product] = (),
+    uniform: Collection[str] = UNIFORM_VECTORS,
 ) -> Body:
     """Lay out a PROGRAM, and products of what it puts out.
 
@@ -132,13 +133,14 @@ def make_body(
     stores_early  store a value as soon as it is known (large outputs) or all at the end (small ones)
     in_groups     vectors that are also stored in groups of four, as soon as the last of them is known; where there are
                   others beside them, STORE_BLOCK stores those
+    uniform       vectors that are the same in all lanes
     """
     multiplied = tuple(multiplication(program, product, sizes) for product in products)
     sizes = {name: size for name, size in sizes.items() if name not in {each.output for each in multiplied}}
     groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
     beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
     writer = _Writer(
-        program, suffix, stores_early, groups, frozenset(beside.difference(in_groups)), multiplied
+        program, suffix, stores_early, groups, frozenset(beside.difference(in_groups)), multiplied, uniform
     )
     sections = writer.sections(sizes)
     read = {slot.vector for slot in program.inputs()}
@@ -157,13 +159,14 @@ class _Writer:
         groups: StoreGroups,
         beside: frozenset[str],
         products: Sequence[Multiplication],
+        uniform: Collection[str],
     ) -> None:
         self.program, self.suffix, self.stores_early = program, suffix, stores_early
         self.groups, self.beside = groups, beside
         self.left = {product.left: product.shape for product in products}
         self.right = {product.right: product.shape for product in products}
         self.stored: dict[Slot, Store] = {}
-        self.names = Names.of(program)
+        self.uniform, self.names = uniform, Names.of(program, uniform)
         self.stores: dict[int, list[Slot]] = {}
         for slot, index in program.outputs:
             self.stores.setdefault(index, []).append(slot)
@@ -185,7 +188,7 @@ class _Writer:
         """The inputs among these values that no earlier section has loaded."""
         slots = {self.program.body[i].slot for i in wanted if not self.done[i]}
         return tuple(
-            Load(_load_name(slot), slot.vector, slot.index, slot.vector in UNIFORM_VECTORS)
+            Load(_load_name(slot), slot.vector, slot.index, slot.vector in self.uniform)
             for slot in self.program.inputs()
             if slot in slots
         )

@@ -6,6 +6,7 @@ The texts are the same for one state and for one state per lane: a value is `V` 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -47,21 +48,22 @@ class Names:
     uniform: tuple[bool, ...]
 
     @staticmethod
-    def of(program: Program) -> Names:
+    def of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> Names:
+        """`shared` are vectors that are the same in all lanes."""
         uses = program.uses()
         outputs = {index for _, index in program.outputs}
         named = [uses[i] > 1 or i in outputs for i in range(len(program))]
         uniform: list[bool] = []
         for instr in program:
-            uniform.append(_is_uniform(instr, uniform))
+            uniform.append(_is_uniform(instr, uniform, shared))
         _cut_deep_trees(program, named)
         return Names(program, tuple(named), tuple(uniform))
 
 
-def _is_uniform(instr: Instr, known: list[bool]) -> bool:
+def _is_uniform(instr: Instr, known: list[bool], shared: Collection[str]) -> bool:
     op, args, slot, _ = instr
     if slot is not None:
-        return slot.vector in UNIFORM_VECTORS
+        return slot.vector in shared
     if op is Op.SIN or op is Op.COS or op is Op.SQRT:
         return False
     return all(known[a] for a in args)

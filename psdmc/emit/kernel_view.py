@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from psdmc.emit.body import Body, make_body
+from psdmc.emit.limbs import LimbsView, limbs_view
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.products import Multiplication
 from psdmc.emit.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
@@ -44,6 +45,7 @@ class KernelView:
     """One kernel: the file(s) with its body, its C functions and their signatures.
 
     single_file  body file, included once per instantiation; also `lanes_file` where one order serves both
+    limbs        a further body for one state; None where there is none
     positive     what must be positive and is not put out; None where there is no such thing
     pivot_order  its entries in the order in which they are found
     """
@@ -62,6 +64,7 @@ class KernelView:
     pivot_order: tuple[int, ...]
     cost: Cost
     lowering: str
+    limbs: LimbsView | None = None
 
     @property
     def called(self) -> str:
@@ -167,7 +170,8 @@ class KernelView:
     @property
     def cost_text(self) -> str:
         """Operations of one state, as text for the header."""
-        return f"{self.name}: {self.cost}, {self.lowering}"
+        limbs = f"; one state with limbs in lanes: {self.limbs.cost}" if self.limbs else ""
+        return f"{self.name}: {self.cost}, {self.lowering}{limbs}"
 
     @property
     def blocks(self) -> tuple[VectorView, ...]:
@@ -197,6 +201,13 @@ class FunctionView:
     def products(self) -> tuple[Multiplication, ...]:
         """Those of all kernels."""
         return tuple(p for kernel in self.kernels for p in kernel.single_body.products)
+
+    @property
+    def limbs(self) -> tuple[int, ...]:
+        """Numbers of limbs in lanes, over all kernels."""
+        return tuple(
+            sorted({count for kernel in self.kernels if kernel.limbs for count in kernel.limbs.counts})
+        )
 
     @property
     def needs_parameters(self) -> bool:
@@ -255,7 +266,14 @@ def kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) 
         ),
         cost=cost(kernel.single),
         lowering=kernel.lowering,
+        limbs=_limbs(kernel, sizes, options),
     )
+
+
+def _limbs(kernel: Kernel, sizes: Sizes, options: EmitOptions) -> LimbsView | None:
+    if kernel.limbs is None or not options.target.vectors:
+        return None
+    return limbs_view(kernel.name, kernel.limbs, kernel.inputs, kernel.function.sizes(sizes), options)
 
 
 def _is_by_state(kernel: Kernel, sizes: Sizes) -> bool:

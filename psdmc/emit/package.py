@@ -13,6 +13,7 @@ from psdmc.emit.friction import FrictionView
 from psdmc.emit.info import PackageInfo
 from psdmc.emit.kernel_view import FunctionView, KernelView, function_views
 from psdmc.emit.lanes import VectorWidth, vector_widths
+from psdmc.emit.limbs import LimbVector, limb_units, limb_vectors
 from psdmc.emit.manifest import manifest
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
@@ -127,7 +128,19 @@ class PackageView:
         """The inline sincos for each vector width that vectors.h may choose, for lanes or for one state's angles."""
         units = dict.fromkeys(width.unit for width in self.widths)
         units |= dict.fromkeys(width.angles.unit for width in self.widths)
+        units |= dict.fromkeys(limb_units(self.limb_vectors, self.options))
         return tuple(vector_trig(self.robot, self.real, unit, self.options.far) for unit in units)
+
+    @property
+    def limb_vectors(self) -> tuple[LimbVector, ...]:
+        """Vectors with one real per limb."""
+        return limb_vectors([count for function in self.functions for count in function.limbs], self.options)
+
+    @property
+    def sincos_types(self) -> tuple[tuple[str, str], ...]:
+        """Vectors whose sines are taken: the macro of their width, and the type."""
+        limbs = ((f"{vector.macro}_WIDTH", vector.name) for vector in self.limb_vectors)
+        return (("WIDTH", "lanes"), ("ANGLE_WIDTH", "angles"), *limbs)
 
     @property
     def widths(self) -> tuple[VectorWidth, ...]:
@@ -394,6 +407,8 @@ def library_files(package: PackageView) -> dict[str, str]:
     if package.has_roots:
         named["src/roots.h"] = "roots.h.jinja"
     files = {path: render(template, package=package) for path, template in named.items()}
+    for vector in package.limb_vectors:
+        files[f"src/{vector.name}.h"] = render("limbs.h.jinja", package=package, limbs=vector)
     for function in package.functions:
         files[f"src/{function.name}.c"] = render(_template(function), package=package, function=function)
         for kernel in function.kernels:
@@ -402,6 +417,8 @@ def library_files(package: PackageView) -> dict[str, str]:
             bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
             for file, body in bodies.items():
                 files[f"src/{file}"] = render("body.inc.jinja", body=body)
+            if kernel.limbs:
+                files[f"src/{kernel.limbs.file}"] = render("limbs.inc.jinja", limbs=kernel.limbs)
     if package.info.payload:
         files["src/payload.c"] = render("payload.c.jinja", package=package)
     if package.info.friction:

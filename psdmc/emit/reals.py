@@ -52,7 +52,10 @@ def check_range(info: PackageInfo, kernels: Mapping[str, Kernel], real: str) -> 
 
 
 def _constants(kernel: Kernel) -> Iterable[float]:
-    for program in (kernel.single, kernel.batch):
+    stages = kernel.limbs.stages if kernel.limbs else ()
+    for program in (kernel.single, kernel.batch, *(stage.program for stage in stages)):
         for instr in program:
             if instr.value is not None:
                 yield instr.value
+    for group in kernel.limbs.groups if kernel.limbs else ():
+        yield from (value for row in group.constants for value in row)

@@ -47,6 +47,7 @@ RECIPE = Recipe(
     pinocchio,
     starts="inverse_dynamics",
     polynomials=Polynomials.SOLVED,
+    in_limbs=True,
     accelerates=True,
     default=True,
     benched=True,

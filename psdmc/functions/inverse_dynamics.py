@@ -35,6 +35,7 @@ RECIPE = Recipe(
     "rnea",
     pinocchio,
     polynomials=Polynomials.TORQUE,
+    in_limbs=True,
     default=True,
     benched=True,
 )

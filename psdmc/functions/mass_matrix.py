@@ -37,6 +37,7 @@ RECIPE = Recipe(
     starts="inverse_dynamics",
     matters=("fold_double_angle",),
     polynomials=Polynomials.MASS,
+    in_limbs=True,
     default=True,
     benched=True,
 )

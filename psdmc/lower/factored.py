@@ -80,18 +80,18 @@ def cost_of_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConst
 def _recorded(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, tracer: Tracer) -> Recorded:
     inputs = _inputs(recipe, robot, tracer)
     n, unit = arrangement.n, arrangement.unit
-    values = _carrier_values(arrangement, robot.theta_b, tracer)
+    values = carrier_values(arrangement, robot.theta_b, tracer)
     bodies, drives = bodies_from_carriers(n, arrangement.carriers, values, unit)
     scaled = in_unit(arrangement.reframed, unit)
 
     def by_theta() -> ByTheta:
-        symbols = _carrier_values(arrangement, None, tracer)
+        symbols = carrier_values(arrangement, None, tracer)
         return ByTheta(
             tracer.symbols("theta_b", arrangement.transfer.shape[1]),
             *bodies_from_carriers(n, arrangement.carriers, symbols, unit),
         )
 
-    return _traced(recipe, robot, scaled, inputs, bodies, drives, arrangement.choices, unit, by_theta)
+    return traced(recipe, robot, scaled, inputs, bodies, drives, arrangement.choices, unit, by_theta)
 
 
 def trace_geometry(recipe: Recipe, reframed: Reframed, robot: RobotConstants) -> Program:
@@ -99,7 +99,7 @@ def trace_geometry(recipe: Recipe, reframed: Reframed, robot: RobotConstants) ->
     tracer = Tracer()
     inputs = _inputs(recipe, robot, tracer)
     return drop_unused(
-        tracer.finish(_traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, _without_bodies))
+        tracer.finish(traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, _without_bodies))
     )
 
 
@@ -107,7 +107,7 @@ def _without_bodies() -> ByTheta:
     return ByTheta([], (), ())
 
 
-def _traced(
+def traced(
     recipe: Recipe,
     robot: RobotConstants,
     reframed: Reframed,
@@ -118,6 +118,7 @@ def _traced(
     unit: float,
     by_theta: Callable[[], ByTheta],
 ) -> Recorded:
+    """What a recipe records on these frames, bodies and symbols: every entry of its outputs with its slot."""
     ingredients = Ingredients(
         frames=reframed.frames,
         base_acceleration=reframed.base_acceleration,
@@ -158,7 +159,8 @@ def _flat(values: Any) -> list[Symbol | Number]:
     return [x for value in values for x in _flat(value)] if isinstance(values, list | tuple) else [values]
 
 
-def _carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:
+def carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:
+    """Values of the carriers; of a theta_b that is not known as symbols."""
     transfer = arrangement.transfer
     if theta_b is not None:
         return [math.fsum(row) for row in (transfer * theta_b).tolist()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Literal
 
 from psdmc.dynamics.solve import SingularMassMatrix
@@ -11,6 +12,7 @@ from psdmc.functions import DEFAULT, RECIPES, default_of
 from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
+from psdmc.lower.limb_search import LimbSearch
 from psdmc.lower.loops import in_loops
 from psdmc.lower.search import Scoring, Search, for_lanes, for_one_state
 from psdmc.model.dynamics_model import DynamicsModel
@@ -155,7 +157,16 @@ class _Lowered:
             single = self._factored(recipe, theta, self.single)
             batch = self._factored(recipe, theta, self.batch)
             candidates.append(_kernel(recipe, theta, single, batch, "factored", self.costs, n))
-        return min(candidates, key=lambda kernel: self.single.score(kernel.single))
+        kernel = min(candidates, key=lambda kernel: self.single.score(kernel.single))
+        return kernel if theta or not recipe.in_limbs else self._in_limbs(recipe, kernel)
+
+    def _in_limbs(self, recipe: Recipe, kernel: Kernel) -> Kernel:
+        """With limbs of equal structure in lanes, where that is worth while."""
+        if self.model.mechanism.is_serial or self.lowering == "expanded":
+            return kernel
+        start = self._arrangement(recipe, False)
+        limbs = LimbSearch(self._search(False), recipe, self.costs).best(start, kernel.single)
+        return kernel if limbs is None else replace(kernel, limbs=limbs)
 
     def _may_expand(self, recipe: Recipe) -> bool:
         if self.lowering == "factored" or recipe.polynomials is None or self.model.p is None:

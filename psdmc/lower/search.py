@@ -107,14 +107,14 @@ class Search:
         self._costs: dict[tuple[str, Reframed, float, tuple[int, ...], Choices], Cost] = {}
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         known = theta_b if known is None else known
-        self._accuracy = None if known is None else Accuracy(self.robot, known)
+        self.accuracy = None if known is None else Accuracy(self.robot, known)
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function. `start` is one found for another function, whose geometry is
         kept. Where the cheapest is not accurate enough, the search is made again among those that are; InternalError where
         all are beyond what rounding does."""
         found = self._descended(recipe, scoring, start)
-        accuracy = self._accuracy
+        accuracy = self.accuracy
         if accuracy is None or accuracy.error(found) <= LIMIT:
             return found
         firsts = [start] if start else [next(self.starts(feet)) for feet in self.geometry.feet]
@@ -165,7 +165,7 @@ class Search:
         return best
 
     def _admits(self, accurate: Arrangement | None) -> Callable[[Arrangement], bool]:
-        accuracy = self._accuracy
+        accuracy = self.accuracy
         if accuracy is None or accurate is None:
             return lambda arrangement: True
         limit = max(LIMIT, accuracy.error(accurate))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from psdmc.program.limb_program import LimbProgram, unpacked
 from psdmc.program.program import Program
 from psdmc.program.signature import Signature
 
@@ -19,6 +20,8 @@ class Kernel:
     lowering  how it was made: 'expanded' or 'factored'
     before    where the function's products are multiplied in loops: the arithmetic in front of them, for one state and for
               lanes; single and batch have them written out
+    limbs     the same for one state, limbs of equal structure in the lanes of vectors, for machines whose vectors make it
+              worth while; None: none do
     """
 
     function: Signature
@@ -27,6 +30,7 @@ class Kernel:
     batch: Program
     lowering: str
     before: Program | None = None
+    limbs: LimbProgram | None = None
 
     def __post_init__(self) -> None:
         inputs = set(self.inputs)
@@ -35,6 +39,8 @@ class Kernel:
             self._check(program, inputs, outputs)
         if self.before is not None:
             self._check(self.before, inputs, set(self.function.traced))
+        if self.limbs is not None:
+            self._check(unpacked(self.limbs), inputs, outputs)
 
     def _check(self, program: Program, inputs: set[str], outputs: set[str]) -> None:
         foreign = [str(slot) for slot in program.inputs() if slot.vector not in inputs]

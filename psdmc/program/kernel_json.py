@@ -9,12 +9,13 @@ from typing import Any
 from psdmc.errors import InternalError
 from psdmc.program.check import check
 from psdmc.program.kernel import Kernel
+from psdmc.program.limb_program import LimbGroup, LimbProgram, Spread, Stage
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.signature import Signature
 
 _OPERATIONS = {op.value: op for op in Op}
 
-FORMAT = 2
+FORMAT = 3
 """Version of the text's form."""
 
 
@@ -28,6 +29,7 @@ def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
             "single": _program_to_plain(kernel.single),
             "batch": None if kernel.batch is kernel.single else _program_to_plain(kernel.batch),
             "before": None if kernel.before is None else _program_to_plain(kernel.before),
+            "limbs": None if kernel.limbs is None else _limbs_to_plain(kernel.limbs),
         }
         for kernel in kernels.values()
     ]
@@ -53,7 +55,37 @@ def _kernel_from_plain(entry: Mapping[str, Any], functions: Mapping[str, Signatu
     single = _program_from_plain(entry["single"])
     batch = single if entry["batch"] is None else _program_from_plain(entry["batch"])
     before = None if entry["before"] is None else _program_from_plain(entry["before"])
-    return Kernel(functions[entry["function"]], entry["theta"], single, batch, entry["lowering"], before)
+    limbs = None if entry["limbs"] is None else _limbs_from_plain(entry["limbs"])
+    return Kernel(
+        functions[entry["function"]], entry["theta"], single, batch, entry["lowering"], before, limbs
+    )
+
+
+def _limbs_to_plain(limbs: LimbProgram) -> dict[str, Any]:
+    groups = [
+        [group.number, group.count, group.inputs, group.constants, group.outputs] for group in limbs.groups
+    ]
+    stages = [[stage.group, _program_to_plain(stage.program)] for stage in limbs.stages]
+    return {"groups": groups, "stages": stages, "least": limbs.least}
+
+
+def _limbs_from_plain(plain: Mapping[str, Any]) -> LimbProgram:
+    groups = tuple(
+        LimbGroup(
+            number,
+            count,
+            _spread(inputs),
+            tuple(tuple(map(float, row)) for row in constants),
+            _spread(outputs),
+        )
+        for number, count, inputs, constants, outputs in plain["groups"]
+    )
+    stages = tuple(Stage(group, _program_from_plain(program)) for group, program in plain["stages"])
+    return LimbProgram(groups, stages, plain["least"])
+
+
+def _spread(plain: Any) -> tuple[Spread, ...]:
+    return tuple((Slot(*slot), tuple(Slot(*each) for each in own)) for slot, own in plain)
 
 
 def _program_to_plain(program: Program) -> list[Any]:

@@ -15,9 +15,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from psdmc.program.cost import Cost
+from psdmc.program.lanes import Lanes
 from psdmc.program.program import Instr, Op, Program, Slot
 
 Number = float | int
+Constant = Number | Lanes
+"""What is known when code is generated: a number, or one for each limb of a group."""
 
 Step = tuple[Op, Any, Any]
 """An instruction while it is recorded: its operation and two arguments; of a load the slot, of a constant the value."""
@@ -26,20 +29,26 @@ _ADD, _SUB, _MUL, _DIV, _NEG, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NE
 _LOAD, _CONST, _SQRT = Op.LOAD, Op.CONST, Op.SQRT
 
 
-Outputs = Sequence[tuple[Slot, "Symbol | Number"]]
+Outputs = Sequence[tuple[Slot, "Symbol | Constant"]]
 """What a trace puts out, in order of storing."""
+
+
+def constants_of(group: int) -> str:
+    """Name of the vector of a group's constants."""
+    return f"limbs{group}_constants"
 
 
 class Tracer:
     """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
 
-    __slots__ = ("_places", "constants", "known", "steps")
+    __slots__ = ("_places", "constants", "known", "lane_constants", "steps")
 
     def __init__(self) -> None:
         self.steps: list[Step] = []
         self.known: dict[Step, int] = {}
-        self.constants: dict[int, float] = {}
-        self._places: dict[float, int] = {}
+        self.constants: dict[int, Any] = {}
+        self.lane_constants: dict[int, list[tuple[float, ...]]] = {}
+        self._places: dict[float | Lanes, int] = {}
 
     def symbols(self, vector: str, count: int) -> list[Symbol]:
         """Inputs vector[0] ... vector[count - 1]."""
@@ -57,11 +66,27 @@ class Tracer:
             self.steps.append(step)
         return index
 
-    def constant(self, value: float) -> Symbol:
+    def constant(self, value: Constant) -> Symbol:
         """A constant; its sign is kept beside it."""
+        if isinstance(value, Lanes):
+            return self._lanes(value)
         # A Python number even where it is NumPy's: signs are compared by identity, which fails for its booleans.
         number = float(value)
         return Symbol(self, self.magnitude(abs(number)), number < 0)
+
+    def _lanes(self, value: Lanes) -> Symbol:
+        """A constant of limbs, which is loaded; its sign is such that its first number that is not zero is positive."""
+        negative = next(x for x in value.values if x) < 0
+        value = -value if negative else value
+        index = self._places.get(value)
+        if index is None:
+            table = self.lane_constants.setdefault(value.group, [])
+            index = self._places[value] = self.record(
+                (_LOAD, Slot(constants_of(value.group), len(table)), None)
+            )
+            self.constants[index] = value
+            table.append(value.values)
+        return Symbol(self, index, negative)
 
     def magnitude(self, value: float) -> int:
         """The index of a constant."""
@@ -122,6 +147,8 @@ class Tracer:
     def _stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
         stored: list[tuple[Slot, int]] = []
         for slot, value in outputs:
+            if isinstance(value, Lanes):
+                value = self.constant(value)
             if not isinstance(value, Symbol):
                 index = self.magnitude(float(value) + 0.0)
             elif value.negative:
@@ -158,22 +185,22 @@ class Symbol:
     def __pos__(self) -> Symbol:
         return self
 
-    def __add__(self, other: Symbol | Number) -> Symbol | float:
+    def __add__(self, other: Symbol | Constant) -> Symbol | float:
         if isinstance(other, Symbol):
             return _sum(self.tracer, self.index, self.negative, other.index, other.negative)
         return self if other == 0 else self + self.tracer.constant(other)
 
     __radd__ = __add__
 
-    def __sub__(self, other: Symbol | Number) -> Symbol | float:
+    def __sub__(self, other: Symbol | Constant) -> Symbol | float:
         if isinstance(other, Symbol):
             return _sum(self.tracer, self.index, self.negative, other.index, not other.negative)
         return self if other == 0 else self + self.tracer.constant(-other)
 
-    def __rsub__(self, other: Number) -> Symbol | float:
+    def __rsub__(self, other: Constant) -> Symbol | float:
         return -self + other
 
-    def __mul__(self, other: Symbol | Number) -> Symbol | float:
+    def __mul__(self, other: Symbol | Constant) -> Symbol | float:
         if not isinstance(other, Symbol):
             if other == 0:
                 return 0.0
@@ -192,14 +219,14 @@ class Symbol:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Symbol | Number) -> Symbol | float:
+    def __truediv__(self, other: Symbol | Constant) -> Symbol | float:
         if not isinstance(other, Symbol):
             return self * (1.0 / other)
         divisor = other.constant_value()
         return _quotient(self, other) if divisor is None else self / divisor
 
-    def __rtruediv__(self, other: Number) -> Symbol | float:
-        return 0.0 if other == 0 else _quotient(self.tracer.constant(float(other)), self)
+    def __rtruediv__(self, other: Constant) -> Symbol | float:
+        return 0.0 if other == 0 else _quotient(self.tracer.constant(other), self)
 
     def sincos(self) -> tuple[Symbol, Symbol]:
         sine = self.tracer.record((_SIN, self.index, None))
@@ -220,7 +247,7 @@ class Symbol:
         op, slot, _ = self.tracer.steps[self.index]
         return slot if op is _LOAD and not self.negative else None
 
-    def constant_value(self) -> float | None:
+    def constant_value(self) -> float | Lanes | None:
         value = self.tracer.constants.get(self.index)
         return -value if value is not None and self.negative else value
 
@@ -242,22 +269,28 @@ def _sum(tracer: Tracer, a: int, a_negative: bool, b: int, b_negative: bool) -> 
     return Symbol(tracer, index, negative)
 
 
-def _scaled(a: Symbol, factor: Number) -> Symbol | float:
+def _scaled(a: Symbol, factor: Constant) -> Symbol | float:
     """A constant times a value; constants along a product become one."""
     tracer, index, constants = a.tracer, a.index, a.tracer.constants
     own = constants.get(index)
     if own is not None:
-        return (-own if a.negative else own) * factor
+        product: Symbol | float = (-own if a.negative else own) * factor
+        return product
     op, left, right = tracer.steps[index]
     if op is _MUL:
         for this, rest in ((left, right), (right, left)):
             inner = constants.get(this)
             if inner is not None:
-                return Symbol(tracer, rest, a.negative) * (inner * factor)
-    number = float(factor)  # also NumPy's numbers, as in `constant`
-    constant = tracer.magnitude(abs(number))
+                both: Constant = inner * factor
+                return Symbol(tracer, rest, a.negative) * both
+    if isinstance(factor, Lanes):
+        loaded = tracer.constant(factor)
+        constant, negative = loaded.index, loaded.negative
+    else:
+        number = float(factor)  # also NumPy's numbers, as in `constant`
+        constant, negative = tracer.magnitude(abs(number)), number < 0
     step = (_MUL, index, constant) if index < constant else (_MUL, constant, index)
-    return Symbol(tracer, tracer.record(step), a.negative is not (number < 0))
+    return Symbol(tracer, tracer.record(step), a.negative is not negative)
 
 
 def _quotient(a: Symbol, b: Symbol) -> Symbol:

@@ -37,6 +37,10 @@ class Costs:
     crowded             lanes take the order for one state unless it keeps this many times more values alive
     worth_two_bodies    lanes get a body of their own where it saves this factor
     loops_from          rows from which products of square matrices behind a PROGRAM are loops in code for one state
+    worth_limbs         limbs run in lanes where this saves that factor
+    limb_real           weight of bringing one of a limb's inputs into its lane, or an output out of it
+    limb_shared         weight of bringing one of the core's values into all lanes
+    limb_sum            weight of a sum over the lanes
     longest_of_two      additions; with parameters at run time a longer body is not written twice: it is tens of kilobytes
     """
 
@@ -52,6 +56,10 @@ class Costs:
     crowded: float
     worth_two_bodies: float
     longest_of_two: float
+    worth_limbs: float
+    limb_real: float
+    limb_shared: float
+    limb_sum: float
     loops_from: int
 
     @property

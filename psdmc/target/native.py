@@ -19,6 +19,10 @@ COSTS = Costs(
     crowded=1.08,
     worth_two_bodies=1.03,
     longest_of_two=1500.0,
+    worth_limbs=1.2,
+    limb_real=1.0,
+    limb_shared=0.5,
+    limb_sum=4.0,
     loops_from=6,
 )
 """For a current x86 or Arm core with 64-byte vectors. Never detected, so that lowering gives the same result on every

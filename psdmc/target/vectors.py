@@ -51,12 +51,14 @@ class VectorUnit:
     macro      which compilers predefine where there are such registers; a target's narrowest unit needs none
     sign_mask  None: signs are gathered lane by lane
     narrower   for sines within scalar code; None: this unit
+    half       registers of half as many bytes that the same processors have; None: there are none, or none is needed
     """
 
     bytes: int
     macro: str = ""
     sign_mask: SignMask | None = None
     narrower: Narrower | None = None
+    half: VectorUnit | None = None
 
     def __post_init__(self) -> None:
         if self.bytes not in (16, 32, 64):
@@ -67,13 +69,17 @@ SSE2 = VectorUnit(
     16, "__SSE2__", SignMask("__SSE2__", "__builtin_ia32_movmskpd", "__builtin_ia32_movmskps", "real")
 )
 AVX = VectorUnit(
-    32, "__AVX__", SignMask("__AVX__", "__builtin_ia32_movmskpd256", "__builtin_ia32_movmskps256", "real")
+    32,
+    "__AVX__",
+    SignMask("__AVX__", "__builtin_ia32_movmskpd256", "__builtin_ia32_movmskps256", "real"),
+    half=SSE2,
 )
 AVX512 = VectorUnit(
     64,
     "__AVX512F__",
     SignMask("__AVX512DQ__", "__builtin_ia32_cvtq2mask512", "__builtin_ia32_cvtd2mask512", "integer"),
     Narrower(AVX, unless="defined(__znver3__) || defined(__znver4__) || defined(__znver5__)"),
+    half=AVX,
 )
 """Intel's cores close one of their two ports for scalar arithmetic while instructions of 64 bytes wait; AMD's do not.
 Compilers that do not know an AMD processor with AVX-512 yet take it for Zen 3."""

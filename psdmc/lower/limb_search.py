@@ -1,0 +1,198 @@
+"""Whether a function's limbs run in lanes, and in which arrangement: by cost, as everything else (search.py).
+
+What was found for the straight line is the start. There, limbs need not be alike: what carries one leg's inertia may be
+other parameters than another leg's. Lanes pay for every parameter that any limb has, so that each limb's choice is tried
+for all of its group; then exchanges are made in all limbs at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psdmc.dynamics.frames import BASE
+from psdmc.lower.accuracy import LIMIT
+from psdmc.lower.factored import Arrangement
+from psdmc.lower.limb_frames import possible_groups
+from psdmc.lower.limbs import TracedLimbs, trace_limbs
+from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, Search, distinct, for_lanes, for_one_state
+from psdmc.program.cost import cost
+from psdmc.program.limb_program import LimbProgram, Stage
+from psdmc.program.limb_stages import staged
+from psdmc.program.pipeline import ordered, shortened
+from psdmc.program.program import Program
+from psdmc.recipes.recipe import Recipe
+from psdmc.robot.limbs import Limbs
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+from psdmc.target.costs import Costs
+
+WIDTHS = (2, 4, 8)
+"""Lanes of the vectors that generated code may have for limbs."""
+
+USUAL = 4
+"""Lanes for which an arrangement is chosen: doubles of AVX2, and of one state's vectors on most machines with AVX-512."""
+
+BUDGET = 80
+"""Exchanges tried per function and way to see limbs, at some 10 ms each."""
+
+
+def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
+    """Cost of one call with vectors of that many lanes, in the same weights as a straight line's."""
+    one, each = for_one_state(costs), for_lanes(costs)
+    groups = {group.number: group for group in limbs.groups}
+    total = 0.0
+    for group in limbs.groups:
+        reals = group.count * (len(group.inputs) + len(group.outputs))
+        total += costs.limb_real * reals
+    for stage in limbs.stages:
+        counted = cost(stage.program)
+        if stage.group is None:
+            total += one.weight(counted)
+            continue
+        group = groups[stage.group]
+        parts = -(-group.count // lanes)
+        own = {group.constant, group.kept} | {slot.vector for slot, _ in group.inputs}
+        shared = sum(slot.vector not in own for slot in stage.program.inputs())
+        sums = sum(slot.vector == group.partial for slot, _ in stage.program.outputs)
+        total += parts * (each.weight(counted) + costs.limb_shared * shared)
+        total += sums * (costs.limb_sum + parts - 1)
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    arrangement: Arrangement
+    groups: tuple[Limbs, ...]
+    weight: float
+
+
+class LimbSearch:
+    """The search for one function of one model with known base parameters."""
+
+    def __init__(self, search: Search, recipe: Recipe, costs: Costs) -> None:
+        self.search, self.recipe, self.costs = search, recipe, costs
+        self.lanes = min(USUAL, costs.angles_per_sincos)
+
+    def best(self, start: Arrangement, straight: Program) -> LimbProgram | None:
+        """The function with limbs in lanes; None where no width makes it worth while against the straight line."""
+        if not self.costs.has_vectors:
+            return None
+        found = [self._descended(start, groups) for groups in possible_groups(start.reframed.frames)]
+        if not found:
+            return None
+        least = min(found, key=lambda each: each.weight)
+        limbs = self._ordered(self._traced(least.arrangement, least.groups))
+        limit = for_one_state(self.costs).score(straight) / self.costs.worth_limbs
+        paying = [lanes for lanes in WIDTHS if weight(limbs, lanes, self.costs) < limit]
+        return limbs.with_least(paying[0]) if paying else None
+
+    def _descended(self, start: Arrangement, groups: tuple[Limbs, ...]) -> _Candidate:
+        best = self._weighed(self._admissible(start, groups), groups)
+        best = self._cheapest(best, self._alike(best.arrangement, groups))
+        best = self._cheapest(best, self._rearranged(best.arrangement))
+        budget = BUDGET
+        while budget > 0:
+            improved = best
+            for candidate in self._exchanged(best.arrangement, groups):
+                budget -= 1
+                improved = self._cheapest(improved, [candidate])
+                if budget == 0:
+                    break
+            if improved is best:
+                break
+            best = improved
+        return best
+
+    def _cheapest(
+        self, best: _Candidate, arrangements: Sequence[Arrangement] | Iterator[Arrangement]
+    ) -> _Candidate:
+        for arrangement in arrangements:
+            candidate = self._weighed(arrangement, best.groups)
+            if candidate.weight < best.weight and self._is_accurate(arrangement, best.arrangement):
+                best = candidate
+        return best
+
+    def _weighed(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> _Candidate:
+        traced = self._traced(arrangement, groups)
+        limbs = LimbProgram(traced.groups, staged(traced.program, traced.groups))
+        return _Candidate(arrangement, groups, weight(limbs, self.lanes, self.costs))
+
+    def _traced(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> TracedLimbs:
+        return trace_limbs(self.recipe, arrangement, self.search.robot, groups)
+
+    def _ordered(self, traced: TracedLimbs) -> LimbProgram:
+        stages = staged(shortened(traced.program), traced.groups)
+        return LimbProgram(
+            traced.groups, tuple(Stage(s.group, ordered(s.program, self.costs)[0]) for s in stages)
+        )
+
+    def _admissible(self, start: Arrangement, groups: Sequence[Limbs]) -> Arrangement:
+        """By articulated bodies where limbs hang on a body: elimination in a mass matrix does not say what it sums."""
+        hang = any(start.reframed.frames[limbs[0][0]].parent != BASE for limbs in groups)
+        if not self.recipe.accelerates or not hang:
+            return start
+        return replace(start, choices=replace(start.choices, articulated=True))
+
+    def _rearranged(self, found: Arrangement) -> Iterator[Arrangement]:
+        way = found.choices.articulated
+        for choices in distinct(self.recipe, CHOICES):
+            yield replace(found, choices=replace(choices, articulated=way))
+
+    def _alike(self, found: Arrangement, groups: Sequence[Limbs]) -> Iterator[Arrangement]:
+        """Each limb's carriers in all limbs of its group; of several groups, the limbs of one number."""
+        for k in range(max(len(limbs) for limbs in groups)):
+            carriers = set(found.carriers)
+            for limbs in groups:
+                model = limbs[k % len(limbs)]
+                for limb in limbs:
+                    carriers -= {c for c in found.carriers if c // PARAMETERS_PER_LINK in limb}
+                    carriers |= {
+                        PARAMETERS_PER_LINK * limb[model.index(c // PARAMETERS_PER_LINK)]
+                        + c % PARAMETERS_PER_LINK
+                        for c in found.carriers
+                        if c // PARAMETERS_PER_LINK in model
+                    }
+            yield from self._carried_by(found, carriers)
+
+    def _exchanged(self, found: Arrangement, groups: Sequence[Limbs]) -> Iterator[Arrangement]:
+        """Exchanges among the core's parameters, or among a group's first limb's, the others' following."""
+        limb_of = {joint: limbs for limbs in groups for limb in limbs for joint in limb}
+        space = self.search.geometry.space(found.reframed)
+        for leaving, entering in space.exchanges(found.carriers):
+            here, there = leaving // PARAMETERS_PER_LINK, entering // PARAMETERS_PER_LINK
+            limbs = limb_of.get(here)
+            if limbs is not limb_of.get(there):
+                continue
+            if limbs is None:
+                yield from self._carried_by(found, {*found.carriers, entering} - {leaving})
+            elif here in limbs[0] and there in limbs[0]:
+                out = {self._same(leaving, limbs[0], limb) for limb in limbs}
+                enter = {self._same(entering, limbs[0], limb) for limb in limbs}
+                yield from self._carried_by(found, (set(found.carriers) - out) | enter)
+
+    @staticmethod
+    def _same(carrier: int, limb: Sequence[int], other: Sequence[int]) -> int:
+        """The parameter of another limb that is at the same place."""
+        joint, name = divmod(carrier, PARAMETERS_PER_LINK)
+        return PARAMETERS_PER_LINK * other[limb.index(joint)] + name
+
+    def _carried_by(self, found: Arrangement, carriers: set[int]) -> Iterator[Arrangement]:
+        """So carried, where these can be carriers."""
+        if len(carriers) != len(found.carriers):
+            return
+        chosen = tuple(sorted(carriers))
+        with np.errstate(all="ignore"):
+            transfer = self.search.geometry.space(found.reframed).transfer(chosen)
+        if np.all(np.isfinite(transfer)) and np.max(np.abs(transfer)) < LARGEST_TRANSFER:
+            yield replace(found, carriers=chosen, transfer=transfer)
+
+    def _is_accurate(self, arrangement: Arrangement, known: Arrangement) -> bool:
+        """Whether it is as accurate as it has to be, or as the one before, which has the same choices."""
+        if arrangement.carriers == known.carriers:
+            return True
+        accuracy = self.search.accuracy
+        if accuracy is None:
+            return True
+        return accuracy.error(arrangement) <= max(LIMIT, accuracy.error(known))

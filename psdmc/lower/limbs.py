@@ -1,0 +1,209 @@
+"""Trace a function of a robot with limbs of equal structure: one limb of each group, with a constant per limb."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import accumulate, product
+
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.scalar import Scalar
+from psdmc.errors import InternalError
+from psdmc.lower.carriers import bodies_from_carriers
+from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
+from psdmc.lower.limb_frames import Place, one_limb, places
+from psdmc.program.lanes import Lanes
+from psdmc.program.limb_program import LimbGroup, Spread
+from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.program import Program, Slot
+from psdmc.program.signature import Quantity
+from psdmc.program.trace import Symbol, Tracer, constants_of
+from psdmc.recipes.recipe import ByTheta, Recipe
+from psdmc.robot.limbs import Limbs
+
+
+@dataclass(frozen=True, slots=True)
+class TracedLimbs:
+    """A PROGRAM of core and limbs, as psdmc.program.limb_stages cuts it, and its groups."""
+
+    program: Program
+    groups: tuple[LimbGroup, ...]
+
+
+def trace_limbs(
+    recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
+) -> TracedLimbs:
+    """One function of a robot whose theta_b is known, limbs of each group traced once."""
+    trace = _Trace(recipe, arrangement, robot, groups)
+    return trace.needed(list(trace.outputs(trace.recorded())))
+
+
+@dataclass(slots=True)
+class _Group:
+    """A group while it is traced.
+
+    stored    its slot for each value that it puts out
+    partials  index of a value to the number of its sum
+    """
+
+    number: int
+    count: int
+    inputs: list[Spread] = field(default_factory=list)
+    outputs: list[Spread] = field(default_factory=list)
+    stored: dict[Hashable, Slot] = field(default_factory=dict)
+    partials: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def vectors(self) -> LimbGroup:
+        return LimbGroup(self.number, self.count, tuple(self.inputs), (), tuple(self.outputs))
+
+
+class _Trace:
+    """One trace. Places take the place of joints."""
+
+    def __init__(
+        self, recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
+    ) -> None:
+        self.recipe, self.arrangement, self.robot = recipe, arrangement, robot
+        self.tracer = Tracer()
+        self.groups = [_Group(number, len(limbs)) for number, limbs in enumerate(groups)]
+        self.kinds: list[int] = []
+        self.vectors: dict[str, int] = {constants_of(group.number): group.number for group in self.groups}
+        whole = in_unit(arrangement.reframed, arrangement.unit)
+        self.places = places(len(whole.frames), groups)
+        frames = zip(one_limb(whole.frames, self.places), self.places, strict=True)
+        self.reframed = replace(whole, frames=tuple(self._with_sums(*each) for each in frames))
+        self.first = {
+            axis: [0, *accumulate(getattr(frame.joint, axis) for frame in whole.frames)]
+            for axis in ("nq", "nv")
+        }
+
+    def _with_sums(self, frame: Frame, place: Place) -> Frame:
+        if place.group is None or not place.is_first:
+            return frame
+        return replace(frame, limbs=self._summing(self.groups[place.group]))
+
+    def _summing(self, group: _Group) -> Callable[[Scalar], Scalar]:
+        def total(value: Scalar) -> Scalar:
+            if isinstance(value, Lanes):
+                return math.fsum(value.values)
+            if not isinstance(value, Symbol) or self._kind(value.index) != group.number:
+                return value * group.count
+            number = group.partials.setdefault(value.index, len(group.partials))
+            summed = self.tracer.symbol(Slot(group.vectors.sum, number))
+            return -summed if value.negative else summed
+
+        return total
+
+    def _kind(self, index: int) -> int:
+        """Number of the group that a value belongs to; -1: none."""
+        for i in range(len(self.kinds), index + 1):
+            slot = self.tracer.steps[i][1]
+            own = self.vectors.get(slot.vector, -1) if isinstance(slot, Slot) else -1
+            self.kinds.append(max([own, *(self.kinds[a] for a in self.tracer.arguments(i))]))
+        return self.kinds[index]
+
+    def recorded(self) -> Mapping[Slot, Scalar]:
+        """What the recipe gives, by slots whose indices count places."""
+        arrangement, unit = self.arrangement, self.arrangement.unit
+        values = carrier_values(arrangement, self.robot.theta_b, self.tracer)
+        bodies, drives = bodies_from_carriers(arrangement.n, arrangement.carriers, values, unit)
+        inputs = {quantity.name: list(self._inputs(quantity)) for quantity in self.recipe.signature.inputs}
+        own = tuple(place.body([bodies[joint] for joint in place.joints]) for place in self.places)
+        driven = tuple(place.constant([drives[joint] for joint in place.joints]) for place in self.places)
+        choices = arrangement.choices
+        return dict(
+            traced(self.recipe, self.robot, self.reframed, inputs, own, driven, choices, unit, _no_theta)
+        )
+
+    def _inputs(self, quantity: Quantity) -> Iterator[Symbol]:
+        (axis,) = quantity.axes
+        used: dict[int, int] = {}
+        for place in self.places:
+            for own in self._entries(place, axis):
+                slots = tuple(Slot(quantity.name, index) for index in own)
+                if place.group is None:
+                    yield self.tracer.symbol(slots[0])
+                    continue
+                group = self.groups[place.group]
+                slot = Slot(group.vectors.input_of(quantity.name), used.setdefault(place.group, 0))
+                used[place.group] += 1
+                self.vectors[slot.vector] = place.group
+                group.inputs.append((slot, slots))
+                yield self.tracer.symbol(slot)
+
+    def _entries(self, place: Place, axis: str) -> list[tuple[int, ...]]:
+        """For each coordinate, or rate, of a place the robot's, limb by limb."""
+        first = self.first[axis]
+        counts = range(first[place.joints[0] + 1] - first[place.joints[0]])
+        return [tuple(first[joint] + k for joint in place.joints) for k in counts]
+
+    def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
+        """What is stored, by the core's slots and those of limbs. Zeros are not stored."""
+        for quantity in self.recipe.signature.stored:
+            entries = [
+                [(place.group, own) for place in self.places for own in self._entries(place, axis)]
+                for axis in quantity.axes
+            ]
+            for index, which in enumerate(product(*entries)):
+                value = found[Slot(quantity.name, index)]
+                if not (isinstance(value, float | int) and value == 0.0):
+                    yield from self._stored(quantity, which, value)
+
+    def _stored(
+        self, quantity: Quantity, which: Sequence[tuple[int | None, tuple[int, ...]]], value: Scalar
+    ) -> Iterator[tuple[Slot, Scalar]]:
+        numbers = {number for number, _ in which if number is not None}
+        if len(numbers) > 1:
+            raise InternalError(f"{quantity.name}: an entry of two groups of limbs is not zero")
+        count = self.groups[min(numbers)].count if numbers else 1
+        slots = tuple(
+            Slot(quantity.name, self._flat(quantity, [own[limb if len(own) > 1 else 0] for _, own in which]))
+            for limb in range(count)
+        )
+        if not numbers:
+            yield slots[0], value
+            return
+        group = self.groups[min(numbers)]
+        key = (value.index, value.negative) if isinstance(value, Symbol) else value
+        is_new = key not in group.stored
+        slot = group.stored.setdefault(key, Slot(group.vectors.output, len(group.stored)))
+        group.outputs.append((slot, slots))
+        if is_new:
+            yield slot, value
+
+    def _flat(self, quantity: Quantity, indices: Sequence[int]) -> int:
+        flat = 0
+        for axis, index in zip(quantity.axes, indices, strict=True):
+            flat = flat * self.first[axis][-1] + index
+        return flat
+
+    def needed(self, stored: list[tuple[Slot, Scalar]]) -> TracedLimbs:
+        """The PROGRAM without sums that nothing needs."""
+        sums = {
+            group.vectors.partial: [Symbol(self.tracer, index) for index in group.partials]
+            for group in self.groups
+        }
+        partials = [
+            (Slot(vector, k), value) for vector, values in sums.items() for k, value in enumerate(values)
+        ]
+        left = len(partials) + 1
+        while len(partials) < left:
+            left = len(partials)
+            program = drop_unused(self.tracer.finish([*stored, *partials]))
+            read = set(program.inputs())
+            partials = [each for each in partials if _sum_of(each[0]) in read]
+        groups = tuple(
+            replace(group.vectors, constants=tuple(self.tracer.lane_constants.get(group.number, ())))
+            for group in self.groups
+        )
+        return TracedLimbs(program, groups)
+
+
+def _sum_of(partial: Slot) -> Slot:
+    return Slot(partial.vector.replace("_partial", "_sum"), partial.index)
+
+
+def _no_theta() -> ByTheta:
+    return ByTheta([], (), ())

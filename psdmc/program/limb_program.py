@@ -1,0 +1,154 @@
+"""A function for one state whose limbs of equal structure run in the lanes of a vector.
+
+What limbs compute is written once: PROGRAMs of scalars, each scalar being one limb's. They read the limb's inputs and
+constants, and what the core (everything that is not in a limb) computes, which is the same for all limbs; the core reads
+sums over the limbs. Stages follow one another, each of one kind: core or a group of limbs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.program import Program, Slot
+from psdmc.program.replay import Value, replayed
+from psdmc.program.trace import Tracer, constants_of
+
+Spread = tuple[Slot, tuple[Slot, ...]]
+"""A slot of a limb, and the function's own slots that it stands for, limb by limb."""
+
+CORE = "core"
+"""Vector of what the core computes and other stages read."""
+
+
+@dataclass(frozen=True, slots=True)
+class LimbGroup:
+    """Limbs of equal structure.
+
+    number     of the group, which its vectors are named by
+    count      limbs
+    inputs     slots that its stages read, and those of the function's inputs, limb by limb
+    constants  rows of `count` numbers, one for each entry of its vector of constants
+    outputs    slots that its stages store, and those of the function's outputs, limb by limb; several may stand for one slot
+               of a limb, one after the other
+    """
+
+    number: int
+    count: int
+    inputs: tuple[Spread, ...]
+    constants: tuple[tuple[float, ...], ...]
+    outputs: tuple[Spread, ...]
+
+    @property
+    def name(self) -> str:
+        return f"limbs{self.number}"
+
+    @property
+    def constant(self) -> str:
+        """Vector of constants."""
+        return constants_of(self.number)
+
+    @property
+    def partial(self) -> str:
+        """Vector of what is summed over the limbs."""
+        return f"{self.name}_partial"
+
+    @property
+    def sum(self) -> str:
+        """Vector of the sums."""
+        return f"{self.name}_sum"
+
+    @property
+    def kept(self) -> str:
+        """Vector of what later stages of the group read."""
+        return f"{self.name}_kept"
+
+    @property
+    def output(self) -> str:
+        """Vector of what it puts out."""
+        return f"{self.name}_output"
+
+    def input_of(self, vector: str) -> str:
+        """The group's name for an input of the function."""
+        return f"{self.name}_{vector}"
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A PROGRAM and the number of the group whose limbs compute it; None: the core does."""
+
+    group: int | None
+    program: Program
+
+
+@dataclass(frozen=True, slots=True)
+class LimbProgram:
+    """Stages in their order.
+
+    least  lanes of the narrowest vector with which this is cheaper than the function's straight line
+    """
+
+    groups: tuple[LimbGroup, ...]
+    stages: tuple[Stage, ...]
+    least: int = 2
+
+    def with_least(self, least: int) -> LimbProgram:
+        return replace(self, least=least)
+
+
+def unpacked(limbs: LimbProgram) -> Program:
+    """The same function as one PROGRAM of the function's own inputs and outputs, each limb written out."""
+    tracer = Tracer()
+    core: dict[Slot, Value] = {}
+    own: dict[tuple[int, int], dict[Slot, Value]] = {
+        (group.number, limb): _given(group, limb, tracer)
+        for group in limbs.groups
+        for limb in range(group.count)
+    }
+    outputs: list[tuple[Slot, Value]] = []
+    by_number = {group.number: group for group in limbs.groups}
+    for stage in limbs.stages:
+        if stage.group is None:
+            stored = _stored(stage.program, tracer, core)
+            outputs += [(slot, value) for slot, value in stored.items() if slot.vector != CORE]
+            core |= stored
+            continue
+        group = by_number[stage.group]
+        found = []
+        for limb in range(group.count):
+            values = own[group.number, limb]
+            values |= _stored(stage.program, tracer, core | values)
+            found.append(values)
+        core |= _sums(group, stage.program, found)
+        outputs += _spread(group, stage.program, found)
+    return drop_unused(tracer.finish(outputs))
+
+
+def _given(group: LimbGroup, limb: int, tracer: Tracer) -> dict[Slot, Value]:
+    values: dict[Slot, Value] = {slot: tracer.symbol(own[limb]) for slot, own in group.inputs}
+    return values | {Slot(group.constant, k): row[limb] for k, row in enumerate(group.constants)}
+
+
+def _stored(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> dict[Slot, Value]:
+    slots = (slot for slot, _ in program.outputs)
+    return dict(zip(slots, replayed(program, tracer, given), strict=True))
+
+
+def _sums(group: LimbGroup, program: Program, found: list[dict[Slot, Value]]) -> Iterator[tuple[Slot, Value]]:
+    for slot, _ in program.outputs:
+        if slot.vector == group.partial:
+            total: Value = 0.0
+            for values in found:
+                total = total + values[slot]
+            yield Slot(group.sum, slot.index), total
+
+
+def _spread(
+    group: LimbGroup, program: Program, found: list[dict[Slot, Value]]
+) -> Iterator[tuple[Slot, Value]]:
+    stored = {slot for slot, _ in program.outputs}
+    for slot, own in group.outputs:
+        if slot in stored:
+            for limb, target in enumerate(own):
+                yield target, found[limb][slot]

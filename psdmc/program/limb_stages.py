@@ -1,0 +1,139 @@
+"""Cut a PROGRAM of core and limbs into stages: what the core computes before the limbs, what these compute, what the core
+makes of their sums, and so on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psdmc.errors import InternalError
+from psdmc.program.check import check
+from psdmc.program.limb_program import CORE, LimbGroup, Stage
+from psdmc.program.program import Instr, Op, Program, Slot
+
+Place = tuple[int, int]
+"""Of a stage: how many sums lie before it, and the group that computes it; the core, which is first, is -1."""
+
+THE_CORE = -1
+
+
+def staged(program: Program, groups: Sequence[LimbGroup]) -> tuple[Stage, ...]:
+    """The stages of a PROGRAM that reads groups' inputs, constants and sums beside the function's inputs, and stores their
+    partial sums and outputs beside the function's outputs.
+
+    Keeps: output values, bit for bit; instructions, but for constants and loads that several stages need.
+    InternalError where limbs of two groups meet in one value, or a limb's value is stored as the core's.
+    """
+    return _Split(program, groups).stages()
+
+
+class _Split:
+    def __init__(self, program: Program, groups: Sequence[LimbGroup]) -> None:
+        self.program = program
+        self.owner: dict[str, int] = {}
+        self.kept = {group.number: group.kept for group in groups} | {THE_CORE: CORE}
+        self.partial_of = {group.sum: group.partial for group in groups}
+        for group in groups:
+            vectors = {group.constant, group.partial}
+            vectors |= {slot.vector for slot, _ in (*group.inputs, *group.outputs)}
+            self.owner |= dict.fromkeys(sorted(vectors), group.number)
+        self.kind = self._kinds()
+        self.level = self._levels()
+        self.place = [(level, kind) for level, kind in zip(self.level, self.kind, strict=True)]
+        self.is_free = [self._may_be_repeated(instr) for instr in program.body]
+        self.stored = self._stored()
+        self.crossing = self._crossing()
+
+    def _kinds(self) -> list[int]:
+        kinds: list[int] = []
+        for instr in self.program.body:
+            if instr.slot is not None:
+                kinds.append(self.owner.get(instr.slot.vector, THE_CORE))
+                continue
+            found = {kinds[a] for a in instr.args} - {THE_CORE}
+            if len(found) > 1:
+                raise InternalError("limbs of two groups meet in one value")
+            kinds.append(found.pop() if found else THE_CORE)
+        return kinds
+
+    def _levels(self) -> list[int]:
+        """Of each value how many sums it depends on, one behind the other."""
+        stored = dict(self.program.outputs)
+        levels = [0] * len(self.program)
+        for _ in range(len(self.program) + 1):
+            before = list(levels)
+            for i, instr in enumerate(self.program.body):
+                if instr.slot is not None and instr.slot.vector in self.partial_of:
+                    partial = Slot(self.partial_of[instr.slot.vector], instr.slot.index)
+                    levels[i] = 1 + levels[stored[partial]]
+                elif instr.args:
+                    levels[i] = max(levels[a] for a in instr.args)
+            if levels == before:
+                return levels
+        raise InternalError("a sum over limbs depends on itself")
+
+    def _may_be_repeated(self, instr: Instr) -> bool:
+        """Constants, and loads that every stage may make: all but those of the function's own inputs, which the first stage
+        reads before anything is stored."""
+        if instr.op is Op.CONST:
+            return True
+        vector = None if instr.slot is None else instr.slot.vector
+        return vector in self.owner or vector in self.partial_of
+
+    def _stored(self) -> dict[Place, list[tuple[Slot, int]]]:
+        """What each stage puts out of what the whole PROGRAM does."""
+        stored: dict[Place, list[tuple[Slot, int]]] = {}
+        for slot, i in self.program.outputs:
+            kind = self.owner.get(slot.vector, THE_CORE)
+            if kind == THE_CORE and self.kind[i] != THE_CORE:
+                raise InternalError(f"{slot} is the core's, and differs from limb to limb")
+            stored.setdefault((self.level[i], kind), []).append((slot, i))
+        return stored
+
+    def _crossing(self) -> dict[int, Slot]:
+        """Values that other stages read, and where they are kept."""
+        read = {
+            a
+            for i, instr in enumerate(self.program.body)
+            for a in instr.args
+            if self._crosses(a, self.place[i])
+        }
+        read |= {i for place, outputs in self.stored.items() for _, i in outputs if self._crosses(i, place)}
+        slots: dict[int, Slot] = {}
+        used: dict[int, int] = {}
+        for i in sorted(read):
+            kind = self.kind[i]
+            slots[i] = Slot(self.kept[kind], used.setdefault(kind, 0))
+            used[kind] += 1
+        return slots
+
+    def _crosses(self, value: int, place: Place) -> bool:
+        return not self.is_free[value] and self.place[value] != place
+
+    def stages(self) -> tuple[Stage, ...]:
+        busy = {
+            p for p, instr, free in zip(self.place, self.program.body, self.is_free, strict=True) if not free
+        }
+        places = sorted(busy | self.stored.keys())
+        return tuple(
+            Stage(None if kind == THE_CORE else kind, self._stage((level, kind))) for level, kind in places
+        )
+
+    def _stage(self, place: Place) -> Program:
+        body: list[Instr] = []
+        here: dict[int, int] = {}
+
+        def local(i: int) -> int:
+            if i not in here:
+                instr = self.program.body[i]
+                here[i] = len(body)
+                body.append(instr if self.is_free[i] else Instr(Op.LOAD, slot=self.crossing[i]))
+            return here[i]
+
+        for i, instr in enumerate(self.program.body):
+            if self.place[i] == place and not self.is_free[i]:
+                moved = {a: local(a) for a in instr.args}
+                here[i] = len(body)
+                body.append(instr.renumbered(moved))
+        outputs = [(slot, local(i)) for slot, i in self.stored.get(place, [])]
+        outputs += [(slot, here[i]) for i, slot in self.crossing.items() if self.place[i] == place]
+        return check(Program(tuple(body), tuple(outputs)), after="cutting into stages")

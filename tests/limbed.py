@@ -1,0 +1,57 @@
+"""Random robots with limbs of equal structure: joints of the same types, every number another one on each limb."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+from random_trees import RandomTree
+
+from psdmc.derivation.derive import derive_model
+from psdmc.emit.info import package_info
+from psdmc.emit.options import EmitOptions
+from psdmc.emit.package import PackageView, package_view
+from psdmc.lower.kernels import lower
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.program.kernel import Kernel
+from psdmc.robot.mechanism import BASE
+
+FUNCTIONS = ("inverse_dynamics", "mass_matrix", "forward_dynamics")
+
+
+def limbed(seed: int, trunk: str, limbs: Sequence[tuple[int, str, int]], parallel: float = 0.5) -> RandomTree:
+    """A serial trunk of these joint types (random_trees.TYPES), then limbs: the trunk's body that they hang on (BASE: the
+    base), joint types from there on, and how many of them there are. Axes are parallel to their parents' or at right angles
+    with this probability."""
+    parents, kinds = list(range(BASE, len(trunk) - 1)), trunk
+    for body, chain, count in limbs:
+        for _ in range(count):
+            parents += [body, *range(len(parents), len(parents) + len(chain) - 1)]
+            kinds += chain
+    return RandomTree(seed, tuple(parents), kinds, parallel)
+
+
+SHAPES = {
+    "two arms on the base": ("", [(BASE, "RRR", 2)]),
+    "three fingers on a wrist": ("RR", [(1, "RR", 3)]),
+    "four legs of a floating body": ("F", [(0, "RRR", 4)]),
+    "five limbs that slide": ("", [(BASE, "RP", 5)]),
+    "arms on a trunk, legs on its root": ("FR", [(1, "RRR", 2), (0, "RR", 3)]),
+    "six legs on a ball": ("S", [(0, "RR", 6)]),
+}
+
+
+@cache
+def shape(name: str, seed: int = 1) -> tuple[RandomTree, DynamicsModel]:
+    tree = limbed(seed, *SHAPES[name])
+    return tree, derive_model(tree.mechanism(), expand=False)
+
+
+@cache
+def kernels(name: str, seed: int = 1) -> dict[str, Kernel]:
+    return lower(shape(name, seed)[1], "factored", FUNCTIONS, theta_variants=False)
+
+
+def package_of(name: str, options: EmitOptions, functions: Sequence[str] = FUNCTIONS) -> PackageView:
+    own = {function: kernels(name)[function] for function in functions}
+    return package_view(package_info(shape(name)[1]), own, options)

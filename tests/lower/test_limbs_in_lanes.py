@@ -1,0 +1,179 @@
+"""Limbs in lanes: the same function as the straight line, chosen where it costs less."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+from limbed import FUNCTIONS, SHAPES, kernels, limbed, shape
+from pinocchio_robots import PinocchioRobot, robot_at_hand
+
+from psdmc.derivation.derive import derive_model
+from psdmc.dynamics.frames import BASE
+from psdmc.functions import RECIPES
+from psdmc.lower.factored import trace_dynamics
+from psdmc.lower.kernels import lower
+from psdmc.lower.limb_frames import possible_groups
+from psdmc.lower.limb_search import weight
+from psdmc.lower.limbs import trace_limbs
+from psdmc.lower.search import Search, for_one_state
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_states import states_of
+from psdmc.program.interpret import interpret
+from psdmc.program.kernel import Kernel
+from psdmc.program.limb_program import LimbProgram, unpacked
+from psdmc.program.limb_stages import staged
+from psdmc.program.program import Program
+from psdmc.program.signature import Sizes
+from psdmc.target.native import COSTS
+from psdmc.target.presets import SCALAR
+
+COUNT = 12
+SAME = 1e-13
+"""Of each entry's largest value: rounding of the same sums in another order."""
+SOLVED = 1e-10
+"""The same of accelerations, which a mass matrix's condition magnifies."""
+
+ROBOTS = {"anymal_b": True, "solo12": True, "allegro": False}
+
+
+def sizes_of(model: DynamicsModel) -> Sizes:
+    return Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+
+
+def given_states(model: DynamicsModel, count: int = COUNT) -> dict[str, np.ndarray]:
+    vectors = states_of(model.mechanism, np.random.default_rng(4), count)
+    return dict(zip(("q", "qd", "qdd"), vectors, strict=True)) | {"tau": 3.0 * vectors[2]}
+
+
+def values(program: Program, function: str, model: DynamicsModel) -> dict[str, np.ndarray]:
+    return interpret(program, given_states(model), RECIPES[function].signature.sizes(sizes_of(model)))
+
+
+def assert_same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray], exact: float) -> None:
+    assert found.keys() == wanted.keys()
+    for name, expected in wanted.items():
+        largest = np.abs(expected).max(axis=0)
+        allowed = exact * np.maximum(largest, 1e-3 * largest.max())
+        error = np.abs(found[name] - expected)
+        assert np.all(error <= allowed), (error / allowed).max() * exact
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+@pytest.mark.parametrize("name", SHAPES)
+def test_written_out_it_is_the_straight_line(name: str, function: str) -> None:
+    model, kernel = shape(name)[1], kernels(name)[function]
+    if kernel.limbs is None:
+        pytest.skip("does not pay")
+
+    found = values(unpacked(kernel.limbs), function, model)
+
+    assert_same(
+        found, values(kernel.single, function, model), SOLVED if function == "forward_dynamics" else SAME
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=some.integers(0, 10_000),
+    trunk=some.sampled_from(["", "F", "R", "FR", "SR"]),
+    chain=some.text("RP", min_size=1, max_size=3),
+    count=some.integers(2, 5),
+    parallel=some.sampled_from([0.0, 0.3, 0.8, 1.0]),
+    function=some.sampled_from(FUNCTIONS),
+)
+def test_any_equal_limbs(
+    seed: int, trunk: str, chain: str, count: int, parallel: float, function: str
+) -> None:
+    """Whether it pays or not, by every way to see limbs: frames turned by any angle, or alike but for signs."""
+    tree = limbed(seed, trunk, [(len(trunk) - 1, chain, count)], parallel)
+    model = derive_model(tree.mechanism(), expand=False)
+    search = Search(model.mechanism, model.representative, model.theta_b)
+    start = next(search.starts(search.geometry.feet[0]))
+    start = replace(
+        start,
+        choices=replace(start.choices, articulated=bool(trunk), fold=seed % 2 == 0, compound=seed % 3 == 0),
+    )
+    recipe = RECIPES[function]
+    wanted = values(trace_dynamics(recipe, start, search.robot), function, model)
+    ways = possible_groups(start.reframed.frames)
+    assert [len(limbs) for limbs in ways[0]] == [count]
+
+    for groups in ways:
+        traced = trace_limbs(recipe, start, search.robot, groups)
+        found = unpacked(LimbProgram(traced.groups, staged(traced.program, traced.groups)))
+        assert_same(
+            values(found, function, model), wanted, SOLVED if function == "forward_dynamics" else 1e-12
+        )
+
+
+def robot(name: str) -> tuple[PinocchioRobot, DynamicsModel]:
+    found = robot_at_hand(name, ROBOTS[name])
+    return found, derive_model(found.mechanism, expand=False)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_real_robots_limbs_run_in_lanes_and_agree_with_pinocchio(name: str) -> None:
+    theirs, model = robot(name)
+    made = lower(model, "factored", FUNCTIONS, theta_variants=False)
+    q, qd, qdd = theirs.motion(COUNT)
+    tau = theirs.each(pin.rnea, q, qd, qdd)
+    states, sizes = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}, sizes_of(model)
+
+    def found(function: str) -> dict[str, np.ndarray]:
+        limbs = made[function].limbs
+        assert limbs is not None
+        return interpret(unpacked(limbs), states, RECIPES[function].signature.sizes(sizes))
+
+    upper = np.triu(theirs.each(pin.crba, q))
+    mass = upper + np.triu(upper, 1).transpose(0, 2, 1)
+    assert_same({"tau": found("inverse_dynamics")["tau"]}, {"tau": tau}, 1e-12)
+    assert_same({"M": found("mass_matrix")["M"]}, {"M": mass.reshape(COUNT, -1)}, 1e-12)
+    accelerated = found("forward_dynamics")
+    assert np.all(accelerated["pivot"] > 0.0)
+    assert_same({"qdd": accelerated["qdd"]}, {"qdd": qdd}, 1e-10)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_it_is_taken_only_where_it_costs_less(name: str) -> None:
+    taken = {function: kernel for function, kernel in kernels(name).items() if kernel.limbs}
+    for kernel in taken.values():
+        assert kernel.limbs is not None
+        straight = for_one_state(COSTS).score(kernel.single)
+        for lanes in (2, 4, 8):
+            if lanes >= kernel.limbs.least:
+                assert weight(kernel.limbs, lanes, COSTS) * COSTS.worth_limbs < straight
+
+
+def test_four_legs_pay_and_two_stubs_on_an_arm_do_not() -> None:
+    assert all(kernel.limbs for kernel in kernels("four legs of a floating body").values())
+    arm = limbed(3, "RRRRRR", [(5, "P", 2)])
+    made = lower(
+        derive_model(arm.mechanism(), expand=False), "factored", ["inverse_dynamics"], theta_variants=False
+    )
+    assert made["inverse_dynamics"].limbs is None
+
+
+def test_no_lanes_for_theta_for_batches_and_for_machines_without_vectors() -> None:
+    model = shape("four legs of a floating body")[1]
+    plain = lower(model, "factored", ["inverse_dynamics"], costs=SCALAR.costs)
+    made: dict[str, Kernel] = lower(model, "factored", ["inverse_dynamics"])
+    assert plain["inverse_dynamics"].limbs is None
+    assert made["inverse_dynamics_theta"].limbs is None
+    assert made["inverse_dynamics"].limbs is not None
+
+
+def test_joints_that_follow_others_are_no_limbs() -> None:
+    frames = list(
+        Search(model := shape("two arms on the base")[1].mechanism, np.eye(11 * len(model)), None)
+        .geometry.reframed(("previous",) * 6)
+        .frames
+    )
+    assert possible_groups(frames)
+    frames[5] = replace(frames[5], follows=(2, 1.0, 0.0))
+    assert possible_groups(frames) == ()
+    assert frames[0].parent == BASE

@@ -1,0 +1,77 @@
+"""Stages of core and limbs: what a cut PROGRAM computes is what the whole does, limb by limb."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from psdmc.errors import InternalError
+from psdmc.program.interpret import interpret
+from psdmc.program.limb_program import LimbGroup, LimbProgram, unpacked
+from psdmc.program.limb_stages import staged
+from psdmc.program.program import Slot
+from psdmc.program.text import parse, show
+
+TWO = LimbGroup(
+    number=0,
+    count=2,
+    inputs=((Slot("limbs0_q", 0), (Slot("q", 1), Slot("q", 2))),),
+    constants=((3.0, 5.0),),
+    outputs=((Slot("limbs0_output", 0), (Slot("tau", 1), Slot("tau", 2))),),
+)
+WHOLE = """
+    body = load q[0]
+    leg = load limbs0_q[0]
+    k = load limbs0_constants[0]
+    s = sin body
+    c = cos leg
+    force = mul s c
+    own = mul force k
+    all = load limbs0_sum[0]
+    carried = mul all s
+    pushed = mul carried c
+    back = add pushed own
+    out tau[0] = carried
+    out limbs0_partial[0] = own
+    out limbs0_output[0] = back
+"""
+
+
+def test_core_limbs_core_limbs():
+    stages = staged(parse(WHOLE), [TWO])
+
+    assert [stage.group for stage in stages] == [None, 0, None, 0]
+    assert show(stages[0].program).splitlines() == ["t0 = load q[0]", "t1 = sin t0", "out core[0] = t1"]
+    assert show(stages[2].program).splitlines() == [
+        "t0 = load limbs0_sum[0]",
+        "t1 = load core[0]",
+        "t2 = mul t0 t1",
+        "out tau[0] = t2",
+        "out core[1] = t2",
+    ]
+
+
+def test_written_out_limb_by_limb_it_is_the_same_function():
+    q = np.random.default_rng(1).uniform(-1.0, 1.0, (10, 3))
+    program = unpacked(LimbProgram((TWO,), staged(parse(WHOLE), [TWO])))
+
+    tau = interpret(program, {"q": q}, {"tau": 3})["tau"]
+
+    s, c = np.sin(q[:, :1]), np.cos(q[:, 1:])
+    own = s * c * [3.0, 5.0]
+    carried = own.sum(axis=1, keepdims=True) * s
+    assert np.allclose(tau, np.hstack([carried, carried * c + own]), rtol=1e-15, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("a = load limbs0_q[0]\nout tau[0] = a", "differs from limb to limb"),
+        ("a = load limbs0_q[0]\nb = load limbs1_q[0]\nc = add a b\nout tau[0] = c", "two groups"),
+        ("a = load limbs0_sum[0]\nout tau[0] = a\nout limbs0_partial[0] = a", "depends on itself"),
+    ],
+)
+def test_what_is_no_function_of_core_and_limbs_is_refused(text: str, fault: str):
+    other = LimbGroup(1, 2, ((Slot("limbs1_q", 0), (Slot("q", 3), Slot("q", 4))),), (), ())
+    with pytest.raises(InternalError, match=fault):
+        staged(parse(text), [TWO, other])

@@ -1,0 +1,164 @@
+"""Limbs in lanes, compiled: vectors of every width, precision and source of sines give what the straight line gives."""
+
+from __future__ import annotations
+
+import platform
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from direct import Direct, shared_library
+from limbed import FUNCTIONS, kernels, package_of, shape
+
+from psdmc.emit.options import EmitOptions
+from psdmc.functions import RECIPES
+from psdmc.model.random_states import states_of
+from psdmc.program.interpret import interpret
+from psdmc.program.signature import Sizes
+from psdmc.target.presets import SCALAR, preset
+
+LEGS, FIVE, BOTH = (
+    "four legs of a floating body",
+    "five limbs that slide",
+    "arms on a trunk, legs on its root",
+)
+FINGERS = "three fingers on a wrist"
+COUNT = 8
+EXACT = {"float64": 1e-12, "float32": 2e-3}
+"""Of an output's largest value; accelerations follow the mass matrix's condition."""
+
+BUILDS = {
+    "2 lanes": ["-march=x86-64"],
+    "4 lanes": ["-march=x86-64-v3"],
+    "4 lanes of 8": ["-march=x86-64-v4"],
+    "8 lanes": ["-march=x86-64-v4", "-D__znver3__"],
+    "no vectors": ["-Dtree_NO_VECTORS"],
+}
+CASES = [
+    *((LEGS, build, "float64", "inline") for build in BUILDS),
+    *((FIVE, build, "float64", "inline") for build in ("2 lanes", "4 lanes", "8 lanes")),
+    (BOTH, "4 lanes", "float64", "inline"),
+    (FINGERS, "4 lanes", "float64", "inline"),
+    (LEGS, "4 lanes", "float64", "libm"),
+    (LEGS, "2 lanes", "float64", "freestanding"),
+    (LEGS, "4 lanes", "float32", "inline"),
+    (BOTH, "2 lanes", "float32", "libm"),
+]
+
+
+def runs_here(build: str) -> bool:
+    if "NO_VECTORS" in " ".join(BUILDS[build]):
+        return True
+    needed = {"2 lanes": "sse2", "4 lanes": "avx2", "4 lanes of 8": "avx512dq", "8 lanes": "avx512dq"}[build]
+    cpu = Path("/proc/cpuinfo")
+    return platform.machine() == "x86_64" and cpu.exists() and needed in cpu.read_text().split()
+
+
+def built(name: str, build: str, folder: Path, real: str = "float64", trig: str = "inline") -> Direct:
+    if not runs_here(build):
+        pytest.skip(f"no processor for {build}")
+    package = package_of(name, EmitOptions(real=real, trig=trig))  # type: ignore[arg-type]
+    strict = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]
+    return Direct(package, shared_library(package, folder, ["-O0", *strict, *BUILDS[build]]))
+
+
+def given_states(name: str, real: str = "float64") -> dict[str, np.ndarray]:
+    mechanism = shape(name)[1].mechanism
+    vectors = states_of(mechanism, np.random.default_rng(9), COUNT)
+    states = dict(zip(("q", "qd", "qdd"), vectors, strict=True)) | {"tau": 2.0 * vectors[2]}
+    return {key: np.ascontiguousarray(rows, real) for key, rows in states.items()}
+
+
+def called(compiled: Direct, function: str, state: dict[str, np.ndarray], size: int) -> np.ndarray:
+    inputs = [state[q.name] for q in RECIPES[function].signature.inputs]
+    out = np.full(size, np.nan, inputs[0].dtype)
+    assert compiled(function, *inputs, out) in (0, None)
+    return out
+
+
+@pytest.mark.parametrize(("name", "build", "real", "trig"), CASES)
+def test_one_state_is_the_straight_lines(name: str, build: str, real: str, trig: str, tmp_path: Path) -> None:
+    compiled, model, given = (
+        built(name, build, tmp_path, real, trig),
+        shape(name)[1],
+        given_states(name, real),
+    )
+    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    in_lanes = 0
+    for function in FUNCTIONS:
+        signature, kernel = RECIPES[function].signature, kernels(name)[function]
+        in_lanes += kernel.limbs is not None
+        wanted = interpret(kernel.single, given, signature.sizes(sizes))[signature.outputs[0].name]
+        for k in range(COUNT):
+            state = {key: rows[k].copy() for key, rows in given.items()}
+            found = called(compiled, function, state, wanted.shape[1])
+            assert np.abs(found - wanted[k]).max() <= EXACT[real] * np.abs(wanted[k]).max(), (function, k)
+    assert in_lanes
+
+
+@pytest.mark.parametrize("build", ["2 lanes", "4 lanes"])
+def test_an_output_may_be_an_input(build: str, tmp_path: Path) -> None:
+    compiled, given = built(LEGS, build, tmp_path), given_states(LEGS)
+    state = {key: rows[0].copy() for key, rows in given.items()}
+    size = shape(LEGS)[1].nv
+    for function in ("inverse_dynamics", "forward_dynamics"):
+        wanted = called(compiled, function, state, size)
+        for shared in RECIPES[function].signature.inputs:
+            inputs = [state[q.name].copy() for q in RECIPES[function].signature.inputs]
+            place = [q.name for q in RECIPES[function].signature.inputs].index(shared.name)
+            compiled(function, *inputs, inputs[place])
+            assert np.array_equal(inputs[place][:size], wanted)
+
+
+@pytest.mark.parametrize("build", ["2 lanes", "4 lanes"])
+def test_nan_in_one_limb_stays_out_of_what_does_not_depend_on_it(build: str, tmp_path: Path) -> None:
+    """Of a leg's angle that is not a number, that leg's torques and the body's know; other legs' entries of M do not."""
+    compiled, given = built(LEGS, build, tmp_path), given_states(LEGS)
+    state = {key: rows[0].copy() for key, rows in given.items()}
+    state["q"][8] = np.nan  # the first leg's second joint
+    nv = shape(LEGS)[1].nv
+
+    mass = called(compiled, "mass_matrix", state, nv * nv).reshape(nv, nv)
+    torques = called(compiled, "inverse_dynamics", state, nv)
+
+    assert np.isfinite(mass[9:, 9:]).all()
+    assert np.isfinite(mass[9:, :6]).all()
+    assert np.isnan(mass[6:9, :6]).any()
+    assert np.isnan(mass[:6, :6]).any()
+    assert np.isfinite(torques[9:]).all()
+    assert np.isnan(torques[:7]).all()
+
+
+@pytest.mark.parametrize("limb", range(4))
+def test_a_pivot_that_is_not_positive_is_reported_as_by_the_straight_line(limb: int, tmp_path: Path) -> None:
+    """An angle that is not a number makes pivots that are none."""
+    given = given_states(LEGS)
+    nv, statuses = shape(LEGS)[1].nv, []
+    for build in ("4 lanes", "no vectors"):
+        compiled = built(LEGS, build, tmp_path / build.replace(" ", "_"))
+        state = {key: rows[0].copy() for key, rows in given.items()}
+        state["q"][7 + 3 * limb + 2] = np.nan
+        out = np.zeros(nv)
+        statuses.append(compiled("forward_dynamics", state["q"], state["qd"], state["tau"], out))
+        assert np.isnan(out).all()
+    assert statuses[0] == statuses[1] > 0
+
+
+def test_the_package_says_what_it_has(tmp_path: Path) -> None:
+    from psdmc.emit.package import package_files
+
+    files = package_files(package_of(LEGS, EmitOptions()))
+    assert "src/limbs4.h" in files
+    assert re.search(r"inverse_dynamics: .*; one state with limbs in lanes: ", files["include/tree/tree.h"])
+    assert "cost_with_limbs_in_lanes" in files["manifest.json"]
+    assert "limbs" not in files["src/inverse_dynamics.inc"]
+
+
+def test_machines_without_vectors_and_packages_without_limbs_have_no_trace_of_them() -> None:
+    from psdmc.emit.package import package_files
+
+    for options in (EmitOptions(target=SCALAR),):
+        assert not [path for path in package_files(package_of(LEGS, options)) if "limbs" in path]
+    narrow = package_files(package_of(LEGS, EmitOptions(target=preset("x86-64-v2"))))
+    assert "#define LIMBS4_WIDTH 2" in narrow["src/vectors.h"]
