@@ -35,7 +35,7 @@ SHAPES = {
     "two arms on the base": ("", [(BASE, "RRR", 2)]),
     "three fingers on a wrist": ("RR", [(1, "RR", 3)]),
     "four legs of a floating body": ("F", [(0, "RRR", 4)]),
-    "five limbs that slide": ("", [(BASE, "RP", 5)]),
+    "five legs of a floating body": ("F", [(0, "RRR", 5)]),
     "arms on a trunk, legs on its root": ("FR", [(1, "RRR", 2), (0, "RR", 3)]),
     "six legs on a ball": ("S", [(0, "RR", 6)]),
 }

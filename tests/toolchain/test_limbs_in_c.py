@@ -20,7 +20,7 @@ from psdmc.target.presets import SCALAR, preset
 
 LEGS, FIVE, BOTH = (
     "four legs of a floating body",
-    "five limbs that slide",
+    "five legs of a floating body",
     "arms on a trunk, legs on its root",
 )
 FINGERS = "three fingers on a wrist"
