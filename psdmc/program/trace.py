@@ -236,7 +236,7 @@ class Symbol:
     def root(self) -> Symbol:
         """The square root; of a constant a constant."""
         known = self.constant_value()
-        if known is not None:
+        if known is not None and not isinstance(known, Lanes):
             return self.tracer.constant(math.sqrt(known))
         index = self.tracer.record((_NEG, self.index, None)) if self.negative else self.index
         return Symbol(self.tracer, self.tracer.record((_SQRT, index, None)))
