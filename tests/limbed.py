@@ -37,7 +37,6 @@ SHAPES = {
     "four legs of a floating body": ("F", [(0, "RRR", 4)]),
     "five legs of a floating body": ("F", [(0, "RRR", 5)]),
     "arms on a trunk, legs on its root": ("FR", [(1, "RRR", 2), (0, "RR", 3)]),
-    "six legs on a ball": ("S", [(0, "RR", 6)]),
 }
 
 
