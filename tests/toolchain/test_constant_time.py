@@ -32,6 +32,9 @@ PACKAGES = {
 }
 """Robot and functions; of the larger one those that are written otherwise for many joints."""
 
+MOVES = ("neutral", "integrate", "difference")
+"""Of a chain these are a few stores and additions; all others take sines."""
+
 
 def program_text(package: PackageView) -> str:
     """C: calls every function CALLS times at random states of a size that the command line gives."""
@@ -82,7 +85,9 @@ def test_the_number_of_instructions_does_not_depend_on_the_state(package: Packag
     counts = {scale: _instructions(folder, scale, package.robot) for scale in SCALES}
     (first, *others) = counts.values()
     assert set(first) == {f"{package.robot}_{kernel.name}" for kernel in package.kernels}
-    assert min(first.values()) > CALLS * 20
+    moves = {f"{package.robot}_{name}" for name in MOVES}
+    assert min(count for name, count in first.items() if name not in moves) > CALLS * 20
+    assert min(first.values()) >= CALLS * 2
     for name in first:
         assert {other[name] for other in others} == {first[name]}, name
 
@@ -101,9 +106,11 @@ def _instructions(folder: Path, scale: str, robot: str) -> dict[str, int]:
     """Of all calls of each function from main, what they call included."""
     words = ["valgrind", "--tool=callgrind", "--callgrind-out-file=counts", "--compress-strings=no"]
     subprocess.run([*words, "./main", scale], capture_output=True, check=True, cwd=folder)
-    (text,) = re.findall(
+    parts = re.findall(
         r"^fn=main\n(.*?)^(?:fn|ob|totals)[=:]", (folder / "counts").read_text(), re.MULTILINE | re.DOTALL
     )
+    assert parts
+    text = "".join(parts)  # callgrind writes a function in several parts where others come between
     found = re.findall(rf"^cfn=({robot}_\w+)\ncalls=(\d+) .*\n\S+ (\d+)$", text, re.MULTILINE)
     assert all(int(calls) == CALLS for _, calls, _ in found)
     return {name: int(cost) for name, _, cost in found}
