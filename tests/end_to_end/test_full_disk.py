@@ -106,7 +106,7 @@ def test_a_full_disk_under_what_was_measured(
     options: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     measured = BenchResult(this_machine(), {f"rival {k}": "1.0" for k in range(200)}, 1, 1, ())
-    monkeypatch.setattr("psdmc.cli.measuring.run", lambda *_: measured)
+    monkeypatch.setattr("psdmc.bench.run.run", lambda *_: measured)
     folder = tmp_path / "work"
     folder.mkdir()
     model_into(folder)

@@ -202,8 +202,8 @@ def test_derive_writes_nothing_to_a_home_and_says_nothing_of_it(tmp_path: Path):
 def test_pictures_are_drawn_without_a_home_and_without_a_word(tmp_path: Path):
     (tmp_path / "home").write_text("no folder")
     code = (
-        "from psdmc.report.bench_plots import svg\n"
-        "print(svg(lambda figure: figure.subplots().plot([1, 2]), (3.0, 2.0))[:4])"
+        "from psdmc.report.drawing import svg\n"
+        "print(svg(lambda figure: figure.subplots().plot([1, 2]), (3.0, 2.0), 'a line')[:4])"
     )
     surroundings = {
         "HOME": str(tmp_path / "home"),
@@ -351,7 +351,7 @@ def test_a_file_where_a_folder_is_expected(model: Path, tmp_path: Path, capsys: 
 
 
 def test_the_cache_is_shown_and_cleared(tmp_path: Path):
-    place = {"PSDMC_CACHE_DIR": str(tmp_path / "my cache")}
+    place = {"PSDMC_CACHE_DIR": str(tmp_path / "my cache"), "PSDMC_DIRECT_CALLS": "0"}
     assert typed("cache", **place).stdout == f"{tmp_path / 'my cache'}: 0 entries, 0.0 MiB of 1024.0 MiB\n"
 
     code = f"import psdmc; psdmc.compile(psdmc.derive({SCARA!r}), functions=['gravity'])"
