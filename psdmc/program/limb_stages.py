@@ -36,24 +36,24 @@ class _Split:
             vectors = {group.constant, group.partial}
             vectors |= {slot.vector for slot, _ in (*group.inputs, *group.outputs)}
             self.owner |= dict.fromkeys(sorted(vectors), group.number)
-        self.kind = self._kinds()
+        self.group = self._groups()
         self.level = self._levels()
-        self.place = [(level, kind) for level, kind in zip(self.level, self.kind, strict=True)]
+        self.place = [(level, group) for level, group in zip(self.level, self.group, strict=True)]
         self.is_free = [self._may_be_repeated(instr) for instr in program.body]
         self.stored = self._stored()
         self.crossing = self._crossing()
 
-    def _kinds(self) -> list[int]:
-        kinds: list[int] = []
+    def _groups(self) -> list[int]:
+        groups: list[int] = []
         for instr in self.program.body:
             if instr.slot is not None:
-                kinds.append(self.owner.get(instr.slot.vector, THE_CORE))
+                groups.append(self.owner.get(instr.slot.vector, THE_CORE))
                 continue
-            found = {kinds[a] for a in instr.args} - {THE_CORE}
+            found = {groups[a] for a in instr.args} - {THE_CORE}
             if len(found) > 1:
                 raise InternalError("limbs of two groups meet in one value")
-            kinds.append(found.pop() if found else THE_CORE)
-        return kinds
+            groups.append(found.pop() if found else THE_CORE)
+        return groups
 
     def _levels(self) -> list[int]:
         """Of each value how many sums it depends on, one behind the other."""
@@ -83,10 +83,10 @@ class _Split:
         """What each stage puts out of what the whole PROGRAM does."""
         stored: dict[Place, list[tuple[Slot, int]]] = {}
         for slot, i in self.program.outputs:
-            kind = self.owner.get(slot.vector, THE_CORE)
-            if kind == THE_CORE and self.kind[i] != THE_CORE:
+            group = self.owner.get(slot.vector, THE_CORE)
+            if group == THE_CORE and self.group[i] != THE_CORE:
                 raise InternalError(f"{slot} is the core's, and differs from limb to limb")
-            stored.setdefault((self.level[i], kind), []).append((slot, i))
+            stored.setdefault((self.level[i], group), []).append((slot, i))
         return stored
 
     def _crossing(self) -> dict[int, Slot]:
@@ -101,9 +101,9 @@ class _Split:
         slots: dict[int, Slot] = {}
         used: dict[int, int] = {}
         for i in sorted(read):
-            kind = self.kind[i]
-            slots[i] = Slot(self.kept[kind], used.setdefault(kind, 0))
-            used[kind] += 1
+            group = self.group[i]
+            slots[i] = Slot(self.kept[group], used.setdefault(group, 0))
+            used[group] += 1
         return slots
 
     def _crosses(self, value: int, place: Place) -> bool:
@@ -115,7 +115,8 @@ class _Split:
         }
         places = sorted(busy | self.stored.keys())
         return tuple(
-            Stage(None if kind == THE_CORE else kind, self._stage((level, kind))) for level, kind in places
+            Stage(None if group == THE_CORE else group, self._stage((level, group)))
+            for level, group in places
         )
 
     def _stage(self, place: Place) -> Program:

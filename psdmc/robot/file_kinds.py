@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -14,6 +15,8 @@ ROBOT_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf", ".toml")
 
 MACRO = "<xacro:"
 """What a file has that xacro must expand. What xacro made of one still declares its namespace, and is a URDF."""
+
+COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 
 SourceFormat = Literal["urdf", "dh"]
 
@@ -33,7 +36,7 @@ def as_source(file: Path, text: str, options: LoadOptions) -> tuple[str, SourceF
         )
     if tag == "mujoco":
         return _from_mjcf(file, options)
-    if file.suffix.lower() == ".xacro" or MACRO in text:
+    if file.suffix.lower() == ".xacro" or MACRO in COMMENT.sub("", text):
         from psdmc.robot.xacro_file import expanded
 
         return expanded(file, file.name), "urdf", options

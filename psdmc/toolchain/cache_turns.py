@@ -24,9 +24,8 @@ def turn(place: Path, key: str) -> Iterator[None]:
     Where the file system cannot lock nobody waits.
     """
     path = place / f".turn-{key[:16]}"
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+    handle = _taken(path)
     try:
-        _wait(handle)
         yield
     finally:
         path.unlink(missing_ok=True)
@@ -34,9 +33,18 @@ def turn(place: Path, key: str) -> Iterator[None]:
         os.close(handle)
 
 
-def _wait(handle: int) -> None:
-    if not can_lock(handle):
-        return
+def _taken(path: Path) -> int:
+    """The lock file, open and locked. Where it was removed meanwhile, by whoever had it or as a leftover, its lock keeps
+    nobody out: the next one is taken."""
     until = time.monotonic() + LONGEST
-    while not lock(handle, wait=False) and time.monotonic() < until:
-        time.sleep(BETWEEN)
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+        if not can_lock(handle):
+            return handle
+        while not lock(handle, wait=False):
+            if time.monotonic() > until:
+                return handle
+            time.sleep(BETWEEN)
+        if os.fstat(handle).st_nlink:
+            return handle
+        os.close(handle)

@@ -101,6 +101,14 @@ def test_what_xacro_has_expanded_is_a_urdf(tmp_path: Path) -> None:
     assert load_robot(tmp_path / "expanded.urdf").mechanism.joint_names == ("turn",)
 
 
+def test_a_macro_in_a_comment_asks_for_no_xacro(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in example-robot-data's quadruped."""
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    text = TWO_LINKS.replace('<link name="arm">', '<!-- <xacro:leg prefix="FL"/> --><link name="arm">', 1)
+    (tmp_path / "expanded.urdf").write_text(text, encoding="utf-8")
+    assert load_robot(tmp_path / "expanded.urdf").mechanism.joint_names == ("turn",)
+
+
 TWO_LINKS = """
 <robot name="x">
   <link name="base"/>

@@ -17,6 +17,7 @@ from traced import arm_package
 from unoptimised import without_optimisation
 
 from psdmc.errors import ToolchainError
+from psdmc.toolchain import cache_turns
 from psdmc.toolchain.cache import cache_key, cached
 from psdmc.toolchain.cache_place import cache_directory
 from psdmc.toolchain.call import CompiledRobot
@@ -105,6 +106,23 @@ def test_threads_that_race_build_once(fresh_cache: Path) -> None:
         found = list(pool.map(lambda _: cached("t" * 64, build), range(4)))
     assert len(built) == 1
     assert found == [fresh_cache / ("t" * 64)] * 4
+
+
+def test_a_turn_is_of_the_file_that_others_find(fresh_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lock file that is removed as a leftover before it is locked keeps nobody out: another one is taken."""
+    fresh_cache.mkdir(exist_ok=True)
+    path, locks = fresh_cache / f".turn-{'u' * 16}", cache_turns.lock
+
+    def swept(handle: int, wait: bool = True) -> bool:
+        monkeypatch.setattr(cache_turns, "lock", locks)
+        path.unlink()
+        return locks(handle, wait)
+
+    monkeypatch.setattr(cache_turns, "lock", swept)
+    with cache_turns.turn(fresh_cache, "u" * 64):
+        other = os.open(path, os.O_RDWR)
+        assert not locks(other, wait=False)
+        os.close(other)
 
 
 def test_after_a_build_that_failed_the_next_one_builds(fresh_cache: Path) -> None:
@@ -234,7 +252,10 @@ def damage_by_forging_the_seal(library: Path) -> None:
         damage_by_forging_the_seal,
     ],
 )
-def test_a_damaged_entry_is_built_again(damage: Callable[[Path], None], fresh_cache: Path) -> None:
+def test_a_damaged_entry_is_built_again(
+    damage: Callable[[Path], None], fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PSDMC_DIRECT_CALLS", "0")  # whose extension is another entry
     package = arm_package(names=["gravity"])
     library = compile_library(package)
     sound = library.read_bytes()
