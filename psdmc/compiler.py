@@ -20,7 +20,8 @@ from weakref import WeakValueDictionary
 from psdmc.emit.adapters import chosen, with_needed
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_files, package_view
+from psdmc.emit.package import PackageView, package_view
+from psdmc.emit.package_files import package_files
 from psdmc.emit.reference_load import reference_load
 from psdmc.emit.reference_states import reference_states
 from psdmc.emit.write import write_package

@@ -25,7 +25,8 @@ from small import (
 )
 
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import package_files, package_view
+from psdmc.emit.package import package_view
+from psdmc.emit.package_files import package_files
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.errors import InputError, InternalError
 
@@ -85,7 +86,7 @@ def test_the_order_of_kernels_does_not_matter() -> None:
 
 def test_the_text_is_the_same_under_every_hash_seed() -> None:
     script = (
-        "import hashlib, json; from small import pendulum; from psdmc.emit.package import package_files;"
+        "import hashlib, json; from small import pendulum; from psdmc.emit.package_files import package_files;"
         "print(hashlib.sha256(json.dumps(package_files(pendulum())).encode()).hexdigest())"
     )
     here = str(Path(__file__).parent)

@@ -15,7 +15,8 @@ from small import INVERSE, kernel, pendulum, pendulum_info
 
 from psdmc.emit.info import JointInfo
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import package_files, package_view
+from psdmc.emit.package import package_view
+from psdmc.emit.package_files import package_files
 from psdmc.emit.reals import rounded_out
 from psdmc.errors import InputError
 

@@ -13,7 +13,7 @@ import pytest
 from small import pendulum, pendulum_info
 
 from psdmc.emit.names import RESERVED, identifier, is_reserved
-from psdmc.emit.package import package_files
+from psdmc.emit.package_files import package_files
 
 NEWEST_GLIBC = (2, 36)
 """The one whose headers reserved/c_and_posix.txt was made from."""

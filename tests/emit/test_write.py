@@ -13,7 +13,7 @@ from small import pendulum, pendulum_info
 from psdmc.emit.manifest import digest
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.own_files import OWN_NAME, edited_files
-from psdmc.emit.package import package_files
+from psdmc.emit.package_files import package_files
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError, ToolchainError
 

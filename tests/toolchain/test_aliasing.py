@@ -11,7 +11,7 @@ from direct import Direct, shared_library, states
 from traced import SIZES, L, N, arm, arm_kernels, arm_package
 
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import package_files
+from psdmc.emit.package_files import package_files
 
 KERNELS = arm_kernels()
 AS_LONG_AS_AN_INPUT = [

@@ -16,7 +16,7 @@ from unoptimised import wrapper
 
 import psdmc
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import package_files
+from psdmc.emit.package_files import package_files
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError, ToolchainError

@@ -146,7 +146,7 @@ def test_a_pivot_that_is_not_positive_is_reported_as_by_the_straight_line(limb: 
 
 
 def test_the_package_says_what_it_has(tmp_path: Path) -> None:
-    from psdmc.emit.package import package_files
+    from psdmc.emit.package_files import package_files
 
     files = package_files(package_of(LEGS, EmitOptions()))
     assert "src/limbs4.h" in files
@@ -156,7 +156,7 @@ def test_the_package_says_what_it_has(tmp_path: Path) -> None:
 
 
 def test_machines_without_vectors_and_packages_without_limbs_have_no_trace_of_them() -> None:
-    from psdmc.emit.package import package_files
+    from psdmc.emit.package_files import package_files
 
     for options in (EmitOptions(target=SCALAR),):
         assert not [path for path in package_files(package_of(LEGS, options)) if "limbs" in path]

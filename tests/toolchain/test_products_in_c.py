@@ -11,7 +11,8 @@ from direct import Direct, all_expected, shared_library, states
 from test_odd_sizes import INFO
 
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import library_files, package_view
+from psdmc.emit.package import package_view
+from psdmc.emit.package_files import library_files
 from psdmc.program.kernel import Kernel
 from psdmc.program.products import Product, written_out
 from psdmc.program.program import Slot

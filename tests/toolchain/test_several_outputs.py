@@ -14,7 +14,8 @@ from unoptimised import compiled as library
 from unoptimised import wrapper
 
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import package_files, package_view
+from psdmc.emit.package import package_view
+from psdmc.emit.package_files import package_files
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError, InternalError

@@ -12,7 +12,8 @@ from psdmc.bench.case import BENCHED, MOST_DIFFERENTIATED, Case
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, library_files, package_view
+from psdmc.emit.package import PackageView, package_view
+from psdmc.emit.package_files import library_files
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
