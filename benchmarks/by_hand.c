@@ -1,56 +1,17 @@
 /* The emitted KR6 library timed by hand, sharing no code with the bench. benchmarks/by_hand.sh compiles and runs it. */
 #define _POSIX_C_SOURCE 200809L
-#include <stdio.h>
-#include <stdlib.h>
-#include <time.h>
-
 #include <kr6/kr6.h>
+
+#include "by_hand_timing.h"
 
 enum { N = kr6_DOF, STATES = 65536, PASSES = 15, BLOCK = 4096, SOME = 256, LARGEST = kr6_DOF * kr6_BASE_PARAMETERS, SQUARE = N * N, RING = 128 };
 
 static _Alignas(64) double q[STATES * N], qd[STATES * N], x[STATES * N], out[RING * LARGEST];
 static _Alignas(64) double by_q[SOME * SQUARE], by_qd[SOME * SQUARE], by_x[SOME * SQUARE], found[SOME * N];
 
-static double seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-static double random_in(double limit)
-{
-    return limit * (2.0 * rand() / RAND_MAX - 1.0);
-}
-
-static int ascending(const void *a, const void *b)
-{
-    const double left = *(const double *)a, right = *(const double *)b;
-    return (left > right) - (left < right);
-}
-
-static void report(const char *name, double *passes)
-{
-    qsort(passes, PASSES, sizeof *passes, ascending);
-    printf("psdmc      %-28s %8.1f ns\n", name, 1e9 * passes[PASSES / 2] / STATES);
-}
-
-/* The median pass over all states, `step` of them a call. */
-#define TIME(name, step, call) \
-    for (int pass = 0; pass < PASSES; ++pass) { \
-        const double start = seconds(); \
-        for (size_t i = 0; i < STATES; i += (step)) { \
-            double *to = out + i / (step) % ((step) > 1 ? 1 : RING) * LARGEST; \
-            call; \
-        } \
-        passes[pass] = seconds() - start; \
-        check += out[1]; \
-    } \
-    report(name, passes)
-
 int main(void)
 {
-    double passes[PASSES], check = 0.0;
+    double times[PASSES], check = 0.0;
     for (size_t i = 0; i < STATES * N; ++i) {
         q[i] = random_in(3.0);
         qd[i] = random_in(3.0);

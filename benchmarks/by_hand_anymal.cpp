@@ -1,8 +1,5 @@
 // Pinocchio on a floating anymal_b timed by hand, sharing no code with the bench. benchmarks/by_hand_anymal.sh compiles and
 // runs it on what Pinocchio's own reading of the URDF says in numbers: the wheel has no headers of the parser.
-#include <algorithm>
-#include <chrono>
-#include <cstdio>
 #include <fstream>
 #include <random>
 #include <string>
@@ -14,7 +11,7 @@
 #include <pinocchio/algorithm/joint-configuration.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
-constexpr int states = 65536, passes = 7;
+#include "by_hand_timing.hpp"
 
 pinocchio::JointIndex add(pinocchio::Model &model, std::size_t parent, const std::string &type, const pinocchio::SE3 &at,
                           const std::string &name) {
@@ -45,18 +42,6 @@ pinocchio::Model robot(const char *file) {
     model.inertias[joint] = pinocchio::Inertia(mass, centre, inertia);
   }
   return model;
-}
-
-template <class Call>
-void report(const char *name, Call call) {
-  std::vector<double> times;
-  for (int pass = 0; pass < passes; ++pass) {
-    const auto start = std::chrono::steady_clock::now();
-    for (int i = 0; i < states; ++i) call(i);
-    times.push_back(std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count());
-  }
-  std::sort(times.begin(), times.end());
-  std::printf("Pinocchio  %-28s %8.1f ns\n", name, times[passes / 2] / states);
 }
 
 int main(int, char **arguments) {

@@ -1,9 +1,7 @@
 #!/bin/sh
 # psdmc's and Pinocchio's C on a floating anymal_b in loops that share no code with the bench: their ratios must agree with
 # the bench's within 15 %. Usage, from the repository's root on an idle machine: PATH=.venv/bin:$PATH sh benchmarks/by_hand_anymal.sh
-set -eu
-made=generated/by_hand
-mkdir -p "$made"
+. benchmarks/by_hand_build.sh
 python - "$made/anymal.txt" > "$made/anymal.path" <<'END'
 import importlib.metadata
 import sys
@@ -23,13 +21,7 @@ print(path)
 END
 psdmc derive "$(cat "$made/anymal.path")" --floating -o "$made/anymal.npz" > "$made/log" 2>&1
 psdmc emit-c "$made/anymal.npz" -o "$made/anymal" >> "$made/log" 2>&1
-gcc -std=c11 -O3 -march=native -ffp-contract=fast -fno-math-errno -fno-trapping-math \
-    -fno-tree-slp-vectorize -I"$made/anymal/include" \
-    benchmarks/by_hand_anymal.c "$made"/anymal/src/[a-z]*.c -lm -o "$made/psdmc_anymal"
-prefix=$(python -c 'import pinocchio; print(pinocchio.__file__.rsplit("/lib/python", 1)[0])')
-g++ -std=c++17 -O3 -DNDEBUG -DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION -DBOOST_MPL_LIMIT_LIST_SIZE=30 \
-    -DBOOST_MPL_LIMIT_VECTOR_SIZE=30 -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12 \
-    -isystem "$prefix/include" -isystem "$prefix/include/eigen3" benchmarks/by_hand_anymal.cpp \
-    -L"$prefix/lib" -lpinocchio_default -Wl,-rpath,"$prefix/lib" -o "$made/pinocchio_anymal"
+timed_psdmc "$made/psdmc_anymal" benchmarks/by_hand_anymal.c "$made/anymal"
+timed_pinocchio "$made/pinocchio_anymal" benchmarks/by_hand_anymal.cpp
 "$made/psdmc_anymal"
 "$made/pinocchio_anymal" "$made/anymal.txt"

@@ -1,7 +1,4 @@
 // Pinocchio on the KR6 timed by hand, sharing no code with the bench. benchmarks/by_hand.sh compiles and runs it.
-#include <algorithm>
-#include <chrono>
-#include <cstdio>
 #include <random>
 #include <string>
 #include <vector>
@@ -14,7 +11,9 @@
 #include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
-constexpr int joints = 6, states = 65536, passes = 7;
+#include "by_hand_timing.hpp"
+
+constexpr int joints = 6;
 
 /// Rows of examples/robots/kr6.toml: a and d in m, alpha in quarter turns.
 constexpr double dh[joints][3] = {{0.025, -1, 0.183}, {-0.315, 0, 0}, {-0.035, 1, 0}, {0, -1, 0.365}, {0, 1, 0}, {0, 0, 0.08}};
@@ -29,18 +28,6 @@ pinocchio::Model arm() {
     model.inertias[joint] = pinocchio::Inertia::Random();
   }
   return model;
-}
-
-template <class Call>
-void report(const char *name, Call call) {
-  std::vector<double> times;
-  for (int pass = 0; pass < passes; ++pass) {
-    const auto start = std::chrono::steady_clock::now();
-    for (int i = 0; i < states; ++i) call(i);
-    times.push_back(std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count());
-  }
-  std::sort(times.begin(), times.end());
-  std::printf("Pinocchio  %-28s %8.1f ns\n", name, times[passes / 2] / states);
 }
 
 int main() {

@@ -56,16 +56,11 @@ class LimbWidth:
         return tuple(range(self.count % self.lanes))
 
 
-@dataclass(frozen=True, slots=True)
-class LimbVector:
-    """The vectors for a number of limbs on every machine of a target.
+class NamedByCount:
+    """C names of what belongs to a number of limbs."""
 
-    widths  possible ones, widest first
-    """
-
+    __slots__ = ()
     count: int
-    widths: tuple[LimbWidth, ...]
-    integer: str
 
     @property
     def name(self) -> str:
@@ -74,6 +69,18 @@ class LimbVector:
     @property
     def macro(self) -> str:
         return self.name.upper()
+
+
+@dataclass(frozen=True, slots=True)
+class LimbVector(NamedByCount):
+    """The vectors for a number of limbs on every machine of a target.
+
+    widths  possible ones, widest first
+    """
+
+    count: int
+    widths: tuple[LimbWidth, ...]
+    integer: str
 
     @property
     def arguments(self) -> str:
@@ -119,7 +126,7 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
-class GroupView:
+class GroupView(NamedByCount):
     """One group of limbs in C.
 
     inputs    read before anything is computed
@@ -133,14 +140,6 @@ class GroupView:
     constants: Table | None
     arrays: tuple[tuple[str, int], ...]
     sums: tuple[tuple[str, int], ...]
-
-    @property
-    def name(self) -> str:
-        return f"limbs{self.count}"
-
-    @property
-    def macro(self) -> str:
-        return self.name.upper()
 
 
 @dataclass(frozen=True, slots=True)

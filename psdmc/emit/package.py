@@ -230,10 +230,11 @@ class PackageView:
         return self_checks(self.kernels, self.dof, self.options, known)
 
     @property
-    def checked_kernels(self) -> int:
-        """Number of kernels whose values are compared."""
+    def checked_functions(self) -> int:
+        """Number of C functions whose values the self-test compares: kernels, loads and friction."""
         loads = 0 if self.references is None or self.references.load is None else len(self.payload_prototypes)
-        return len({check.kernel for check in self.self_checks if check.expected}) + loads
+        kernels = len({check.kernel for check in self.self_checks if check.expected})
+        return kernels + loads + bool(self.info.friction)
 
     @property
     def load_tolerance(self) -> str:

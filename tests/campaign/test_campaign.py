@@ -121,17 +121,21 @@ def test_no_accelerations_are_accepted_only_where_the_precision_leaves_none() ->
         assert (reference.acceleration_error(_answered(none, reference, real)) <= 1e-11) is is_accepted
 
 
-@pytest.mark.parametrize("mixed", [False, True])
-def test_a_random_robot_lowered_and_compiled(mixed: bool, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
-    robots = map(random_robot, range(400))
-    seed = next(robot.seed for robot in robots if len(robot.joints) == 2 and robot.is_mixed is mixed)
+def assert_right_when_lowered(seed: int) -> None:
     with without_optimisation():
         errors = measured(seed, STATES, lowered=True).errors
     assert failures(errors) == {}
     for function in FUNCTIONS:
         assert any(what.endswith(f"C auto float64 inline {function}") for what in errors)
         assert any(f"PROGRAM factored {function} batch" in what for what in errors)
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_a_random_robot_lowered_and_compiled(mixed: bool, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
+    robots = map(random_robot, range(400))
+    seed = next(robot.seed for robot in robots if len(robot.joints) == 2 and robot.is_mixed is mixed)
+    assert_right_when_lowered(seed)
 
 
 def test_a_random_tree_lowered_and_compiled(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,12 +145,7 @@ def test_a_random_tree_lowered_and_compiled(tmp_path, monkeypatch: pytest.Monkey
     seed = next(
         r.seed for r in robots if len(r.joints) == 4 and r.is_floating and r.follows and not r.is_light
     )
-    with without_optimisation():
-        errors = measured(seed, STATES, lowered=True).errors
-    assert failures(errors) == {}
-    for function in FUNCTIONS:
-        assert any(what.endswith(f"C auto float64 inline {function}") for what in errors)
-        assert any(f"PROGRAM factored {function} batch" in what for what in errors)
+    assert_right_when_lowered(seed)
 
 
 def test_trees_are_of_all_kinds() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import robot_path
+from pendulum import pendulum
 from pinocchio_robots import path_of
 from shared_data import UR10_LOG
 
@@ -230,22 +231,7 @@ def test_base_parameters_of_no_links_are_refused_with_a_distance(tmp_path: Path)
     assert not list(tmp_path.iterdir())
 
 
-PENDULUM = """
-name = "pendulum"
-convention = "standard"
-gravity = [0.0, -9.81, 0.0]
-[[joint]]
-name = "pivot"
-type = "revolute"
-a = 0.5
-alpha = 0.0
-d = 0.0
-theta = 0.0
-[joint.link]
-mass = 1.0
-com = [-0.1, 0.0, 0.0]
-inertia_com = { xx = 0.01, yy = 0.01, zz = 0.01, xy = 0.0, xz = 0.0, yz = 0.0 }
-"""
+PENDULUM = pendulum(mass=1.0, x=-0.1, yy=0.01, zz=0.01)
 
 
 def test_the_distance_is_that_of_the_nearest_pendulum(tmp_path: Path) -> None:

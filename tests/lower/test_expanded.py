@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pendulum import pendulum
 from random_chains import Oracle, random_chain, relative_error, states
 
 from psdmc.derivation.derive import derive_model
@@ -121,22 +122,7 @@ def test_without_gravity_nothing_is_left_of_gravity_but_zeros():
     ]
 
 
-PENDULUM = """
-name = "pendulum"
-convention = "standard"
-gravity = [0.0, -9.81, 0.0]
-[[joint]]
-name = "hinge"
-type = "revolute"
-a = 0.5
-alpha = 0.0
-d = 0.0
-theta = 0.0
-[joint.link]
-mass = 2.0
-com = [0.0, 0.0, 0.0]
-inertia_com = { xx = 0.0, yy = 0.0, zz = 0.1, xy = 0.0, xz = 0.0, yz = 0.0 }
-"""
+PENDULUM = pendulum(mass=2.0, x=0.0, yy=0.0, zz=0.1)
 
 
 def test_a_pendulum_accelerates_as_on_paper():

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-import threading
-import time
-
 import numpy as np
 import pytest
 from direct import error, expected
+from other_threads import counted_during
 from traced import SIZES, L, N, arm_kernels, arm_package, arm_references
 from unoptimised import compiled
 
@@ -96,29 +93,10 @@ def test_single_precision_gives_single_precision() -> None:
 
 
 def test_other_threads_run_during_a_call(robot: CompiledRobot) -> None:
-    """Nobody has to give up the GIL for 30 s, so that another thread counts only where C let go of it."""
     q = RANDOM.normal(size=(300_000, N))
-    counts, stop = [0], threading.Event()
-
-    def count() -> None:
-        while not stop.is_set():
-            counts[0] += 1
-            time.sleep(0)
-
     out = np.empty((len(q), N * N))
     arguments = [robot._address(array) for array in (q, q, out)]
-    counter = threading.Thread(target=count)
-    interval = sys.getswitchinterval()
-    counter.start()
-    try:
-        sys.setswitchinterval(30)
-        before = counts[0]
-        robot._library.test_arm_coriolis_matrix_batch(len(q), *arguments)
-        during = counts[0] - before
-    finally:
-        sys.setswitchinterval(interval)
-        stop.set()
-        counter.join()
+    during = counted_during(lambda: robot._library.test_arm_coriolis_matrix_batch(len(q), *arguments))
     assert during > 10, "with the GIL held there is at most one"
 
 

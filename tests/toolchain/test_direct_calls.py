@@ -6,14 +6,13 @@ import gc
 import inspect
 import sys
 import sysconfig
-import threading
-import time
 import weakref
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bundled import robot_path
+from other_threads import counted_during
 from traced import N, arm_kernels, arm_package, arm_references
 from unoptimised import compiled, without_optimisation
 
@@ -231,26 +230,8 @@ def test_nothing_is_leaked(robot: CompiledRobot) -> None:
 def test_other_threads_run_during_a_call_for_many_states() -> None:
     robot = new_robot()
     q = RANDOM.normal(size=(100_000, N))
-    counts, stop = [0], threading.Event()
-
-    def count() -> None:
-        while not stop.is_set():
-            counts[0] += 1
-            time.sleep(0)
-
-    counter = threading.Thread(target=count)
-    interval = sys.getswitchinterval()
-    counter.start()
-    try:
-        sys.setswitchinterval(30)
-        out = np.empty((len(q), N, N))
-        before = counts[0]
-        robot.coriolis_matrix(q, q, out=out)
-        during = counts[0] - before
-    finally:
-        sys.setswitchinterval(interval)
-        stop.set()
-        counter.join()
+    out = np.empty((len(q), N, N))
+    during = counted_during(lambda: robot.coriolis_matrix(q, q, out=out))
     assert during > 10, "with the GIL held there is at most one"
 
 
