@@ -1,0 +1,88 @@
+"""A package that was built for this machine, and then for another one, by its own build files."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from bundled import bundled_model
+
+import psdmc
+from psdmc.toolchain.build_package import build_package
+
+TOOLS = ("arm-none-eabi-gcc", "arm-none-eabi-ar", "arm-none-eabi-readelf")
+BOARD = """set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR arm)
+set(CMAKE_C_COMPILER arm-none-eabi-gcc)
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+"""
+
+
+def need(*programs: str) -> None:
+    for program in programs:
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed")
+
+
+def run(*words: str | Path) -> str:
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    return done.stdout
+
+
+def emitted(folder: Path, target: str) -> Path:
+    psdmc.emit_c(bundled_model("two_link"), folder, name="arm", functions=["gravity"], target=target)
+    return folder
+
+
+def members(library: Path) -> list[str]:
+    return run("ar", "t", library).split()
+
+
+@pytest.mark.parametrize("first", ["psdmc build", "make"])
+def test_another_compiler_compiles_everything_again(tmp_path: Path, first: str) -> None:
+    need("make", "cmake", "cc", "ar")
+    package = emitted(tmp_path / "arm", "scalar")
+    if first == "make":
+        run("make", "-C", package, "CFLAGS=-O0", "all")
+    else:
+        build_package(package)
+    other = tmp_path / "other cc"
+    other.write_text(f'#!/bin/sh\necho compiled >> "{tmp_path}/calls"\nexec cc "$@"\n', encoding="utf-8")
+    other.chmod(0o755)
+    make = ["make", "-C", package, f"CC='{other}'", "CFLAGS=-O0", "all"]
+
+    run(*make)
+    calls = (tmp_path / "calls").read_text(encoding="utf-8").count("compiled")
+    again = run(*make)
+
+    assert sorted(members(package / "build" / "libarm.a")) == ["gravity.o", "tables.o"]
+    assert calls >= 2
+    assert "-c src/" not in again, "nothing changed, nothing is compiled"
+
+
+def test_a_board_s_library_holds_the_boards_code_alone(tmp_path: Path) -> None:
+    need(*TOOLS, "make")
+    package = emitted(tmp_path / "arm", "cortex-m4f")
+    build_package(package)
+
+    run("make", "-C", package, f"CC={TOOLS[0]}", f"AR={TOOLS[1]}", "all")
+
+    heads = run(TOOLS[2], "-h", package / "build" / "libarm.a")
+    machines = [line.split(":")[1].strip() for line in heads.splitlines() if "Machine:" in line]
+    assert machines == ["ARM"] * len(members(package / "build" / "libarm.a"))
+
+
+def test_cmake_with_a_boards_toolchain_file_needs_no_further_option(tmp_path: Path) -> None:
+    """The self-test is a program: it wants an operating system, or an emulator."""
+    need(*TOOLS, "cmake")
+    package = emitted(tmp_path / "arm", "cortex-m4f")
+    (tmp_path / "board.cmake").write_text(BOARD, encoding="utf-8")
+    build = tmp_path / "build"
+
+    run("cmake", "-S", package, "-B", build, f"-DCMAKE_TOOLCHAIN_FILE={tmp_path}/board.cmake")
+    run("cmake", "--build", build)
+
+    assert (build / "libarm.a").is_file()
