@@ -37,6 +37,7 @@ MENU = {
         "how-to/cmake",
         "how-to/embedded",
         "how-to/batch",
+        "how-to/whole-body",
         "how-to/calibration-log",
         "how-to/extending",
     ),
