@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from bundled import bundled_model, robot_path
 from command_line import typed
+from unoptimised import wrapper
 
 
 def next_words(stderr: str) -> list[str]:
@@ -21,10 +22,10 @@ def next_words(stderr: str) -> list[str]:
 def test_from_a_robot_file_to_a_library_by_typing_what_is_said(tmp_path: Path) -> None:
     robot = tmp_path / "my scara.toml"
     robot.write_bytes(robot_path("scara").read_bytes())
-    words, typed_words = ["psdmc", "show", "my scara.toml"], []
+    words, typed_words, compiler = ["psdmc", "show", "my scara.toml"], [], str(wrapper(tmp_path))
     while words[0] == "psdmc":
         typed_words.append(words[1])
-        done = typed(*words[1:], cwd=tmp_path)
+        done = typed(*words[1:], cwd=tmp_path, CC=compiler)
         assert done.returncode == 0, done.stderr
         words = next_words(done.stderr)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from bundled import robot_path
-from command_line import files_in, status, typed
+from command_line import files_in, started, status
 
 from psdmc.toolchain.cache_entry import is_sound
 
@@ -165,9 +165,9 @@ def test_any_name_on_any_terminal(environment: dict[str, str], tmp_path: Path):
     folder.mkdir()
     (folder / "arm ü.toml").write_text(named, encoding="utf-8")
 
-    derived = typed("derive", folder / "arm ü.toml", "-o", folder / "m ü.npz", **environment)
-    shown = typed("show", folder / "m ü.npz", **environment)
-    missing = typed("show", folder / "no ü.npz", **environment)
+    derived = started("derive", folder / "arm ü.toml", "-o", folder / "m ü.npz", **environment)
+    shown = started("show", folder / "m ü.npz", **environment)
+    missing = started("show", folder / "no ü.npz", **environment)
 
     assert (derived.returncode, shown.returncode, missing.returncode) == (0, 0, 2), derived.stderr
     assert "Gelenk_" in shown.stdout
@@ -193,7 +193,7 @@ def test_derive_writes_nothing_to_a_home_and_says_nothing_of_it(tmp_path: Path):
         "XDG_CONFIG_HOME": "",
         "MPLCONFIGDIR": "",
     }
-    done = typed("derive", SCARA, "-o", tmp_path / "m.npz", **surroundings)
+    done = started("derive", SCARA, "-o", tmp_path / "m.npz", **surroundings)
 
     assert done.returncode == 0
     assert done.stderr == f"next: psdmc check {tmp_path / 'm.npz'}\n"
@@ -352,12 +352,12 @@ def test_a_file_where_a_folder_is_expected(model: Path, tmp_path: Path, capsys: 
 
 def test_the_cache_is_shown_and_cleared(tmp_path: Path):
     place = {"PSDMC_CACHE_DIR": str(tmp_path / "my cache"), "PSDMC_DIRECT_CALLS": "0"}
-    assert typed("cache", **place).stdout == f"{tmp_path / 'my cache'}: 0 entries, 0.0 MiB of 1024.0 MiB\n"
+    assert started("cache", **place).stdout == f"{tmp_path / 'my cache'}: 0 entries, 0.0 MiB of 1024.0 MiB\n"
 
     code = f"import psdmc; psdmc.compile(psdmc.derive({SCARA!r}), functions=['gravity'])"
     subprocess.run([sys.executable, "-c", code], env=os.environ | place, check=True)
-    assert ": 3 entries, " in typed("cache", **place).stdout, "a lowering, a library and its interface"
-    assert typed("cache", "--clear", **place).stdout.splitlines()[0] == "3 entries removed"
+    assert ": 3 entries, " in started("cache", **place).stdout, "a lowering, a library and its interface"
+    assert started("cache", "--clear", **place).stdout.splitlines()[0] == "3 entries removed"
     assert list((tmp_path / "my cache").iterdir()) == []
 
 
