@@ -86,6 +86,7 @@ ROOMS = {
     "calibration": {
         "logs": set(),
         "identify": {"logs"},
+        "description": {"logs", "identify"},
         "motions": {"logs", "identify"},
         "plant": {"logs", "identify", "motions"},
         "verdict": {"logs", "identify"},

@@ -19,17 +19,20 @@ def calibrate(
     logs: str | Path | Sequence[str | Path],
     options: CalibrateOptions | None = None,
     torque_constants: Mapping[str, float] | None = None,
+    validation: str | Path | Sequence[str | Path] = (),
 ) -> Calibration:
-    """The calibrated model, the identified values, and the verdict on them, from a campaign's folder or from logs.
+    """The calibrated model, the identified values, and the verdict on them, from a campaign's folder, a log
+    description (log.toml) or logs.
 
     The result's `verdict.word` is "usable", "usable, with doubts" or "not usable"; `verdict.reasons`, `.suspects` and
     `.doubts` say why, `.model` is the calibrated model whatever the verdict.
 
     model              or the path of a model file
     torque_constants   N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
+    validation         plain logs that are held out as a whole; the others are then fitted whole
 
     Raises InputError where a file is missing or a log cannot be read.
     """
     from psdmc.calibration.calibrate import calibrate as run
 
-    return run(model_of(model), logs, options, torque_constants=torque_constants)
+    return run(model_of(model), logs, options, torque_constants=torque_constants, validation=validation)

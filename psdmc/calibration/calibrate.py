@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from psdmc.calibration.campaign_file import is_campaign, read_campaign
+from psdmc.calibration.campaign_file import read_campaign
+from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.identify.four_steps import FourSteps, Runs, calibrate_four_steps, checked_runs
 from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibration.identify.motor_constants import motors_of_logs
@@ -20,8 +21,8 @@ from psdmc.calibration.identify.physical_steps import physical_steps
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.open_log import open_log
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.sources import campaign_of, log_sources
 from psdmc.calibration.verdict.judged_record import judged_record
 from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
 from psdmc.calibration.verdict.record import Calibration, four_step_record, linear_record, with_data
@@ -43,6 +44,7 @@ class CalibrateOptions:
     linear       options of the linear fit
     consistency  options of the physical estimate
     verdict      limits of the verdict
+    choice       of the linear fit's options, before what a log description says; for plain logs only
     """
 
     physical: bool = True
@@ -50,6 +52,7 @@ class CalibrateOptions:
     linear: LinearOptions = field(default_factory=LinearOptions)
     consistency: PhysicalOptions = field(default_factory=PhysicalOptions)
     verdict: VerdictOptions = field(default_factory=VerdictOptions)
+    choice: FitChoice = field(default_factory=FitChoice)
 
 
 def calibrate(
@@ -59,12 +62,14 @@ def calibrate(
     *,
     regressor: Regressor | None = None,
     torque_constants: Mapping[str, float] | None = None,
+    validation: str | Path | Sequence[str | Path] = (),
     progress: Progress = lambda step: None,
 ) -> Calibration:
-    """Calibrate a model from a campaign (its folder or campaign.toml) or from plain logs.
+    """Calibrate a model from a campaign (its folder or campaign.toml), a log description (log.toml) or plain logs.
 
     regressor         the compiled model where there is one; else Newton-Euler on arrays
     torque_constants  N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
+    validation        plain logs that are held out as a whole
 
     Raises InputError where a file is missing or a log cannot be used.
     """
@@ -73,22 +78,33 @@ def calibrate(
     if options.physical:
         require_cvxpy()
     regressor = regressor or ChainRegressor(model)
-    paths = [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
-    if not paths:
-        raise InputError("no log to calibrate from", "give a campaign's folder, or logs")
-    campaigns = [path for path in paths if is_campaign(path)]
-    if campaigns and len(paths) > 1:
-        raise InputError(
-            f"{campaigns[0]}: a campaign, given with {len(paths) - 1} other log(s) or campaign(s)",
-            "calibrate from one campaign, or from plain logs",
-        )
-    if campaigns:
-        return calibrate_campaign(
-            model, read_campaign(paths[0], model.joint_names), options, regressor, torque_constants, progress
-        )
+    paths, held = _paths(sources), _paths(validation)
+    campaign = campaign_of(paths)
+    if campaign is not None:
+        _require_plain(campaign, options, held)
+        runs = read_campaign(campaign, model.joint_names)
+        return calibrate_campaign(model, runs, options, regressor, torque_constants, progress)
     progress("reading logs")
-    logs = [open_log(path, progress) for path in paths]
-    return calibrate_logs(model, logs, options, regressor, torque_constants, progress)
+    found = log_sources(paths, held, model.joint_names, options.linear, options.choice, progress)
+    options = replace(options, linear=found.linear)
+    constants = {**found.constants, **(torque_constants or {})}
+    return calibrate_logs(model, found.logs, options, regressor, constants or None, progress)
+
+
+def _paths(sources: str | Path | Sequence[str | Path]) -> list[Path]:
+    return [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
+
+
+def _require_plain(campaign: Path, options: CalibrateOptions, validation: list[Path]) -> None:
+    """InputError where what is for plain logs is given with a campaign."""
+    given = [flag for flag, value in options.choice.by_flag().items() if value is not None]
+    given += ["--validate"] if validation else []
+    if given:
+        are = "is" if len(given) == 1 else "are"
+        raise InputError(
+            f"{', '.join(given)} {are} for plain logs, {campaign} is a campaign",
+            "leave it out: a campaign's steps have cut-offs, splits and friction of their own",
+        )
 
 
 def calibrate_campaign(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -15,10 +15,6 @@ from psdmc.cli.one_line import one_line
 from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
 from psdmc.cli.torque_constants import parsed_torque_constants
-from psdmc.errors import InputError
-
-if TYPE_CHECKING:
-    from psdmc.calibration.identify.linear_fit import LinearOptions
 
 WRONG_STATUS = 5
 """A contestant's results disagreed with the others'."""
@@ -158,6 +154,7 @@ def calibrate(
     """Identify base parameters, friction and motor constants from logs; the verdict comes first, exit 6: not usable."""
     with interrupt.at_once():
         from psdmc.calibration.calibrate import CalibrateOptions
+        from psdmc.calibration.description.table_fit import FitChoice
         from psdmc.calibration.verdict.record import verdict_of
         from psdmc.calibration.verdict.said_once import unsaid_warnings
         from psdmc.cli.show_checks import print_accuracy, print_verdict
@@ -171,7 +168,7 @@ def calibrate(
             logs,
             output,
             report,
-            CalibrateOptions(physical=physical is not False, linear=_linear(cutoff, logs)),
+            CalibrateOptions(physical=physical is not False, choice=FitChoice(cutoff=cutoff)),
             parsed_torque_constants(torque_constants),
             actuators,
             progress,
@@ -196,17 +193,3 @@ def calibrate(
     if not verdict.usable:
         raise typer.Exit(verdict.exit_status)
     say_next("emit-c", output, "-o", output.stem)
-
-
-def _linear(cutoff: float | None, logs: list[Path]) -> LinearOptions:
-    """Options of the linear fit; a campaign's steps have cut-offs of their own."""
-    from psdmc.calibration.campaign_file import is_campaign
-    from psdmc.calibration.identify.linear_fit import LinearOptions
-    from psdmc.calibration.logs.low_pass import FilterOptions
-
-    if cutoff is None:
-        return LinearOptions()
-    campaigns = [path for path in logs if is_campaign(path)]
-    if campaigns:
-        raise InputError(f"--cutoff is for plain logs, {campaigns[0]} is a campaign", "leave it out")
-    return LinearOptions(filter=FilterOptions(cutoff=cutoff))

@@ -19,7 +19,7 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.logs.check_options import CheckOptions
-from psdmc.calibration.logs.filter import SplitOptions, States, held_out, smoothed_rows, stretches
+from psdmc.calibration.logs.filter import SplitOptions, States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
@@ -191,7 +191,7 @@ def linear_problem(
             count += len(at)
             share = (states.first + at[-1]) / len(log)
             progress(Step(f"linear fit: {log.name}: {share:.0%}", share))
-        outs.append(held_out(count, options.split))
+        outs.append(held_out_of(log, count, options.split))
     problem = LinearProblem(chain, rows, np.concatenate(torques), np.concatenate(outs), l, names)
     return problem, tuple(remarks)
 

@@ -182,6 +182,11 @@ def held_out(count: int, options: SplitOptions) -> NDArray[np.bool_]:
     return np.asarray(is_out[block])
 
 
+def held_out_of(log: AnyLog, count: int, options: SplitOptions) -> NDArray[np.bool_]:
+    """(count,) held_out of a log's samples; all of them where the log is for validation."""
+    return np.ones(count, dtype=bool) if log.use == "validate" else held_out(count, options)
+
+
 def thinned(states: States, options: FilterOptions) -> NDArray[np.intp]:
     """Indices of usable samples that are independent: 1/(2 f_c) apart.
 

@@ -16,6 +16,9 @@ Quantity = Literal["current", "motor_torque", "joint_torque"]
 
 QUANTITIES: tuple[Quantity, ...] = ("current", "motor_torque", "joint_torque")
 
+Use = Literal["fit", "validate"]
+USES: tuple[Use, ...] = ("fit", "validate")
+
 LARGEST_NUMBER = 1e20
 """In any unit: a number beyond it is no time, angle or torque, and its square may overflow."""
 
@@ -54,6 +57,7 @@ class Log(Timed):
     notes        assumptions made when it was read
     sliding      names of joints whose position is in m, the others' being in rad; None: the log does not say
     date         of the data, if the file tells; else empty
+    use          fit, or validate: held out as a whole
     """
 
     name: str
@@ -66,6 +70,7 @@ class Log(Timed):
     notes: tuple[str, ...] = ()
     sliding: tuple[str, ...] | None = None
     date: str = ""
+    use: Use = "fit"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joint_names", tuple(self.joint_names))

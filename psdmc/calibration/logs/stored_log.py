@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from psdmc.calibration.logs.log import Array, Log, Quantity, Timed, places_of
+from psdmc.calibration.logs.log import Array, Log, Quantity, Timed, Use, places_of
 from psdmc.calibration.logs.row_store import RowStore
 
 
@@ -28,6 +28,7 @@ class StoredLog(Timed):
     notes: tuple[str, ...] = ()
     sliding: tuple[str, ...] | None = None
     date: str = ""
+    use: Use = "fit"
 
     def ordered(self, joint_names: tuple[str, ...]) -> StoredLog:
         """The same log with its columns in the order of these joints; InputError names every joint that is missing."""
@@ -53,7 +54,7 @@ class StoredLog(Timed):
 
     def held(self) -> Log:
         """The same log in memory."""
-        return replace(self.rows(0, len(self)), notes=self.notes, date=self.date)
+        return replace(self.rows(0, len(self)), notes=self.notes, date=self.date, use=self.use)
 
 
 AnyLog = Log | StoredLog

@@ -86,8 +86,10 @@ class TomlTable:
         self._fault(key, value, f"a text of at most {LONGEST_TEXT} characters")
         return ""
 
-    def word(self, key: str, words: tuple[str, ...]) -> str:
-        """One of some words."""
+    def word(self, key: str, words: tuple[str, ...], default: str | None = None) -> str:
+        """One of some words; missing it is a fault where there is no default."""
+        if key not in self.content and default is not None:
+            return default
         value = self.content.get(key)
         if isinstance(value, str) and value in words:
             return value

@@ -26,7 +26,7 @@ from psdmc.calibration.identify.prediction import Prediction, prediction_from_js
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import StepOptions, StepQuality, judged
 from psdmc.calibration.logs.check_options import CheckOptions
-from psdmc.calibration.logs.filter import States, held_out, smoothed_rows, stretches
+from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.stored_log import AnyLog
@@ -105,7 +105,9 @@ def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) 
     chain, step = found.model.mechanism, found.prediction.steps["all"]
     parts = [_log_parts(found, log, step, check) for log in logs]
     time, measured, predicted = (np.concatenate([part[k] for part in parts]) for k in range(3))
-    out = np.concatenate([held_out(len(part[0]), step.split) for part in parts])
+    out = np.concatenate(
+        [held_out_of(log, len(part[0]), step.split) for log, part in zip(logs, parts, strict=True)]
+    )
     return judged("All", chain.joint_names, time, measured, predicted, out)
 
 

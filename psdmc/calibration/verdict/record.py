@@ -259,8 +259,14 @@ def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration
 
 def with_data(record: Calibration, logs: Sequence[AnyLog]) -> Calibration:
     """The record with the names, lengths and dates of its logs."""
-    data = [{"log": log.name, "rows": len(log), "seconds": log.duration, "date": log.date} for log in logs]
+    data = [_data(log) for log in logs]
     return replace(record, facts={**record.facts, "data": data})
+
+
+def _data(log: AnyLog) -> dict[str, Any]:
+    """A log in plain values; `use` where it is not for fitting."""
+    found = {"log": log.name, "rows": len(log), "seconds": log.duration, "date": log.date}
+    return found if log.use == "fit" else {**found, "use": log.use}
 
 
 def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:

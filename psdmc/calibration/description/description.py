@@ -1,0 +1,74 @@
+"""A log description (log.toml): what the columns of a user's logs are, and how they are to be fitted.
+
+Each top-level key is a Table with a file of its own; `tables.TABLES` lists them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from psdmc.calibration.description.table import Reading, Table
+from psdmc.calibration.description.tables import TABLES
+from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_none
+
+WHAT = "a log description (log.toml), as `psdmc calibrate --describe` drafts one"
+HINT = "docs/log_description.md has every key; `psdmc calibrate --describe LOG` drafts a description"
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogDescription:
+    """A description's tables by key.
+
+    path   of its file, for messages
+    parts  by key, of the tables that the file has
+    """
+
+    path: Path
+    parts: Mapping[str, object]
+
+    def part(self, table: Table[T]) -> T:
+        """What the file says of a table; its default where it says nothing."""
+        return cast(T, self.parts.get(table.key, table.default))
+
+    def options(self, options: LinearOptions) -> LinearOptions:
+        """The linear fit's options with what all tables say."""
+        for table in TABLES:
+            options = table.options(options, self.part(table))
+        return options
+
+
+def read_description(path: str | Path, joint_names: tuple[str, ...] | None = None) -> LogDescription:
+    """A description from its file; InputError names the table and key that is wrong, and what is expected.
+
+    joint_names  of the model; None: names of joints are not checked
+    """
+    path = Path(path)
+    return description_of(read_toml(path, WHAT), path, joint_names)
+
+
+def description_of(
+    content: Mapping[str, Any], path: Path, joint_names: tuple[str, ...] | None = None
+) -> LogDescription:
+    """A description from the content of its TOML file."""
+    faults: list[str] = []
+    TomlTable(content, "description", tuple(table.key for table in TABLES), faults)
+    reading = Reading(path.parent, joint_names, faults)
+    parts = {table.key: table.read(content[table.key], reading) for table in TABLES if table.key in content}
+    if "log" not in content:
+        faults.append("no [[log]], expected one for each recording")
+    require_none(faults, str(path), HINT)
+    return LogDescription(path, parts)
+
+
+def is_description(path: Path) -> bool:
+    """Whether a path names a log description: a .toml file with [[log]] and no [[run]], as a campaign has."""
+    if path.suffix.lower() != ".toml":
+        return False
+    content = read_toml(path, "a log description or a campaign (.toml)")
+    return "run" not in content and any(table.key in content for table in TABLES)

@@ -1,0 +1,128 @@
+"""`[fit]`: options of the linear fit that belong to the logs: cut-off, split, and each joint's friction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from psdmc.calibration.description.table import Reading, Table
+from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.logs.filter import SplitOptions
+from psdmc.calibration.logs.low_pass import LARGEST_CUTOFF, SMALLEST_CUTOFF
+from psdmc.calibration.logs.toml_tables import TomlTable, shown
+from psdmc.calibration.logs.wording import listed, quoted
+
+KEYS = ("cutoff", "held_out", "blocks", "friction", "sign_speed")
+LARGEST_HELD_OUT = 0.9
+MOST_BLOCKS = 1000
+SLOWEST, FASTEST = 1e-6, 10.0
+"""rad/s (m/s), of the speed over which friction changes sign."""
+LARGEST_EXPONENT = 4.0
+MOST_EXPONENTS = 4
+EXPECTED_FRICTION = "coulomb, viscous, viscous^EXPONENT (above 0, to 4), offset"
+
+
+@dataclass(frozen=True, slots=True)
+class FitChoice:
+    """Choices of a description or of the command line; None: the default of LinearOptions.
+
+    cutoff      Hz
+    split       share that is held out of each log for fitting, and blocks
+    exponents   of the viscous terms;  offset  whether each joint's torque has a constant
+    sign_speed  rad/s (m/s)
+    """
+
+    cutoff: float | None = None
+    split: SplitOptions | None = None
+    exponents: tuple[float, ...] | None = None
+    offset: bool | None = None
+    sign_speed: float | None = None
+
+    def by_flag(self) -> dict[str, object]:
+        """The choices by the option of the command line that makes them."""
+        return {"--cutoff": self.cutoff, "--split": self.split, "--friction": self.exponents}
+
+
+def _read(value: object, reading: Reading) -> FitChoice:
+    table = TomlTable(value, "fit", KEYS, reading.faults)
+    exponents, offset = None, None
+    if table.has("friction"):
+        exponents, offset = _friction(table, reading.faults)
+    return FitChoice(
+        cutoff=_given(table, "cutoff", SMALLEST_CUTOFF, LARGEST_CUTOFF),
+        split=_split(table) if table.has("held_out") or table.has("blocks") else None,
+        exponents=exponents,
+        offset=offset,
+        sign_speed=_given(table, "sign_speed", SLOWEST, FASTEST),
+    )
+
+
+def _given(table: TomlTable, key: str, low: float, high: float) -> float | None:
+    return table.number(key, low, high) if table.has(key) else None
+
+
+def _split(table: TomlTable) -> SplitOptions:
+    usual = LinearOptions().split
+    share = table.number("held_out", 0.0, LARGEST_HELD_OUT, usual.held_out)
+    return SplitOptions(share, int(table.number("blocks", 0, MOST_BLOCKS, usual.blocks)))
+
+
+def _friction(table: TomlTable, faults: list[str]) -> tuple[tuple[float, ...], bool]:
+    words = table.items("friction")
+    odd = [shown(word) for word in words if not isinstance(word, str)]
+    if odd:
+        faults.append(f"fit: friction: found {listed(odd)}, expected {EXPECTED_FRICTION}")
+        return (), False
+    found = friction_terms_of(words)
+    if isinstance(found, str):
+        faults.append(f"fit: friction: {found}")
+        return (), False
+    return found
+
+
+def friction_terms_of(words: Sequence[str]) -> tuple[tuple[float, ...], bool] | str:
+    """Exponents of the viscous terms, and whether there is an offset, of names of terms; else what is wrong."""
+    exponents, offset = [], False
+    for word in words:
+        exponent = _exponent(word)
+        if word == "offset":
+            offset = True
+        elif exponent is not None:
+            exponents.append(exponent)
+        elif word != "coulomb":
+            return f"found {quoted(word)}, expected {EXPECTED_FRICTION}"
+    if "coulomb" not in words:
+        return "no coulomb, expected it among the terms: it is always fitted"
+    if len(set(words)) < len(words) or len(set(exponents)) < len(exponents):
+        return "a term twice, expected each once"
+    if len(exponents) > MOST_EXPONENTS:
+        return f"{len(exponents)} viscous terms, expected at most {MOST_EXPONENTS}"
+    if exponents and "viscous" not in words:
+        return "viscous^EXPONENT without viscous, expected both"
+    return tuple(sorted(exponents, key=lambda d: (d != 1.0, d))), offset
+
+
+def _exponent(word: str) -> float | None:
+    if word == "viscous":
+        return 1.0
+    head, _, number = word.partition("^")
+    try:
+        value = float(number)
+    except ValueError:
+        return None
+    return value if head == "viscous" and 0.0 < value <= LARGEST_EXPONENT else None
+
+
+def with_choice(options: LinearOptions, choice: FitChoice) -> LinearOptions:
+    """The options with everything that is chosen."""
+    if choice.cutoff is not None:
+        options = replace(options, filter=replace(options.filter, cutoff=choice.cutoff))
+    plain = {
+        name: value
+        for name in ("split", "exponents", "offset", "sign_speed")
+        if (value := getattr(choice, name)) is not None
+    }
+    return replace(options, **plain)
+
+
+FIT: Table[FitChoice] = Table("fit", _read, FitChoice(), with_choice)

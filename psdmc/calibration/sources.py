@@ -1,0 +1,84 @@
+"""What a calibration is made from: a campaign, a log description, or plain logs, some of them for validation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from psdmc.calibration.campaign_file import is_campaign
+from psdmc.calibration.description.description import is_description, read_description
+from psdmc.calibration.description.read_described import described_logs
+from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
+from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.logs.open_log import open_log
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.errors import InputError
+from psdmc.progress import Progress
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogSources:
+    """Logs, and what their description says of the fit.
+
+    linear     options of the linear fit
+    constants  N m/A by joint name, for logs that hold currents; empty: the description says nothing
+    """
+
+    logs: tuple[AnyLog, ...]
+    linear: LinearOptions
+    constants: Mapping[str, float] = field(default_factory=dict)
+
+
+def campaign_of(paths: Sequence[Path]) -> Path | None:
+    """The campaign among the sources; InputError where anything else is given with it."""
+    if not paths:
+        raise InputError("no log to calibrate from", "give a campaign's folder, a log description, or logs")
+    campaigns = [path for path in paths if is_campaign(path) and not is_description(path)]
+    if campaigns and len(paths) > 1:
+        raise InputError(
+            f"{campaigns[0]}: a campaign, given with {len(paths) - 1} other log(s) or campaign(s)",
+            "calibrate from one campaign, or from plain logs",
+        )
+    return campaigns[0] if campaigns else None
+
+
+def log_sources(
+    paths: Sequence[Path],
+    validation: Sequence[Path],
+    joint_names: tuple[str, ...],
+    linear: LinearOptions,
+    choice: FitChoice,
+    progress: Progress,
+) -> LogSources:
+    """Opened logs of a description or of plain files.
+
+    validation  logs that are held out as a whole; the others are then fitted whole, unless `choice` has a split
+    choice      of the command line, which overrides the description's
+
+    Raises InputError where a file cannot be used, or a description is given with other logs.
+    """
+    described = [path for path in paths if is_description(path)]
+    if described and len(paths) + len(validation) > 1:
+        raise InputError(
+            f"{described[0]}: a log description, given with {len(paths) + len(validation) - 1} other log(s)",
+            "name the other logs in it, each as a [[log]]",
+        )
+    if not described:
+        fit = [open_log(path, progress) for path in paths]
+        held = [replace(open_log(path, progress), use="validate") for path in validation]
+        return LogSources((*fit, *held), _options(linear, FitChoice(), choice, bool(held)))
+    description = read_description(described[0], joint_names)
+    logs = described_logs(description, progress)
+    own = description.part(FIT)
+    held_out = any(log.use == "validate" for log in logs)
+    return LogSources(logs, _options(description.options(linear), own, choice, held_out))
+
+
+def _options(linear: LinearOptions, own: FitChoice, choice: FitChoice, held_out: bool) -> LinearOptions:
+    """The fit's options: the command line's before the description's; no split beside logs for validation unless one is
+    asked for."""
+    linear = with_choice(linear, choice)
+    if held_out and own.split is None and choice.split is None:
+        return replace(linear, split=replace(linear.split, held_out=0.0))
+    return linear
