@@ -107,7 +107,11 @@ def _of_calibration(
     names = friction_names(law.exponents, law.offset)
     friction = np.array([[found.friction[joint, name] for name in names] for joint in model.joint_names])
     options = LinearOptions(
-        filter=law.steps["all"].filter, exponents=law.exponents, sign_speed=law.sign_speed, offset=law.offset
+        filter=law.steps["all"].filter,
+        exponents=law.exponents,
+        sign_speed=law.sign_speed,
+        offset=law.offset,
+        coupling=law.coupling,
     )
     return std, options, friction, found.constants or None
 

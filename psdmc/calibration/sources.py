@@ -8,6 +8,7 @@ from pathlib import Path
 
 from psdmc.calibration.campaign_file import is_campaign
 from psdmc.calibration.description.description import is_description, read_description
+from psdmc.calibration.description.efforts import torque_constants
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
 from psdmc.calibration.identify.linear_fit import LinearOptions
@@ -69,10 +70,12 @@ def log_sources(
         held = [replace(open_log(path, progress), use="validate") for path in validation]
         return LogSources((*fit, *held), _options(linear, FitChoice(), choice, bool(held)))
     description = read_description(described[0], joint_names)
-    logs = described_logs(description, progress)
+    logs = described_logs(description, joint_names, progress)
     own = description.part(FIT)
     held_out = any(log.use == "validate" for log in logs)
-    return LogSources(logs, _options(description.options(linear), own, choice, held_out))
+    options = _options(description.options(linear), own, choice, held_out)
+    constants = torque_constants(description, joint_names) if logs[0].quantity == "current" else {}
+    return LogSources(logs, options, constants)
 
 
 def _options(linear: LinearOptions, own: FitChoice, choice: FitChoice, held_out: bool) -> LinearOptions:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -14,24 +16,30 @@ LARGEST_LOGS = 1000
 """As of a campaign's runs."""
 LATEST = 86_400.0
 """s: a log lasts a day at most."""
-KEYS = ("file", "use", "start", "end", "topic")
+MOST_TABLES = 20
+KEYS = ("file", "tables", "use", "start", "end", "topic")
 
 
 @dataclass(frozen=True, slots=True)
 class LogEntry:
     """One `[[log]]`.
 
-    file        relative to the working directory
+    tables      files by name, relative to the working directory; one without a name, or several side by side
     use         fit, or validate: held out as a whole
     start, end  s from the log's first row; rows outside are left out
     topic       of a bag; empty: its only one, or /joint_states
     """
 
-    file: Path
+    tables: Mapping[str, Path]
     use: Use
     start: float
     end: float
     topic: str
+
+    @property
+    def name(self) -> str:
+        """For messages and reports."""
+        return " + ".join(path.name for path in self.tables.values())
 
 
 def _read(value: object, reading: Reading) -> tuple[LogEntry, ...]:
@@ -46,16 +54,33 @@ def _read(value: object, reading: Reading) -> tuple[LogEntry, ...]:
 
 def _entry(value: object, where: str, reading: Reading) -> LogEntry:
     table = TomlTable(value, where, KEYS, reading.faults)
-    start, end = table.number("start", 0.0, LATEST, 0.0), table.number("end", 0.0, LATEST, LATEST)
+    start, end = table.number("start", 0.0, LATEST, 0.0), table.number("end", 0.0, LATEST, math.inf)
     if end <= start:
         reading.faults.append(f"{where}: end: found {end:g}, expected more than its start, {start:g} s")
     return LogEntry(
-        file=reading.folder / table.text("file"),
+        tables=_tables(table, where, reading),
         use=cast(Use, table.word("use", USES, "fit")),
         start=start,
         end=end,
         topic=table.text("topic", ""),
     )
+
+
+def _tables(table: TomlTable, where: str, reading: Reading) -> dict[str, Path]:
+    """Files by the name of their table."""
+    if not table.has("tables"):
+        return {"": reading.folder / table.text("file")}
+    if table.has("file"):
+        reading.faults.append(f"{where}: tables: beside file, expected one or the other")
+    given = table.content["tables"]
+    names = tuple(given) if isinstance(given, dict) else ()
+    if not 0 < len(names) <= MOST_TABLES or any(not name for name in names):
+        reading.faults.append(
+            f"{where}: tables: found {shown(given)}, expected NAME = FILE, 1 to {MOST_TABLES}"
+        )
+        return {}
+    inner = TomlTable(given, f"{where}: tables", names, reading.faults)
+    return {name: reading.folder / inner.text(name) for name in names}
 
 
 LOGS: Table[tuple[LogEntry, ...]] = Table("log", _read, ())

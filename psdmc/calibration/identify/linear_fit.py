@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibration.identify.coupling import Matrix, coupling_of
 from psdmc.calibration.identify.kept_rows import KeptRows
 from psdmc.calibration.identify.least_squares import Estimate, FitOptions, Prior, estimate_rows
 from psdmc.calibration.identify.motor_model import Motors
@@ -38,6 +39,7 @@ class LinearOptions:
     sign_speed  rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
     offset      whether each joint's torque has a constant of its own
     stretch     rows of a log that are filtered at once
+    coupling    C of q_joint = C q_motor where motors drive several joints: friction acts on the motors; empty: none
     held_bytes  of columns that are held in memory; more of them go to a temporary file
     """
 
@@ -48,6 +50,7 @@ class LinearOptions:
     exponents: tuple[float, ...] = (1.0,)
     sign_speed: float = 0.03
     offset: bool = True
+    coupling: Matrix = ()
     stretch: int = STRETCH_ROWS
     held_bytes: int = HELD_BYTES
 
@@ -229,10 +232,11 @@ def _filtered_columns(
     options: LinearOptions,
 ) -> Array:
     smoothed = smoothed_rows(states, at, lambda rows: model.regressor(*(part[rows] for part in motion)))
-    terms = friction_terms(motion[1], options.sign_speed, options.exponents, options.offset)
+    coupling = coupling_of(options.coupling)
+    speed = motion[1] if coupling is None else coupling.to_motors(motion[1])
+    terms = friction_terms(speed, options.sign_speed, options.exponents, options.offset)
     rubbed = np.stack([states.low_pass(term)[at] for term in terms], axis=-1)
     n, f = rubbed.shape[1:]
-    spread = np.zeros((len(at), n, n * f))
-    for k in range(n):
-        spread[:, k, k * f : (k + 1) * f] = rubbed[:, k]
+    onto_joints = np.eye(n) if coupling is None else coupling.inverse
+    spread = np.einsum("tkf,kj->tjkf", rubbed, onto_joints).reshape(len(at), n, n * f)
     return np.concatenate([smoothed, spread], axis=2)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from psdmc.calibration.identify.coupling import Matrix
 from psdmc.calibration.identify.steps import StepOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.low_pass import FilterOptions
@@ -32,6 +33,7 @@ class Prediction:
     steps       filter and split by step: "all" of one log, else motor, gravity, friction, inertial
     sign_speed  rad/s over which Coulomb friction changes sign, linear law
     exponents   of the viscous terms, linear law;  offset  whether each joint has one
+    coupling    C of q_joint = C q_motor, linear law: friction is of motors; empty: of joints
     runs        constants of the friction runs by joint, LuGre
     """
 
@@ -41,6 +43,7 @@ class Prediction:
     exponents: tuple[float, ...] = ()
     offset: bool = False
     runs: Mapping[str, FrictionRunConstants] = field(default_factory=dict)
+    coupling: Matrix = ()
 
     def as_json(self) -> dict[str, Any]:
         """Plain values, which read back the same."""
@@ -54,7 +57,7 @@ class Prediction:
             "exponents": list(self.exponents),
             "offset": self.offset,
             "runs": {joint: asdict(constants) for joint, constants in self.runs.items()},
-        }
+        } | ({"coupling": [list(row) for row in self.coupling]} if self.coupling else {})
 
 
 def prediction_from_json(kept: Mapping[str, Any]) -> Prediction:
@@ -64,4 +67,7 @@ def prediction_from_json(kept: Mapping[str, Any]) -> Prediction:
         for name, step in kept["steps"].items()
     }
     runs = {joint: FrictionRunConstants(**constants) for joint, constants in kept["runs"].items()}
-    return Prediction(kept["law"], steps, kept["sign_speed"], tuple(kept["exponents"]), kept["offset"], runs)
+    coupling = tuple(tuple(map(float, row)) for row in kept.get("coupling", ()))
+    return Prediction(
+        kept["law"], steps, kept["sign_speed"], tuple(kept["exponents"]), kept["offset"], runs, coupling
+    )

@@ -29,11 +29,11 @@ def columns_from_npz(file: BinaryIO, name: str) -> dict[str, Array]:
         require_unpacked(sum(member.file_size for member in members), _size(file), name)
         names = [member.filename.removesuffix(".npy") for member in members]
         require_names(names, name)
-        stored = [_array(archive.read(member)) for member in members]
+        stored = [array_of(archive.read(member)) for member in members]
         return {column: _column(values, column, name) for column, values in zip(names, stored, strict=True)}
 
 
-def _array(content: bytes) -> Any:
+def array_of(content: bytes) -> Any:
     """A member's array; ValueError where its header names more numbers than follow, for which NumPy would allocate
     memory."""
     stream = io.BytesIO(content)
@@ -78,7 +78,7 @@ def write_npz(columns: Mapping[str, Array], path: Path) -> None:
 
 def open_parquet(file: BinaryIO, name: str) -> tuple[Any, list[str]]:
     """pyarrow's file and its column names; InputError where columns hold anything but numbers."""
-    parquet = _parquet()
+    parquet = parquet_module()
     with decoding(name, "a Parquet file"):
         stored = parquet.ParquetFile(file, pre_buffer=False)
         fields = list(stored.schema_arrow)
@@ -104,7 +104,7 @@ def columns_from_parquet(file: BinaryIO, name: str) -> dict[str, Array]:
 
 def parquet_names(file: BinaryIO, name: str) -> tuple[str, ...]:
     """The columns' names."""
-    parquet = _parquet()
+    parquet = parquet_module()
     with decoding(name, "a Parquet file"):
         return tuple(parquet.ParquetFile(file).schema_arrow.names)
 
@@ -123,10 +123,10 @@ def write_parquet(columns: Mapping[str, Array], path: Path) -> None:
     """Write named columns as a Parquet file."""
     import pyarrow
 
-    _parquet().write_table(pyarrow.table(dict(columns)), path)
+    parquet_module().write_table(pyarrow.table(dict(columns)), path)
 
 
-def _parquet() -> Any:
+def parquet_module() -> Any:
     try:
         import pyarrow.parquet
     except ImportError as error:

@@ -30,7 +30,7 @@ _OTHER_MARKS = (
 
 def columns_from_csv(data: bytes, name: str) -> dict[str, Array]:
     """Named columns of a CSV file's bytes; InputError says which line and column is no number."""
-    first, header, body = _header_and_body(_text(data, name), name)
+    first, header, body = _header_and_body(plain_text(data, name), name)
     separator = _separator(header)
     with decoding(f"{name}: line {first}", "a header"):
         names = _cells(header, separator)
@@ -59,7 +59,7 @@ class CsvReader:
     def header(self, line: bytes) -> list[str]:
         """The column names of the next line; none where it is empty."""
         self._line += 1
-        text = _text(line, self.name).strip("\n")
+        text = plain_text(line, self.name).strip("\n")
         if not text.strip():
             return []
         self._separator = _separator(text)
@@ -76,7 +76,7 @@ class CsvReader:
 
     def rows(self, lines: bytes) -> Array:
         """(rows, columns) of whole lines."""
-        body = _text(lines, self.name, self._line)
+        body = plain_text(lines, self.name, self._line)
         first, self._line = self._line + 1, self._line + body.count("\n")
         if not body.strip():
             return np.zeros((0, len(self._names)))
@@ -99,12 +99,12 @@ class CsvReader:
 
 def header_names(line: bytes, name: str) -> tuple[str, ...]:
     """The column names of a CSV file's first line."""
-    _, header, _ = _header_and_body(_text(line, name), name)
+    _, header, _ = _header_and_body(plain_text(line, name), name)
     with decoding(name, "a header"):
         return tuple(_cells(header, _separator(header)))
 
 
-def _text(data: bytes, name: str, before: int = 0) -> str:
+def plain_text(data: bytes, name: str, before: int = 0) -> str:
     """Bytes as text with plain line ends; `before` lines came before them."""
     for mark, encoding in _OTHER_MARKS:
         if data.startswith(mark):
@@ -156,7 +156,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 def _require_header(names: Sequence[str], name: str) -> None:
     expected = f"expected a first line such as {TIME},position_rad.<joint>,motor_torque_nm.<joint>"
-    if all(_is_number(cell) for cell in names):
+    if all(is_number(cell) for cell in names):
         raise InputError(f"{name}: no header: its first line holds numbers", expected)
     nameless = [k for k, cell in enumerate(names, start=1) if not cell]
     if nameless:
@@ -199,20 +199,21 @@ def _first_fault(body: str, names: Sequence[str], separator: str, first: int, na
                 "each line has one cell per column",
             )
         for column, cell in zip(names, cells, strict=True):
-            if not _is_number(cell):
+            if not is_number(cell):
                 return _no_number(name, number, column, cell)
     return InputError(f"{name}: not a table of numbers", "export it as plain numbers separated by commas")
 
 
 def _no_number(name: str, line: int, column: str, cell: str) -> InputError:
     what = f"{quoted(cell)} is no number" if cell else "the cell is empty"
-    decimal = _is_number(cell.replace(",", ".", 1))
+    decimal = is_number(cell.replace(",", ".", 1))
     comma = "decimal commas are read where ';' or tab separates the columns"
     hint = comma if decimal else "below the header each cell is a number"
     return InputError(f"{name}: line {line}, column {quoted(column)}: {what}", hint)
 
 
-def _is_number(cell: str) -> bool:
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number as psdmc reads one: ASCII, without underscores."""
     if not cell.isascii() or "_" in cell:
         return False
     try:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from psdmc.calibration.identify.coupling import coupling_of
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.friction import FrictionResult, judge_friction, prepared_runs
 from psdmc.calibration.identify.friction_fit import JointFriction
@@ -131,10 +132,13 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
     q, qd, qdd = states.q[rows], states.qd[rows], states.qdd[rows]
     rigid = recursive.torques(found.model.mechanism, found.model.standard_parameters(), [q, qd, qdd])
     law = found.prediction
-    terms = friction_terms(qd, law.sign_speed, law.exponents, law.offset)
+    coupling = coupling_of(law.coupling)
+    speed = qd if coupling is None else coupling.to_motors(qd)
+    terms = friction_terms(speed, law.sign_speed, law.exponents, law.offset)
     names = friction_names(law.exponents, law.offset)
     for name, term in zip(names, terms, strict=True):
-        rigid = rigid + term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
+        torque = term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
+        rigid = rigid + (torque if coupling is None else coupling.torque_of_joints(torque))
     return rigid
 
 

@@ -242,7 +242,12 @@ def linear_record(
             warnings=(*found.warnings, *visibility_warnings("linear fit", problem.names, seen)),
             facts=facts,
             prediction=Prediction(
-                "linear", {"all": step}, options.sign_speed, options.exponents, options.offset
+                "linear",
+                {"all": step},
+                options.sign_speed,
+                options.exponents,
+                options.offset,
+                coupling=options.coupling,
             ),
             notes=weak_notes("linear fit", problem.names, seen),
         ),

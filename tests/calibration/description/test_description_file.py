@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -38,8 +39,8 @@ def test_a_whole_description(tmp_path: Path):
     found = read_description(written(tmp_path, WHOLE))
 
     assert found.part(LOGS) == (
-        LogEntry(tmp_path / "one.csv", "fit", 1.5, 60.0, ""),
-        LogEntry(tmp_path / "two.csv", "validate", 0.0, 86_400.0, ""),
+        LogEntry({"": tmp_path / "one.csv"}, "fit", 1.5, 60.0, ""),
+        LogEntry({"": tmp_path / "two.csv"}, "validate", 0.0, math.inf, ""),
     )
     assert found.part(FIT) == FitChoice(5.0, SplitOptions(0.2, 0), (1.0, 2.0), True)
     options = found.options(LinearOptions())
@@ -50,7 +51,7 @@ FAULTS = {
     "[fit]\ncutoff = 5": "no [[log]], expected one for each recording",
     "log = 3": "log: found 3, expected 1 to 1000 tables [[log]]",
     "[[log]]": "log 1: file: missing, expected a text of at most 300 characters",
-    '[[log]]\nfile = "a.csv"\nfil = 3': "log 1: unknown key(s) 'fil', known are file, use, start, end, topic",
+    '[[log]]\nfile = "a.csv"\nfil = 3': "log 1: unknown key(s) 'fil', known are file, tables, use, start, end, topic",
     '[[log]]\nfile = "a.csv"\nuse = "test"': "log 1: use: found 'test', expected one of fit, validate",
     '[[log]]\nfile = "a.csv"\nuse = "validate"': "log: every one is for validation, expected one for fitting",
     '[[log]]\nfile = "a.csv"\nstart = 3\nend = 2': "log 1: end: found 2, expected more than its start, 3 s",

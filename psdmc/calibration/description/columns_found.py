@@ -1,0 +1,198 @@
+"""Which column of a file is which joint's quantity, and the numbers that make SI units of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from psdmc.calibration.description.description import LogDescription
+from psdmc.calibration.description.table_joints import JOINTS, JointEntry
+from psdmc.calibration.description.table_quantities import EFFORT, POSITION, VELOCITY, Entry, refused
+from psdmc.calibration.description.units import TICKS, UNITS, Kind
+from psdmc.calibration.logs.log import Quantity
+from psdmc.calibration.logs.some_columns import Columns
+from psdmc.calibration.logs.wording import listed, quoted
+
+What = Literal["position", "velocity", "effort"]
+
+USUAL: Mapping[What, Mapping[str, tuple[str, Quantity]]] = {
+    "position": {
+        "position_rad": ("rad", "motor_torque"),
+        "position_m": ("m", "motor_torque"),
+        "position": ("", "motor_torque"),
+    },
+    "velocity": {
+        "velocity_rad_s": ("rad/s", "motor_torque"),
+        "velocity_m_s": ("m/s", "motor_torque"),
+        "velocity": ("", "motor_torque"),
+    },
+    "effort": {
+        "current_a": ("A", "current"),
+        "motor_torque_nm": ("Nm", "motor_torque"),
+        "motor_torque_n": ("N", "motor_torque"),
+        "joint_torque_nm": ("Nm", "joint_torque"),
+        "joint_torque_n": ("N", "joint_torque"),
+        "effort_nm": ("Nm", "motor_torque"),
+        "effort_n": ("N", "motor_torque"),
+        "effort": ("", "motor_torque"),
+    },
+}
+"""Columns that need no naming, PREFIX.<joint>: their units (none: SI), and for effort what they hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A column: SI value = factor * (number - zero).
+
+    table, place  of the column: name of the table, and place from 0
+    kind          what its unit says
+    entry         what was said of it
+    """
+
+    table: str
+    place: int
+    factor: float
+    zero: float
+    kind: Kind
+    delay: float
+    quantity: Quantity
+    entry: Entry
+
+
+@dataclass(frozen=True, slots=True)
+class JointColumns:
+    """Columns of a joint; velocity is None where the log has none."""
+
+    name: str
+    position: Found
+    velocity: Found | None
+    effort: Found
+
+
+def joint_columns(
+    description: LogDescription, joint_names: Sequence[str], tables: Mapping[str, Columns]
+) -> tuple[JointColumns, ...]:
+    """The columns of every joint of the model, in its order; InputError where one is missing or ambiguous."""
+    said = {joint.name: joint for joint in description.part(JOINTS)}
+    found = []
+    for name in joint_names:
+        own = said.get(name, JointEntry(name, name, Entry(), Entry(), Entry()))
+        position = _found(own, "position", own.position.over(description.part(POSITION)), tables)
+        effort = _found(own, "effort", own.effort.over(description.part(EFFORT)), tables)
+        velocity = _found(own, "velocity", own.velocity.over(description.part(VELOCITY)), tables)
+        if position is None or effort is None:
+            raise _missing(own, "position" if position is None else "effort", tables)
+        found.append(JointColumns(name, position, velocity, effort))
+    return tuple(found)
+
+
+def _found(joint: JointEntry, what: What, entry: Entry, tables: Mapping[str, Columns]) -> Found | None:
+    where = f"joint {quoted(joint.name)}: {what}"
+    unit, quantity = entry.unit or "", entry.quantity or "motor_torque"
+    if entry.column is not None:
+        table, place = place_of(entry.column, entry.table, tables, where)
+    else:
+        usual = _usual(joint, what, tables)
+        if usual is None:
+            return None
+        table, place, implied, held = usual
+        unit, quantity = unit or implied, entry.quantity or held
+    return _converted(where, what, replace_unit(entry, unit), (table, place), quantity)
+
+
+def replace_unit(entry: Entry, unit: str) -> Entry:
+    """The entry with this unit; without one where it is empty."""
+    return Entry(unit=unit or None).over(entry)
+
+
+def _converted(where: str, what: What, entry: Entry, at: tuple[str, int], quantity: Quantity) -> Found:
+    kind: Kind = "any"
+    size = 1.0
+    if entry.unit is not None:
+        unit = UNITS[what][entry.unit]
+        size, kind = unit.size, unit.kind
+    if entry.unit in TICKS:
+        if entry.ticks_per_rev is None:
+            raise refused(f"{where}: unit {quoted(entry.unit or '')} without ticks_per_rev")
+        size /= entry.ticks_per_rev
+    elif entry.ticks_per_rev is not None:
+        raise refused(f"{where}: ticks_per_rev, but its unit is {entry.unit or 'SI'}, expected ticks")
+    factor = (entry.sign or 1.0) * (1.0 if entry.scale is None else entry.scale) * size
+    gear = entry.gear_ratio or 1.0
+    if kind == "current":
+        quantity = "current"
+    elif what == "effort":
+        if entry.torque_constant is not None:
+            raise refused(f"{where}: torque_constant, but its unit is {entry.unit or 'SI'}, expected A or mA")
+        factor *= gear
+    else:
+        factor /= gear
+    return Found(at[0], at[1], factor, entry.offset or 0.0, kind, entry.delay or 0.0, quantity, entry)
+
+
+def _usual(
+    joint: JointEntry, what: What, tables: Mapping[str, Columns]
+) -> tuple[str, int, str, Quantity] | None:
+    """Table, place, unit and quantity of the one column that is called PREFIX.<joint>."""
+    hits = [
+        (table, columns.names.index(f"{prefix}.{joint.logged_as}"), unit, quantity, prefix)
+        for table, columns in tables.items()
+        for prefix, (unit, quantity) in USUAL[what].items()
+        if f"{prefix}.{joint.logged_as}" in columns.names
+    ]
+    if len(hits) > 1:
+        both = listed([quoted(f"{hit[4]}.{joint.logged_as}") for hit in hits])
+        raise refused(
+            f"joint {quoted(joint.name)}: {what}: columns {both}, expected one, or its name in [[joint]]"
+        )
+    return hits[0][:4] if hits else None
+
+
+def place_of(
+    column: str | int, table: str | None, tables: Mapping[str, Columns], where: str
+) -> tuple[str, int]:
+    """Table and place (from 0) of a column by its name or number."""
+    if table is not None and table not in tables:
+        raise refused(
+            f"{where}: table {quoted(table)}, expected one of {listed([quoted(t) for t in tables])}"
+        )
+    among = {table: tables[table]} if table is not None else tables
+    if isinstance(column, int):
+        if len(among) > 1:
+            raise refused(f"{where}: column {column} of a log with several tables, expected its table, too")
+        name, columns = next(iter(among.items()))
+        if column > columns.width:
+            raise refused(f"{where}: column {column}, but {columns.name} has {columns.width}")
+        return name, column - 1
+    hits = [
+        (name, place)
+        for name, columns in among.items()
+        for place, found in enumerate(columns.names)
+        if found == column
+    ]
+    if len(hits) != 1:
+        raise _no_column(column, len(hits), among, where)
+    return hits[0]
+
+
+def _no_column(column: str, count: int, among: Mapping[str, Columns], where: str) -> Exception:
+    files = " and ".join(columns.name for columns in among.values())
+    names = [quoted(name) for columns in among.values() for name in columns.names]
+    if count:
+        return refused(
+            f"{where}: column {quoted(column)} stands {count} times in {files}, expected its number"
+        )
+    has = f"which has {listed(names)}" if names else "which has no header: expected its number"
+    return refused(f"{where}: no column {quoted(column)} in {files}, {has}")
+
+
+def _missing(joint: JointEntry, what: What, tables: Mapping[str, Columns]) -> Exception:
+    files = " and ".join(columns.name for columns in tables.values())
+    names = listed([quoted(name) for columns in tables.values() for name in columns.names])
+    usual = f"{next(iter(USUAL[what]))}.{joint.logged_as}"
+    has = f"it has {names}" if names else "it has no header"
+    return refused(
+        f"{files}: joint {quoted(joint.name)}: no column for its {what}, expected "
+        f"{quoted(usual)}, or one named in [[joint]]; {has}"
+    )
