@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from psdmc.calibration.identify.coupling import Coupling
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
@@ -38,9 +39,10 @@ class Evidence:
     model       as it was before it was calibrated: its theta_b is the file's, or None
     regressor   of the model
     q, qd, qdd  (N, n)
-    sign        (N, n)  smooth sign of the speed, filtered like the torque: Coulomb friction's column
+    sign        (N, n)  smooth sign of the motors' speed, filtered like the torque: Coulomb friction's column
     torque      (N, n)  of the motors, N m (N), filtered, without what the tool weighs
     noise       (n,)    RMS of the sensor noise that passes the filter, from what lies above its cut-off
+    coupling    of the motors that drive several joints together; None: motor k drives joint k
     """
 
     model: DynamicsModel
@@ -51,6 +53,7 @@ class Evidence:
     sign: Array
     torque: Array
     noise: Array
+    coupling: Coupling | None = None
 
     def __len__(self) -> int:
         return len(self.q)
@@ -80,7 +83,37 @@ class Evidence:
         """The samples as if joint k's position were `signs[k]` times column `order[k]` of the log."""
         columns = list(order)
         moved = {name: signs * getattr(self, name)[:, columns] for name in ("q", "qd", "qdd", "sign")}
+        if self.coupling is not None:
+            moved["sign"] = np.tanh(self.coupling.to_motors(moved["qd"]) / SIGN_SPEED)
         return replace(self, **moved)
+
+    def of_motors(self) -> Evidence:
+        """The same samples by motors: their torques, speeds, accelerations and columns; positions stay the joints'."""
+        return self if self.coupling is None else _of_motors(self, self.coupling)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _MotorEvidence(Evidence):
+    """Samples by motors; `whole` holds those of the joints."""
+
+    whole: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+
+    def columns(self) -> Array:
+        return self.whole
+
+
+def _of_motors(joints: Evidence, coupling: Coupling) -> Evidence:
+    return _MotorEvidence(
+        joints.model,
+        joints.regressor,
+        joints.q,
+        coupling.to_motors(joints.qd),
+        coupling.to_motors(joints.qdd),
+        joints.sign,
+        coupling.torque_of_motors(joints.torque),
+        joints.noise,
+        whole=np.einsum("tjl,jk->tkl", joints.columns(), coupling.matrix),
+    )
 
 
 def evidence_of(
@@ -89,16 +122,17 @@ def evidence_of(
     motions: Sequence[Motion],
     motors: Motors,
     options: FilterOptions,
+    coupling: Coupling | None = None,
 ) -> Evidence:
     """Samples of all motions, one after the other; InputError where a log cannot be used."""
-    parts = [_samples(model, motion, motors, options) for motion in motions]
+    parts = [_samples(model, motion, motors, options, coupling) for motion in motions]
     q, qd, qdd, sign, torque = (np.concatenate(x) for x in zip(*(part[:5] for part in parts), strict=True))
     noise = np.sqrt(np.mean([part[5] ** 2 for part in parts], axis=0))
-    return Evidence(model, regressor, q, qd, qdd, sign, torque, noise).thinned(MOST_ROWS)
+    return Evidence(model, regressor, q, qd, qdd, sign, torque, noise, coupling).thinned(MOST_ROWS)
 
 
 def _samples(
-    model: DynamicsModel, motion: Motion, motors: Motors, options: FilterOptions
+    model: DynamicsModel, motion: Motion, motors: Motors, options: FilterOptions, coupling: Coupling | None
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
     """For one motion: q, qd, qdd, sign and torque of its samples, and the RMS noise that passes the filter if noise has
     the same density below the cut-off as above."""
@@ -106,7 +140,8 @@ def _samples(
     parts, above, count = [], np.zeros(model.n), 0
     for stretch in stretches(log, options):
         states, at = stretch.states, stretch.at
-        sign = states.low_pass(np.tanh(states.qd / SIGN_SPEED))
+        speed = states.qd if coupling is None else coupling.to_motors(states.qd)
+        sign = states.low_pass(np.tanh(speed / SIGN_SPEED))
         torque = motors.torque(states.effort)[at]
         if motion.tool is not None:
             torque = torque - payload_torque(model.mechanism, states.q[at], motion.tool.mass, motion.tool.com)

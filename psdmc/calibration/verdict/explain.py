@@ -23,6 +23,7 @@ class Explainer:
     """explain(k, torque) -> share of a column's variation that joint k explains as it is, and turned: each 0 to 1."""
 
     def __init__(self, evidence: Evidence) -> None:
+        evidence = evidence.of_motors()
         columns = evidence.columns()
         theta_b = evidence.model.theta_b
         self._joints: list[_ByFile | _ByFit] = [

@@ -43,7 +43,9 @@ class Power:
 
 
 def joint_gains(evidence: Evidence) -> tuple[Gain, ...]:
-    """Per joint: measured torque regressed on the file's, beside friction and the drive inertia that the file omits."""
+    """Per joint (of its motor where motors are coupled): measured torque regressed on the file's, beside friction and the
+    drive inertia that the file omits."""
+    evidence = evidence.of_motors()
     by_file = evidence.file_torque()
     if by_file is None:
         return tuple(Gain(np.nan, np.nan, False) for _ in range(evidence.n))
@@ -104,7 +106,9 @@ def _gain(line: _Line, scale: float) -> Gain:
 
 
 def friction_powers(evidence: Evidence) -> tuple[Power, ...]:
-    """Per joint: power of Coulomb and viscous friction, every base parameter of the joint free."""
+    """Per joint (of its motor where motors are coupled): power of Coulomb and viscous friction, every base parameter of
+    the joint free."""
+    evidence = evidence.of_motors()
     columns = evidence.columns()
     return tuple(_power(evidence, columns[:, k], k) for k in range(evidence.n))
 

@@ -109,7 +109,8 @@ def _searched(evidence: Evidence, stated: Hypothesis, rounds: int) -> list[Hypot
 def _stated(evidence: Evidence) -> Hypothesis:
     """The hypothesis that the log is right."""
     explain = Explainer(evidence)
-    score = sum(explain(k, evidence.torque[:, k])[0] for k in range(evidence.n))
+    torque = evidence.of_motors().torque
+    score = sum(explain(k, torque[:, k])[0] for k in range(evidence.n))
     here = tuple(range(evidence.n))
     return Hypothesis((1,) * evidence.n, here, (1,) * evidence.n, here, score)
 
@@ -132,7 +133,8 @@ def _assigned(
     nothing."""
     n = evidence.n
     explain = Explainer(evidence.turned(np.array(signs, dtype=np.float64), order))
-    shares = np.array([[explain(k, evidence.torque[:, i]) for i in range(n)] for k in range(n)])
+    torque = evidence.of_motors().torque
+    shares = np.array([[explain(k, torque[:, i]) for i in range(n)] for k in range(n)])
     stays = np.eye(n, dtype=bool) | (np.array(order)[:, None] == np.arange(n))
     moving = np.where(stays, 0.0, 0.5 * PRICE)
     turning = (np.array([0.0, PRICE]), np.zeros(2), np.array([np.inf, 0.0]))

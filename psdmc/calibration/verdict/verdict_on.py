@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from psdmc.calibration.identify.coupling import coupling_of
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
@@ -30,7 +31,9 @@ def with_verdict_on_logs(
 
     model   as it was given, whose theta_b is the file's; record holds the calibrated one
     """
-    evidence = evidence_of(model, regressor, [Motion(log) for log in logs], motors, options)
+    matrix = () if record.prediction is None else record.prediction.coupling
+    motions = [Motion(log) for log in logs]
+    evidence = evidence_of(model, regressor, motions, motors, options, coupling_of(matrix))
     demand = Demand("linear fit", _fitted(record, "All"), record.facts["rank"])
     return with_verdict(record, judge(record, evidence, [demand], limits))
 
