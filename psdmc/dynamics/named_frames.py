@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from psdmc.dynamics.following import matrices_summed, on_coordinates
 from psdmc.dynamics.frames import Frame, as_matrix, as_vector
@@ -70,30 +70,44 @@ def frame_velocity_slopes(
     qd: Sequence[Scalar],
     root: Root = AT_BASE,
 ) -> list[list[list[Scalar]]]:
-    """6 x n per named frame: derivatives of its velocity J qd (linear, then angular) by q, along the base's axes, of robots
-    whose joints have one coordinate each.
+    """6 x nv per named frame: derivatives of its velocity J qd (linear, then angular) by q, along its tangent, and along the
+    base's axes.
 
-    Joint j moves what it carries along the twist (v, z) of its column. With w the angular velocity of the link before
-    it, and (u, s) the part of the frame's velocity that joints from j on contribute, the frame's velocity changes by (w
-    x v + z x u, z x s): that part is turned, and the frame's origin moves in the velocity field of the link before.
+    Joint j moves what it carries along the twists (v, z) of its columns, one for each of its rates. With w the angular
+    velocity of the link before it, and (u, s) the part of the frame's velocity that joints from j on contribute, the
+    frame's velocity changes by (w x v + z x u, z x s): that part, j's own rates in it, is turned, and the frame's origin
+    moves in the velocity field of the link before.
     """
-    found = []
+    first, found = first_rates(frames), []
     for each, rows in zip(named, frame_jacobians(frames, named, q, root), strict=True):
-        columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * len(frames)
+        columns: list[tuple[Scalar, ...]] = [(0.0,) * 6] * first[-1]
         path = path_to(frames, each.joint)
+        own = {j: range(first[j], first[j] + frames[j].joint.nv) for j in path}
         twists = {
-            j: ((rows[0][j], rows[1][j], rows[2][j]), (rows[3][j], rows[4][j], rows[5][j])) for j in path
+            k: ((rows[0][k], rows[1][k], rows[2][k]), (rows[3][k], rows[4][k], rows[5][k]))
+            for j in path
+            for k in own[j]
         }
-        turning = [scale(twists[j][1], qd[j]) for j in path]
+        turning = [_sum(scale(twists[k][1], qd[k]) for k in own[j]) for j in path]
         before = dict(zip(path, _running(turning), strict=True))
         linear, angular = ZERO, ZERO
         for j in reversed(path):
-            along, about = twists[j]
-            linear, angular = add(linear, scale(along, qd[j])), add(angular, scale(about, qd[j]))
-            moved = add(cross(before[j], along), cross(about, linear))
-            columns[j] = (*moved, *cross(about, angular))
-        found.append([[column_j[row] for column_j in columns] for row in range(6)])
+            for k in own[j]:
+                along, about = twists[k]
+                linear, angular = add(linear, scale(along, qd[k])), add(angular, scale(about, qd[k]))
+            for k in own[j]:
+                along, about = twists[k]
+                moved = add(cross(before[j], along), cross(about, linear))
+                columns[k] = (*moved, *cross(about, angular))
+        found.append([[column[row] for column in columns] for row in range(6)])
     return found
+
+
+def _sum(parts: Iterable[Vector]) -> Vector:
+    first, *others = parts
+    for other in others:
+        first = add(first, other)
+    return first
 
 
 def _running(parts: Sequence[Vector]) -> list[Vector]:

@@ -61,5 +61,4 @@ RECIPE = Recipe(
     "getFrameVelocityDerivatives",
     pinocchio,
     beside="frame_jacobian",
-    of_axes=True,
 )

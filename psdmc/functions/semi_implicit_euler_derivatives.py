@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from psdmc.dynamics.manifold import integrated
+from psdmc.dynamics.tangent_steps import step_slopes
 from psdmc.functions import forward_dynamics_derivatives, semi_implicit_euler
 from psdmc.program.signature import Signature
 from psdmc.recipes.on_arrays import RobotOnArrays
@@ -15,6 +17,7 @@ from psdmc.recipes.steps import (
     B,
     semi_implicit,
     semi_implicit_on_arrays,
+    slopes_on_arrays,
     step_on_arrays,
     stepped,
 )
@@ -31,9 +34,10 @@ def trace(g: Ingredients) -> Outputs:
     (dt,) = g.inputs[DT.name]
     found = forward_dynamics_derivatives.multiplied(g)
     rates = stepped(g.inputs["qd"], found["qdd"], dt)
-    by_state, by_torque = semi_implicit(found["dqdd_dq"], found["dqdd_dqd"], found["dqdd_dtau"], dt)
+    blocks = (found["dqdd_dq"], found["dqdd_dqd"], found["dqdd_dtau"])
+    by_state, by_torque = semi_implicit(*blocks, dt, step_slopes(g.frames, rates, dt))
     return {
-        "q_next": stepped(g.inputs["q"], rates, dt),
+        "q_next": integrated(g.frames, g.inputs["q"], [dt * rate for rate in rates]),
         "qd_next": rates,
         "A": by_state,
         "B": by_torque,
@@ -42,16 +46,20 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    return STEP.reference(robot, given) | _jacobians(ACCELERATIONS.reference(robot, given), given)
+    found = STEP.reference(robot, given)
+    slopes = slopes_on_arrays(robot.frames, step_on_arrays(given) * found["qd_next"])
+    return found | _jacobians(ACCELERATIONS.reference(robot, given), given, slopes)
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    return STEP.pinocchio(robot, given) | _jacobians(ACCELERATIONS.pinocchio(robot, given), given)
+    found = STEP.pinocchio(robot, given)
+    slopes = robot.integrated_slopes(given["q"], step_on_arrays(given) * found["qd_next"])
+    return found | _jacobians(ACCELERATIONS.pinocchio(robot, given), given, slopes)
 
 
-def _jacobians(found: Arrays, given: Mapping[str, Array]) -> Arrays:
-    by_q, by_qd, by_tau = (found[name] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))
-    by_state, by_torque = semi_implicit_on_arrays(by_q, by_qd, by_tau, step_on_arrays(given))
+def _jacobians(found: Arrays, given: Mapping[str, Array], slopes: tuple[Array, Array]) -> Arrays:
+    blocks = (found[name] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))
+    by_state, by_torque = semi_implicit_on_arrays(*blocks, step_on_arrays(given), *slopes)
     return {"A": by_state, "B": by_torque}
 
 
@@ -68,8 +76,7 @@ RECIPE = Recipe(
     "Jacobians of a step of semi-implicit Euler",
     trace,
     reference,
-    "aba, computeABADerivatives",
+    "aba, computeABADerivatives, dIntegrate",
     pinocchio,
     shares="inverse_dynamics",
-    of_axes=True,
 )

@@ -27,8 +27,8 @@ class Sizes:
 
     @property
     def nx(self) -> int:
-        """Length of the state (q, qd)."""
-        return self.nq + self.nv
+        """Length of a small motion of the state (q, qd), along the tangent of q."""
+        return 2 * self.nv
 
     @staticmethod
     def of_chain(n: int, l: int, frames: int = 1) -> Sizes:

@@ -10,8 +10,11 @@ import numpy as np
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import integrated
 from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.slices import first_rates
+from psdmc.dynamics.solve import inner_product
+from psdmc.dynamics.tangent_steps import StepSlopes, step_slopes
 from psdmc.program.signature import Quantity
-from psdmc.recipes.on_arrays import columns
+from psdmc.recipes.on_arrays import columns, matrix
 from psdmc.robot.mechanism import Array
 
 DT = Quantity("dt", (), 0.01)
@@ -39,29 +42,72 @@ def step_on_arrays(given: Mapping[str, Array]) -> Array:
     return np.reshape(given[DT.name], (-1, 1))
 
 
-def semi_implicit(by_q: Rows, by_qd: Rows, by_tau: Rows, dt: Scalar) -> tuple[list[Any], list[Any]]:
-    """A and B of semi-implicit Euler from the derivatives of accelerations, n x n each.
+def semi_implicit(
+    by_q: Rows, by_qd: Rows, by_tau: Rows, dt: Scalar, slopes: Sequence[StepSlopes | None]
+) -> tuple[list[Any], list[Any]]:
+    """A and B of semi-implicit Euler from the derivatives of accelerations, nv x nv each, along the tangents at both ends.
 
-    d qd_next = d qd + dt d qdd and d q_next = d q + dt d qd_next.
+    d qd_next = d qd + dt d qdd and, where q is a vector, d q_next = d q + dt d qd_next; `slopes` have what takes the place
+    of the ones of joints of several rates.
     """
     rates = [
         [dt * x for x in row] + _plus_one(i, [dt * x for x in own])
         for i, (row, own) in enumerate(zip(by_q, by_qd, strict=True))
     ]
-    positions = [_plus_one(i, [dt * x for x in row]) for i, row in enumerate(rates)]
+    positions = _turned(_moved(rates, dt, slopes), slopes)
     pushed = [[dt * x for x in row] for row in by_tau]
-    return positions + rates, [[dt * x for x in row] for row in pushed] + pushed
+    return positions + rates, _moved(pushed, dt, slopes) + pushed
+
+
+def _moved(rows: Rows, dt: Scalar, slopes: Sequence[StepSlopes | None]) -> list[list[Scalar]]:
+    """What rates' rows, times dt, move the end of the step by."""
+    found: list[list[Scalar]] = []
+    for own in slopes:
+        block = [[dt * x for x in row] for row in rows[len(found) :][: 1 if own is None else len(own.by_way)]]
+        found += (
+            block
+            if own is None
+            else [[inner_product(w, x) for x in zip(*block, strict=True)] for w in own.by_way]
+        )
+    return found
+
+
+def _turned(rows: list[list[Scalar]], slopes: Sequence[StepSlopes | None]) -> list[list[Scalar]]:
+    """The rows, and what the start of the step moves its end by."""
+    found: list[list[Scalar]] = []
+    for own in slopes:
+        first = len(found)
+        for row in ((1.0,),) if own is None else own.by_start:
+            moved = list(rows[len(found)])
+            moved[first : first + len(row)] = [x + y for x, y in zip(moved[first:], row, strict=False)]
+            found.append(moved)
+    return found
 
 
 def _plus_one(i: int, row: list[Scalar]) -> list[Scalar]:
     return [x + 1.0 if j == i else x for j, x in enumerate(row)]
 
 
-def semi_implicit_on_arrays(by_q: Array, by_qd: Array, by_tau: Array, dt: Array) -> tuple[Array, Array]:
-    """(k, 2 n, 2 n) and (k, 2 n, n): `semi_implicit` on arrays, as matrices of the two half steps."""
+def semi_implicit_on_arrays(
+    by_q: Array, by_qd: Array, by_tau: Array, dt: Array, by_start: Array, by_way: Array
+) -> tuple[Array, Array]:
+    """(k, 2 nv, 2 nv) and (k, 2 nv, nv): `semi_implicit` on arrays, as matrices of the two half steps; by_start and by_way
+    (k, nv, nv) are how `integrate` moves with either of its arguments."""
     n, h = by_q.shape[-1], dt[..., None]
     unit, none = np.broadcast_to(np.eye(n), by_q.shape), np.zeros_like(by_q)
     kick = np.block([[unit, none], [h * by_q, unit + h * by_qd]])
-    drift = np.block([[unit, h * unit], [none, unit]])
+    drift = np.block([[by_start, h * by_way], [none, unit]])
     push = np.concatenate([none, h * by_tau], axis=-2)
     return drift @ kick, drift @ push
+
+
+def slopes_on_arrays(frames: Sequence[Frame], way: Array) -> tuple[Array, Array]:
+    """(k, nv, nv) each: how where `integrate` comes to moves with its start, and with the way (k, nv)."""
+    count, nv = way.shape
+    by_start, by_way = (np.broadcast_to(np.eye(nv), (count, nv, nv)).copy() for _ in range(2))
+    first = first_rates(frames)
+    for i, own in enumerate(step_slopes(frames, list(way.T))):
+        part = slice(first[i], first[i + 1])
+        if own is not None:
+            by_start[:, part, part], by_way[:, part, part] = (matrix(rows, count) for rows in own)
+    return by_start, by_way

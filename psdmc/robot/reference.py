@@ -148,6 +148,17 @@ class Reference:
 
         return self.each(moved, q, way)
 
+    def integrated_slopes(self, q: Array, way: Array) -> tuple[Array, Array]:
+        """(..., nv, nv) each: how `integrated` moves along its tangent with q, and with the way."""
+
+        def slopes(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
+            return np.array(
+                [pinocchio.dIntegrate(model, *state, which) for which in (pinocchio.ARG0, pinocchio.ARG1)]
+            )
+
+        by_start, by_way = np.moveaxis(self.each(slopes, q, way), -3, 0)
+        return by_start, by_way
+
     def coordinate_rates(self, q: Array, qd: Array) -> Array:
         """(..., nq) how the coordinates change at these rates: the central difference of eighth order of `integrate`, which
         is wrong by 1e-12 of the rates."""

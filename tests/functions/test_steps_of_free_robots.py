@@ -7,11 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 from unoptimised import without_optimisation
-from wide_robots import is_pinocchios
+from wide_robots import KINDS, is_pinocchios, wide_robot
 
 import psdmc
 from psdmc.derivation.derive import derive_model
+from psdmc.dynamics.manifold import difference
+from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.recipes.on_arrays import columns
+from psdmc.recipes.steps import turned
 from psdmc.robot.load import load_robot_text
 from psdmc.toolchain.call import CompiledRobot
 
@@ -47,6 +51,50 @@ COUNT = 8
 def test_a_step_is_pinocchios(function: str, name: str) -> None:
     """Random trees' mass matrices are conditioned badly: relative to the accelerations' largest entry."""
     is_pinocchios(function, name, exact=1e-9, in_c=False)
+
+
+@pytest.mark.parametrize("name", ["small", "hand"])
+def test_the_steps_jacobians_are_pinocchios(name: str) -> None:
+    """Chained from computeABADerivatives and dIntegrate."""
+    is_pinocchios("semi_implicit_euler_derivatives", name, exact=1e-9, in_c=name == "small")
+
+
+@pytest.mark.parametrize("name", ["small", "hand"])
+def test_the_steps_jacobians_are_difference_quotients_along_the_tangents(name: str) -> None:
+    """Of the step itself, by psdmc's own `integrate` and `difference`, which no derivative has a part in."""
+    own = wide_robot(name)
+    recipe, step, nv = RECIPES["semi_implicit_euler_derivatives"], 1e-6, own.model.nv
+    given = {quantity.name: own.given[quantity.name] for quantity in recipe.signature.inputs}
+    given["qdd"] = own.arrays.accelerations(given["q"], given["qd"], given["tau"])
+    found = recipe.reference(own.arrays, given)
+    whole, frames = np.concatenate([found["A"], found["B"]], axis=-1), own.arrays.frames
+
+    def after(move: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        by_q, by_qd, by_tau = move.reshape(3, nv)
+        q = turned(frames, given["q"], np.broadcast_to(by_q, given["qd"].shape))
+        qd, tau = given["qd"] + by_qd, given["tau"] + by_tau
+        qd_next = qd + given["dt"][:, None] * own.arrays.accelerations(q, qd, tau)
+        return turned(frames, q, given["dt"][:, None] * qd_next), qd_next
+
+    for j, unit in enumerate(np.eye(3 * nv)):
+        (q1, qd1), (q0, qd0) = after(step * unit), after(-step * unit)
+        way = columns(difference(frames, list(q0.T), list(q1.T)), len(q0))
+        slope = np.concatenate([way, qd1 - qd0], axis=-1) / (2 * step)
+        np.testing.assert_allclose(whole[:, :, j], slope, atol=1e-6 * np.abs(whole[:, :, j]).max())
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_derivatives_of_frames_velocities_are_pinocchios(name: str) -> None:
+    is_pinocchios("frame_velocity_derivatives", name, exact=1e-11, in_c=name == "free")
+
+
+def test_along_the_motion_they_are_the_drift() -> None:
+    """d (J qd) / d q qd is how fast J qd changes while the rates stay: the acceleration that `jacobian_dot_qd` says."""
+    own = wide_robot("free")
+    slopes = RECIPES["frame_velocity_derivatives"].reference(own.arrays, own.given)["dv_dq"]
+    drift = RECIPES["jacobian_dot_qd"].reference(own.arrays, own.given)["drift"]
+    found = (slopes @ own.given["qd"][:, None, :, None])[..., 0]
+    np.testing.assert_allclose(found, drift, atol=1e-12 * np.abs(drift).max())
 
 
 @cache

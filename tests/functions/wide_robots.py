@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
+import pinocchio as pin
 from random_trees import TREES, RandomTree
 from unoptimised import without_optimisation
 
@@ -81,6 +82,10 @@ def wide_robot(name: str) -> WideRobot:
     parents, kinds = SMALL[name] if name in SMALL else (TREE, KINDS[name])
     tree = RandomTree(4, parents, kinds)
     model = derive_model(tree.mechanism(), expand=False)
+    for frame in model.mechanism.frames:
+        place = pin.SE3(frame.placement.rotation.copy(), frame.placement.translation.copy())
+        joint = tree.joints[frame.joint]
+        tree.model.addFrame(pin.Frame(frame.name, joint, 0, place, pin.FrameType.OP_FRAME))
     return WideRobot(tree, model, Reference(tree.model, "tip"))
 
 

@@ -1,0 +1,133 @@
+"""How the end of a step depends on its start and on its way: derivatives of `integrate` along tangents.
+
+A joint goes from T to T exp(x), x its constant rates times seconds. Moved by a small e along its own axes at the start,
+or on the way, it ends moved by
+
+    Ad(exp(-x)) e = (1 - ad(x) J) e   or   J e,   J = 1 - ad(x) / 2! + ad(x)^2 / 3! - ...,
+
+along the axes that it ends with. Every joint type's motions are a group among those of a free body: one formula is for
+all of them, written for a linear part v and an angular part w of x.
+Source: Barfoot, State Estimation for Robotics, 2nd edition, section 8.1 (left Jacobian; here the right one, of -x).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.own_axes import unit_twists
+from psdmc.dynamics.scalar import Matrix, Scalar, Vector, dot, multiply
+from psdmc.dynamics.slices import leading
+from psdmc.dynamics.twist import combined
+from psdmc.robot.joints import JointType
+
+Rows = Sequence[Sequence[Scalar]]
+
+HALVINGS = 3
+"""Of the angle, before its series are summed."""
+TERMS = 12
+"""Of the series: of a turn by 25 rad, an eighth of which is pi, what is left out is less than 1e-16 of the sum."""
+
+
+class StepSlopes(NamedTuple):
+    """nv x nv: derivatives of where a joint ends, along its tangent there, by its start and by its way."""
+
+    by_start: Rows
+    by_way: Rows
+
+
+def step_slopes(
+    frames: Sequence[Frame], rates: Sequence[Scalar], seconds: Scalar = 1.0
+) -> list[StepSlopes | None]:
+    """Joint by joint, of nv rates for so long. None where both are one, of joints of one rate."""
+    found: list[StepSlopes | None] = []
+    used = 0
+    for frame in leading(frames):
+        nv = frame.joint.nv
+        own = rates[used : used + nv]
+        found.append(_slopes(frame.joint, [seconds * rate for rate in own]) if nv > 1 else None)
+        used += nv
+    return found
+
+
+def _slopes(joint: JointType, way: Sequence[Scalar]) -> StepSlopes:
+    v, w = combined(joint, way)
+    turns, across, squared, product = _cross_matrix(w), _cross_matrix(v), dot(w, w), dot(v, w)
+    b, c, d, e = _coefficients(squared)
+    twice = _plus(_outer(w, w), _diagonal(-squared))
+    both = _plus(_plus(_outer(v, w), _outer(w, v)), _diagonal(-2.0 * product))
+    own = _plus(_diagonal(1.0), _plus(_times(turns, -b), _times(twice, c)))
+    mixed = _plus(
+        _plus(_times(across, -b), _times(turns, (c - 2.0 * d) * product)),
+        _plus(_times(both, c), _times(twice, -2.0 * e * product)),
+    )
+    turned = _plus(_diagonal(1.0), _times(multiply(turns, own), -1.0))
+    shifted = _times(_plus(multiply(turns, mixed), multiply(across, own)), -1.0)
+    return StepSlopes(_of_rates(joint, turned, shifted), _of_rates(joint, own, mixed))
+
+
+def _of_rates(joint: JointType, own: Matrix, mixed: Matrix) -> Rows:
+    """The rows and columns of a joint's rates in ((own, mixed), (0, own)), of linear then angular ones."""
+    places = unit_twists(joint)
+
+    def entry(row: tuple[int, bool], column: tuple[int, bool]) -> Scalar:
+        if row[1] == column[1]:
+            return own[row[0]][column[0]]
+        return mixed[row[0]][column[0]] if column[1] else 0.0
+
+    return [[entry(row, column) for column in places] for row in places]
+
+
+def _coefficients(squared: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """Of an angle t, from its square:
+
+        b = (1 - cos t) / t^2,  c = (t - sin t) / t^3,  d = (1/2 - b) / t^2,  e = (3 c - b) / (2 t^2).
+
+    The quotients cancel near zero, the series far from it. So d and e are summed at an eighth of the angle, and all are
+    doubled three times, by formulas whose terms neither cancel nor divide.
+    """
+    y = squared * 0.25**HALVINGS
+    d = _series(y, [1.0 / math.factorial(2 * k + 4) for k in range(TERMS)])
+    e = _series(y, [(k + 1.0) / math.factorial(2 * k + 5) for k in range(TERMS)])
+    b = 0.5 - y * d
+    c = (b + 2.0 * y * e) * (1.0 / 3.0)
+    for _ in range(HALVINGS):
+        a = 1.0 - y * c  # sin t / t
+        e = 0.0625 * e + 0.03125 * (4.0 * (c - d) - 3.0 * b * c - 2.0 * y * c * c)
+        d = 0.125 * c * (1.0 + a)
+        c = 0.25 * (c + a * b)
+        b = 0.5 * a * a
+        y = 4.0 * y
+    return b, c, d, e
+
+
+def _series(y: Scalar, terms: Sequence[float]) -> Scalar:
+    """The sum of terms times powers of -y."""
+    total: Scalar = terms[-1]
+    for term in reversed(terms[:-1]):
+        total = term - total * y
+    return total
+
+
+def _cross_matrix(v: Vector) -> Matrix:
+    x, y, z = v
+    return ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+
+
+def _outer(a: Vector, b: Vector) -> Matrix:
+    return tuple((x * b[0], x * b[1], x * b[2]) for x in a)  # type: ignore[return-value]
+
+
+def _diagonal(x: Scalar) -> Matrix:
+    return ((x, 0.0, 0.0), (0.0, x, 0.0), (0.0, 0.0, x))
+
+
+def _times(rows: Matrix, factor: Scalar) -> Matrix:
+    return tuple((x * factor, y * factor, z * factor) for x, y, z in rows)  # type: ignore[return-value]
+
+
+def _plus(a: Matrix, b: Matrix) -> Matrix:
+    rows = zip(a, b, strict=True)
+    return tuple(tuple(x + y for x, y in zip(*pair, strict=True)) for pair in rows)  # type: ignore[return-value]
