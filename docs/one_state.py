@@ -28,11 +28,13 @@ def main(path: str = "examples/robots/kr6.toml") -> None:
     model = reference(load_robot(path)).model
     data = model.createData()
     q, qd, qdd = np.random.default_rng(0).uniform(-1.0, 1.0, (3, robot.n))
-    out = np.empty(robot.n)
+    out, theta_b = np.empty(robot.n), robot.theta_b
     through_cffi = type(robot).inverse_dynamics.__get__(robot)
     ways: dict[str, Callable[[], object]] = {
         "robot.inverse_dynamics(q, qd, qdd)": lambda: robot.inverse_dynamics(q, qd, qdd),
         "the same with out=": lambda: robot.inverse_dynamics(q, qd, qdd, out=out),
+        "the same with theta_b": lambda: robot.inverse_dynamics(q, qd, qdd, theta_b),
+        "theta_b through cffi": lambda: through_cffi(q, qd, qdd, theta_b),
         "through cffi": lambda: through_cffi(q, qd, qdd),
         "pin.rnea(model, data, q, qd, qdd)": lambda: pin.rnea(model, data, q, qd, qdd),
     }

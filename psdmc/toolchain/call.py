@@ -54,6 +54,9 @@ class CompiledRobot(CompiledFunctions):
 
     def _bound(self, function: Signature, compiled: CompiledFunctions) -> tuple[Any, ...]:
         """The arguments of DirectCall for one function."""
+        with_theta = f"{function.name}_theta"
+        arrays = len(function.inputs) + 1 + len(function.outputs)
+        takes_theta = with_theta in compiled._kernels and arrays <= MOST_ARRAYS
         return (
             MethodType(getattr(type(self), function.name), self),
             compiled._address_of(function.name),
@@ -63,6 +66,8 @@ class CompiledRobot(CompiledFunctions):
             tuple(self._sizes.shape(quantity.axes) for quantity in function.outputs),
             results(function) if len(function.outputs) > 1 else None,
             self._units_of(function),
+            compiled._address_of(with_theta) if takes_theta else 0,
+            self._sizes.l,
         )
 
     __class_getitem__ = classmethod(GenericAlias)

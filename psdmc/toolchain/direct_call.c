@@ -36,12 +36,19 @@ typedef struct {
     PyObject *slow;      /* bound method of the robot, which keeps its library open */
     PyObject *result;    /* class of the named tuple of several outputs, or NULL */
     void (*batch)(void);
+    void (*batch_theta)(void);    /* the same with theta_b behind the inputs, or NULL */
+    Tail parameters;              /* of theta_b */
     int inputs, outputs, type, can_fail, units;
     Unit unit[MOST_UNITS];
     Tail tails[MOST_ARRAYS];
 } DirectCall;
 
-static PyObject *out_word;    /* "out", interned */
+static PyObject *out_word, *theta_word;    /* "out", "theta_b", interned */
+
+/* What a call gives beside its inputs, borrowed; NULL where it is None or left out. */
+typedef struct {
+    PyObject *theta, *out;
+} Extras;
 
 /* The functions' own pointers are to const or plain reals: all pointers to objects are passed alike on the machines that
    psdmc.compile builds for. */
@@ -112,9 +119,28 @@ static int overlap(PyArrayObject *a, PyArrayObject *b)
     return from < other + (uintptr_t)PyArray_NBYTES(b) && other < from + (uintptr_t)PyArray_NBYTES(a);
 }
 
-/* The outputs that a caller gave, borrowed, into arrays[inputs...]; 0 where Python must look at them. */
-static int take_outputs(const DirectCall *self, PyObject *out, int lead, const npy_intp *shape, PyArrayObject **arrays)
+/* theta_b by its place or name, out by its name; 0 where Python must look at them. */
+static int take_extras(const DirectCall *self, PyObject *const *args, Py_ssize_t placed, PyObject *names, Extras *extras)
 {
+    const Py_ssize_t named = names == NULL ? 0 : PyTuple_GET_SIZE(names);
+    if (placed != self->inputs && placed != self->inputs + 1) return 0;
+    if (placed > self->inputs) extras->theta = args[self->inputs];
+    for (Py_ssize_t k = 0; k < named; k++) {
+        PyObject *name = PyTuple_GET_ITEM(names, k);
+        if (name == out_word) extras->out = args[placed + k];
+        else if (name == theta_word && placed == self->inputs) extras->theta = args[placed + k];
+        else return 0;
+    }
+    if (extras->theta != NULL && self->batch_theta == NULL) return 0;
+    if (extras->theta == Py_None) extras->theta = NULL;
+    if (extras->out == Py_None) extras->out = NULL;
+    return extras->theta == NULL || is_plain(extras->theta, self->type, NPY_ARRAY_CARRAY_RO, &self->parameters, 0, NULL);
+}
+
+/* The outputs that a caller gave, borrowed, into arrays[inputs...]; 0 where Python must look at them. */
+static int take_outputs(const DirectCall *self, const Extras *extras, int lead, const npy_intp *shape, PyArrayObject **arrays)
+{
+    PyObject *out = extras->out;
     if (self->outputs > 1 && (!PyTuple_Check(out) || PyTuple_GET_SIZE(out) != self->outputs)) return 0;
     for (int k = 0; k < self->outputs; k++) {
         PyObject *own = self->outputs > 1 ? PyTuple_GET_ITEM(out, k) : out;
@@ -124,6 +150,7 @@ static int take_outputs(const DirectCall *self, PyObject *out, int lead, const n
         for (int i = 0; i < place; i++) {
             if (overlap(arrays[i], arrays[place])) return 0;
         }
+        if (extras->theta != NULL && overlap((PyArrayObject *)extras->theta, arrays[place])) return 0;
     }
     return 1;
 }
@@ -187,13 +214,9 @@ static int are_units(const DirectCall *self, PyArrayObject **arrays, npy_intp co
 static PyObject *call(PyObject *object, PyObject *const *args, size_t nargsf, PyObject *names)
 {
     DirectCall *self = (DirectCall *)object;
-    PyObject *out = NULL;
+    Extras extras = {NULL, NULL};
     PyArrayObject *arrays[MOST_ARRAYS];
-    if (PyVectorcall_NARGS(nargsf) != self->inputs) goto slow;
-    if (names != NULL && PyTuple_GET_SIZE(names) > 0) {
-        if (PyTuple_GET_SIZE(names) != 1 || PyTuple_GET_ITEM(names, 0) != out_word) goto slow;
-        if (args[self->inputs] != Py_None) out = args[self->inputs];
-    }
+    if (!take_extras(self, args, PyVectorcall_NARGS(nargsf), names, &extras)) goto slow;
     if (!PyArray_CheckExact(args[0])) goto slow;
     const int lead = PyArray_NDIM((PyArrayObject *)args[0]) - self->tails[0].axes;
     const npy_intp *shape = PyArray_DIMS((PyArrayObject *)args[0]);
@@ -206,22 +229,25 @@ static PyObject *call(PyObject *object, PyObject *const *args, size_t nargsf, Py
     for (int i = 0; i < lead; i++) count *= shape[i];
     if (!are_units(self, arrays, count)) goto slow;
     PyObject *result;
-    if (out == NULL) {
+    if (extras.out == NULL) {
         result = make_outputs(self, lead, shape, arrays);
         if (result == NULL) return NULL;
     } else {
-        if (!take_outputs(self, out, lead, shape, arrays)) goto slow;
-        result = self->outputs > 1 ? named(self, Py_NewRef(out)) : Py_NewRef(out);
+        if (!take_outputs(self, &extras, lead, shape, arrays)) goto slow;
+        result = self->outputs > 1 ? named(self, Py_NewRef(extras.out)) : Py_NewRef(extras.out);
         if (result == NULL) return NULL;
     }
     void *data[MOST_ARRAYS];
-    const int all = self->inputs + self->outputs;
-    for (int i = 0; i < all; i++) data[i] = PyArray_DATA(arrays[i]);
+    int all = 0;
+    for (int i = 0; i < self->inputs; i++) data[all++] = PyArray_DATA(arrays[i]);
+    if (extras.theta != NULL) data[all++] = PyArray_DATA((PyArrayObject *)extras.theta);
+    for (int i = 0; i < self->outputs; i++) data[all++] = PyArray_DATA(arrays[self->inputs + i]);
+    void (*batch)(void) = extras.theta != NULL ? self->batch_theta : self->batch;
     if (count < RELEASE_FROM) {
-        run(self->batch, self->can_fail, (size_t)count, all, data);
+        run(batch, self->can_fail, (size_t)count, all, data);
     } else {
         Py_BEGIN_ALLOW_THREADS
-        run(self->batch, self->can_fail, (size_t)count, all, data);
+        run(batch, self->can_fail, (size_t)count, all, data);
         Py_END_ALLOW_THREADS
     }
     return result;
@@ -285,18 +311,33 @@ static int read_units(DirectCall *self, PyObject *units)
     return 1;
 }
 
-/* DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units) */
+/* The function that takes theta_b, too; 0 with an exception where that is one array more than `run` knows. */
+static int read_theta(DirectCall *self, unsigned long long address, Py_ssize_t parameters)
+{
+    if (address == 0) return 1;
+    if (parameters < 0 || self->inputs + 1 + self->outputs > MOST_CALLED) {
+        PyErr_SetString(PyExc_ValueError, "theta_b does not fit");
+        return 0;
+    }
+    self->batch_theta = (void (*)(void))(uintptr_t)address;
+    self->parameters.axes = 1;
+    self->parameters.length[0] = parameters;
+    return 1;
+}
+
+/* DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units, theta_address, parameters) */
 static PyObject *new(PyTypeObject *type, PyObject *args, PyObject *named_args)
 {
     PyObject *slow, *inputs, *outputs, *result, *units;
-    unsigned long long address;
+    unsigned long long address, theta;
+    Py_ssize_t parameters;
     int can_fail, is_single;
     if (named_args != NULL && PyDict_GET_SIZE(named_args) > 0) {
         PyErr_SetString(PyExc_TypeError, "DirectCall() takes no keyword arguments");
         return NULL;
     }
-    if (!PyArg_ParseTuple(args, "OKppO!O!OO!", &slow, &address, &can_fail, &is_single, &PyTuple_Type, &inputs,
-                          &PyTuple_Type, &outputs, &result, &PyTuple_Type, &units)) return NULL;
+    if (!PyArg_ParseTuple(args, "OKppO!O!OO!Kn", &slow, &address, &can_fail, &is_single, &PyTuple_Type, &inputs,
+                          &PyTuple_Type, &outputs, &result, &PyTuple_Type, &units, &theta, &parameters)) return NULL;
     DirectCall *self = (DirectCall *)type->tp_alloc(type, 0);
     if (self == NULL) return NULL;
     self->vectorcall = call;
@@ -306,7 +347,8 @@ static PyObject *new(PyTypeObject *type, PyObject *args, PyObject *named_args)
     self->slow = Py_NewRef(slow);
     self->result = result == Py_None ? NULL : Py_NewRef(result);
     const int is_class = result == Py_None || (PyType_Check(result) && PyType_IsSubtype((PyTypeObject *)result, &PyTuple_Type));
-    if (!is_class || !read_tails(self, inputs, outputs) || !read_units(self, units) || (self->outputs > 1) != (self->result != NULL)) {
+    if (!is_class || !read_tails(self, inputs, outputs) || !read_units(self, units) || !read_theta(self, theta, parameters)
+        || (self->outputs > 1) != (self->result != NULL)) {
         if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "several outputs have a class of tuples, one has none");
         Py_DECREF(self);
         return NULL;
@@ -375,8 +417,9 @@ static int fill(PyObject *module)
 {
     if (PyArray_ImportNumPyAPI() < 0) return -1;
     out_word = PyUnicode_InternFromString("out");
+    theta_word = PyUnicode_InternFromString("theta_b");
     PyObject *type = PyType_FromSpec(&spec);
-    if (out_word == NULL || type == NULL) return -1;
+    if (out_word == NULL || theta_word == NULL || type == NULL) return -1;
     const int failed = PyModule_AddObjectRef(module, "DirectCall", type);
     Py_DECREF(type);
     return failed;

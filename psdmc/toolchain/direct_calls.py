@@ -40,7 +40,8 @@ MOST_ARRAYS, MOST_UNITS = 12, 64
 class DirectCalls:
     """Whether direct calls are possible here.
 
-    make    the type DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units); None where they are not
+    make    the type DirectCall(slow, address, can_fail, is_single, inputs, outputs, result, units, theta_address,
+            parameters); None where they are not
     reason  why not, for people; empty where they are
     remedy  how to have them
     """

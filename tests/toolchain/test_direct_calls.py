@@ -8,6 +8,7 @@ import sys
 import sysconfig
 import weakref
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,6 +80,66 @@ def test_results_go_where_the_caller_says(robot: CompiledRobot, name: str) -> No
         assert call(*states, out=out) is out
         assert np.array_equal(out, expected)
         assert np.array_equal(call(*states, out=None), expected)
+
+
+def detours(robot: CompiledRobot, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The functions that are called through Python from now on."""
+    seen: list[str] = []
+    whole = CompiledRobot.call
+
+    def recorded(self: CompiledRobot, function: Any, *given: Any) -> Any:
+        seen.append(function.name)
+        return whole(self, function, *given)
+
+    monkeypatch.setattr(CompiledRobot, "call", recorded)
+    return seen
+
+
+@pytest.mark.parametrize("lead", [(), (3,), (70,), (0,)], ids=str)
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if f"{name}_theta" in arm_kernels()])
+def test_parameters_at_run_time_give_the_same_bits_without_a_detour(
+    robot: CompiledRobot, name: str, lead: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    states, call = given(robot, name, *lead), getattr(robot, name)
+    theta = (1.1 * robot.theta_b).astype(robot.dtype)
+    expected = slow(robot, name)(*states, theta_b=theta)
+    seen = detours(robot, monkeypatch)
+
+    out = np.empty_like(expected)
+    found = [call(*states, theta), call(*states, theta_b=theta), call(*states, out=out, theta_b=theta)]
+
+    assert seen == []
+    assert found[2] is out
+    assert all(np.array_equal(one, expected, equal_nan=True) for one in found)
+
+
+def test_parameters_that_c_cannot_read_take_the_other_way(robot: CompiledRobot) -> None:
+    states = given(robot, "inverse_dynamics", 4)
+    theta = robot.theta_b.astype(robot.dtype)
+    expected = slow(robot, "inverse_dynamics")(*states, theta)
+    for same in (theta.tolist(), np.repeat(theta, 2)[::2], theta.astype(np.longdouble)):
+        assert np.array_equal(robot.inverse_dynamics(*states, same), expected)
+    assert np.array_equal(robot.inverse_dynamics(*states, None), robot.inverse_dynamics(*states))
+    with pytest.raises(InputError, match=r"theta_b has shape \(2,\)"):
+        robot.inverse_dynamics(*states, theta[:2])
+    with pytest.raises(InputError, match="theta_b"):
+        robot.inverse_dynamics(*states, theta[None])
+    with pytest.raises(TypeError, match=r"inverse_dynamics\(\)"):
+        robot.inverse_dynamics(*states, theta, theta_b=theta)
+    with pytest.raises(TypeError, match=r"jacobian\(\)"):
+        robot.jacobian(states[0], None)
+
+
+def test_out_may_lie_across_the_parameters(robot: CompiledRobot) -> None:
+    states = given(robot, "inverse_dynamics", 4)
+    memory = np.zeros(4 * N + robot.l, robot.dtype)
+    theta, out = memory[: robot.l], memory[: 4 * N].reshape(4, N)
+    theta[:] = robot.theta_b
+    expected = slow(robot, "inverse_dynamics")(*states, theta.copy())
+
+    robot.inverse_dynamics(*states, theta, out=out)
+
+    assert np.array_equal(out, expected)
 
 
 def test_out_may_be_an_input_or_lie_across_inputs(robot: CompiledRobot) -> None:
@@ -206,11 +267,14 @@ def test_robots_that_nobody_holds_go_and_functions_keep_theirs() -> None:
 def test_nothing_is_leaked(robot: CompiledRobot) -> None:
     q = np.zeros(N, robot.dtype)
     out = np.empty(N, robot.dtype)
+    theta = robot.theta_b.astype(robot.dtype)
 
     def calls() -> None:
         for _ in range(1000):
             robot.gravity(q)
             robot.gravity(q, out=out)
+            robot.gravity(q, theta, out=out)
+            robot.gravity(q, theta_b=theta)
             with pytest.raises(InputError):
                 robot.gravity(q, out=q[:1])
 
@@ -219,12 +283,19 @@ def test_nothing_is_leaked(robot: CompiledRobot) -> None:
         sys.getrefcount(q),
         sys.getrefcount(out),
         sys.getrefcount(robot.gravity),
+        sys.getrefcount(theta),
         sys.getallocatedblocks(),
     )
     calls()
-    after = sys.getrefcount(q), sys.getrefcount(out), sys.getrefcount(robot.gravity), sys.getallocatedblocks()
-    assert after[:3] == before[:3]
-    assert after[3] - before[3] < 200
+    after = (
+        sys.getrefcount(q),
+        sys.getrefcount(out),
+        sys.getrefcount(robot.gravity),
+        sys.getrefcount(theta),
+        sys.getallocatedblocks(),
+    )
+    assert after[:4] == before[:4]
+    assert after[4] - before[4] < 200
 
 
 def test_other_threads_run_during_a_call_for_many_states() -> None:
