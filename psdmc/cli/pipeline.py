@@ -11,6 +11,7 @@ from psdmc.cli.lists import assignments, names, numbers
 from psdmc.cli.next_step import quoted, say_next, say_next_line
 from psdmc.cli.output import check_output
 from psdmc.cli.progress import steps
+from psdmc.errors import InputError
 from psdmc.robot.load_options import DEFAULT_SNAP
 from psdmc.target.native import NATIVE
 from psdmc.target.presets import PRESETS
@@ -84,6 +85,8 @@ def derive(
     from psdmc.robot.lock import parsed as parsed_lock
 
     target = output or Path(Path(robot.name.removesuffix(".xacro")).stem + ".npz")
+    if robot.suffix == ".npz":
+        raise InputError(f"{robot}: a model, which is derived already", "give the robot's file")
     check_output(target, robot)
     with steps() as progress:
         model = compiler.derive(
@@ -160,7 +163,9 @@ def check(
 
 def emit_c(
     model: ModelFile,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: the model's name")
+    ] = None,
     lowering: Annotated[
         str,
         typer.Option(
@@ -212,11 +217,12 @@ def emit_c(
     from psdmc.model.load import load
 
     found = load(model)
+    folder = output or Path(model.stem)
     wanted = names(functions) or None
     with steps() as progress:
         changed = compiler.emit_c(
             found,
-            output,
+            folder,
             lowering,  # type: ignore[arg-type]
             wanted,
             real,  # type: ignore[arg-type]
@@ -229,13 +235,13 @@ def emit_c(
             target,
             friction,
         )
-    print(f"{output}: {len(changed)} files written" if changed else f"{output}: nothing changed")
+    print(f"{folder}: {len(changed)} files written" if changed else f"{folder}: nothing changed")
     asked = name or found.mechanism.name
     if identifier(asked) != asked:
         print(f"note: in C '{one_line(asked)}' is {identifier(asked)}")
     for note in run_time_only(found, wanted):
         print(f"note: {note}")
-    say_next("build", output)
+    say_next("build", folder)
 
 
 def build(
@@ -245,19 +251,29 @@ def build(
     ] = False,
 ) -> None:
     """Build an emitted package through its own build files and run its self-test."""
-    from psdmc.toolchain.build_package import build_package
+    from psdmc.toolchain.build_package import build_package, checks_of
 
     with steps() as progress:
         progress("building")
-        build_package(directory, edited)
-    print(f"{directory}: built, self-test passed")
+        built = build_package(directory, edited)
+    print(f"{directory}: built, self-test passed ({checks_of(built)})")
     for library in sorted((directory / "build").glob("lib*.*")):
         if library.suffix in (".a", ".so", ".dylib"):
             print(f"{library}: written")
-    install = f"cmake --install {quoted(directory / 'build')}"
-    if not (directory / "build" / "CMakeCache.txt").exists():
-        install = f"make -C {quoted(directory)} install"
-    say_next_line(install)
+    say_next_line(_after_building(directory))
+
+
+def _after_building(package: Path) -> str:
+    """The command that puts a built package to use: installed for its user; compiled for the board that it is made for."""
+    from psdmc.emit.own_files import target_of
+
+    target = PRESETS.get(target_of(package) or "")
+    if target is not None and target.tools:
+        compilers = f"CC={target.tools}gcc AR={target.tools}ar"
+        return f"BUILD=board {compilers} make -C {quoted(package)} all"
+    if (package / "build" / "CMakeCache.txt").exists():
+        return f'cmake --install {quoted(package / "build")} --prefix "$HOME/.local"'
+    return f'make -C {quoted(package)} install PREFIX="$HOME/.local"'
 
 
 def cache(

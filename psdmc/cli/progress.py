@@ -19,6 +19,9 @@ PATIENCE = 2.0
 TICK = 0.2
 """s between two looks at the clock."""
 
+WORTH_SAYING = 1.0
+"""s that a stage must still take for a line about it: one that is about to end says so by ending."""
+
 FIRST_SHARE = 0.02
 """Share of the work from which the time left is estimated."""
 
@@ -88,8 +91,10 @@ class Lines:
             now, at = self._clock(), self._estimate
             if now - self._last < PATIENCE or at.stage == self._told:
                 return
-            self._last, self._told = now, at.stage
             left = at.left()
+            if left is not None and left < WORTH_SAYING:
+                return
+            self._last, self._told = now, at.stage
             ending = "" if left is None else f", about {in_words(left)} left"
             self._say(f"{at.text} ...{ending}")
 

@@ -85,7 +85,20 @@ def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
     return edited if entries else None
 
 
+def target_of(directory: str | os.PathLike[str]) -> str | None:
+    """The name of the machine that a package says it was made for; None where it names none."""
+    target = _content(Path(directory) / MANIFEST).get("target")
+    name = target.get("name") if isinstance(target, dict) else None
+    return name if isinstance(name, str) else None
+
+
 def _entries(path: Path) -> dict[str, object]:
+    files = _content(path).get("files")
+    return files if isinstance(files, dict) else {}
+
+
+def _content(path: Path) -> dict[str, object]:
+    """What a manifest or journal of psdmc's says; empty where there is none."""
     try:
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_LIST:
@@ -93,7 +106,4 @@ def _entries(path: Path) -> dict[str, object]:
         content = json.loads(path.read_bytes())
     except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return {}
-    if not isinstance(content, dict) or content.get("generator") != GENERATOR:
-        return {}
-    files = content.get("files")
-    return files if isinstance(files, dict) else {}
+    return content if isinstance(content, dict) and content.get("generator") == GENERATOR else {}

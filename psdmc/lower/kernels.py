@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from typing import Literal
 
 from psdmc.dynamics.solve import SingularMassMatrix
@@ -94,11 +95,15 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
     names = [name for word in functions for name in groups.get(word, (word,))]
     unknown = [name for name in names if name not in RECIPES]
     if unknown:
-        raise InputError(
-            f"function {unknown[0]!r} is not known", f"psdmc generates {', '.join((*RECIPES, *groups))}"
-        )
+        raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
     called = {RECIPES[name].signature.calls for name in names}
     return tuple(name for name in RECIPES if name in names or name in called)
+
+
+def _near(word: str, names: Sequence[str]) -> str:
+    """The hint for a name that is none: those that look like it, else all."""
+    alike = get_close_matches(word.lower().replace("-", "_"), names, n=3)
+    return f"do you mean {' or '.join(alike)}?" if alike else f"psdmc generates {', '.join(names)}"
 
 
 def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> InputError:

@@ -32,7 +32,7 @@ def as_source(file: Path, text: str, options: LoadOptions) -> tuple[str, SourceF
     if tag == "sdf":
         raise InputError(
             f"{file.name}: an SDF, which psdmc does not read",
-            "give the URDF or MJCF of the robot; ROS's sdformat_urdf makes a URDF of an SDF",
+            "give the URDF, xacro or MJCF that it was made from, or convert it, with sdf2urdf of pysdf for instance",
         )
     if tag == "mujoco":
         return _from_mjcf(file, options)

@@ -21,6 +21,9 @@ from psdmc.robot.tool import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
 
+PACKED = b"PK\x03\x04"
+"""First bytes of a model file, which is an archive."""
+
 __all__ = ["DEFAULT_SNAP", "LoadOptions", "LoadedRobot", "SourceFormat", "load_robot", "load_robot_text"]
 
 
@@ -124,6 +127,10 @@ def robot_text(file: Path) -> str:
         with file.open("rb") as opened:
             data = opened.read(limits.MAX_BYTES + 1)
         _refuse_size(len(data), str(file))
+        if data.startswith(PACKED):
+            raise InputError(
+                f"{file}: a packed file, as models are, and no robot's", "give a URDF or a DH .toml file"
+            )
         return data.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{file}: no such file", "give the path of a URDF or DH .toml file") from None

@@ -83,6 +83,7 @@ CORTEX_M4F = replace(
     forms=("single",),
     texts=False,
     hosted=False,
+    tools="arm-none-eabi-",
     flags=("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"),
     costs=replace(
         SCALAR.costs,

@@ -32,6 +32,7 @@ class Target:
     flags          for the compiler, which must take them
     host_flags     the first of these that a compiler takes means the machine at hand; in a package only if its user asks
     costs          figures for the search and the passes
+    tools          what the names of its usual compiler and ar begin with; empty: those of the machine at hand
     """
 
     name: str
@@ -47,6 +48,7 @@ class Target:
     flags: tuple[str, ...]
     host_flags: tuple[str, ...]
     costs: Costs
+    tools: str = ""
 
     def __post_init__(self) -> None:
         widths = [unit.bytes for unit in self.vectors]

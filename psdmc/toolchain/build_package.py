@@ -103,6 +103,12 @@ def _self_test(words: list[str], root: Path) -> str:
     )
 
 
+def checks_of(report: str) -> str:
+    """What a build's self-test checked, in its own words: '39 checks of 15 functions'."""
+    found = re.findall(r": (\d+ checks of \d+ functions), 0 failed", report)
+    return found[-1] if found else "nothing to check"
+
+
 def failed_checks(report: str) -> list[str]:
     """The failed checks of a self-test's report, each once: ctest numbers its lines, and repeats them."""
     lines = (re.sub(r"^\d+: ", "", line.strip()) for line in report.splitlines())

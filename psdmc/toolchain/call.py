@@ -59,7 +59,7 @@ class CompiledRobot(CompiledFunctions):
         takes_theta = with_theta in compiled._kernels and arrays <= MOST_ARRAYS
         return (
             MethodType(getattr(type(self), function.name), self),
-            compiled._address_of(function.name),
+            compiled._address_of(function.name) if function.name in compiled._kernels else 0,
             function.positive is not None,
             self.dtype == np.float32,
             tuple(self._sizes.shape(quantity.axes) for quantity in function.inputs),

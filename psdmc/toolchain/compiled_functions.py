@@ -140,6 +140,11 @@ class CompiledFunctions(RobotFacts):
 
     def _kernel(self, name: str) -> _Kernel:
         found = self._kernels.get(name)
+        if found is None and f"{name}_theta" in self._kernels:
+            raise InputError(
+                f"{self._robot}: {name} wants parameters, and this model's theta_b is unknown",
+                f"give theta_b=, {self._sizes.l} numbers; psdmc calibrate finds them from logs",
+            )
         if found is None and self._more is not None:
             other = self._more(name.removesuffix("_theta"))
             self._others.append(other)

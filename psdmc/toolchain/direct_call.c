@@ -35,7 +35,7 @@ typedef struct {
     vectorcallfunc vectorcall;
     PyObject *slow;      /* bound method of the robot, which keeps its library open */
     PyObject *result;    /* class of the named tuple of several outputs, or NULL */
-    void (*batch)(void);
+    void (*batch)(void);          /* or NULL, where the robot has no parameters of its own */
     void (*batch_theta)(void);    /* the same with theta_b behind the inputs, or NULL */
     Tail parameters;              /* of theta_b */
     int inputs, outputs, type, can_fail, units;
@@ -134,6 +134,7 @@ static int take_extras(const DirectCall *self, PyObject *const *args, Py_ssize_t
     if (extras->theta != NULL && self->batch_theta == NULL) return 0;
     if (extras->theta == Py_None) extras->theta = NULL;
     if (extras->out == Py_None) extras->out = NULL;
+    if (extras->theta == NULL && self->batch == NULL) return 0;
     return extras->theta == NULL || is_plain(extras->theta, self->type, NPY_ARRAY_CARRAY_RO, &self->parameters, 0, NULL);
 }
 

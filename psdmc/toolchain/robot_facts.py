@@ -77,8 +77,8 @@ class RobotFacts:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """Names of the functions that are compiled, without the variants that take theta_b."""
-        return tuple(name for name in self._interface.kernels if not name.endswith("_theta"))
+        """Names of the functions that are compiled, each once: without theta_b, with it, or both."""
+        return tuple(dict.fromkeys(name.removesuffix("_theta") for name in self._interface.kernels))
 
     @cached_property
     def limits(self) -> JointLimits:

@@ -82,6 +82,20 @@ def test_a_line_has_the_time_left(clock: Clock) -> None:
     assert said == [r"round 3 of 10\x1b[2J ..., about 12 s left"]
 
 
+def test_a_stage_that_is_about_to_end_is_not_told(clock: Clock) -> None:
+    said: list[str] = []
+    lines = Lines(said.append, clock)
+    lines.tell(Step("lowering jacobian", 0.0))
+    clock.now += 2.1
+    lines.tell(Step("lowering jacobian", 0.9))
+    lines.look()
+    assert said == []
+
+    lines.tell(Step("round 1 of 2", 0.0))
+    lines.look()
+    assert said == ["round 1 of 2 ..."], "the patience was not used up"
+
+
 def test_shares_pass_through_longer_texts() -> None:
     told: list[str] = []
     tell = within("kr6", told.append)

@@ -76,7 +76,7 @@ def test_an_sdf_is_told(name: str, tmp_path: Path) -> None:
 
     with pytest.raises(InputError, match="an SDF, which psdmc does not read") as refused:
         load_robot(tmp_path / name)
-    assert "sdformat_urdf" in str(refused.value.hint)
+    assert "URDF, xacro or MJCF" in str(refused.value.hint)
 
 
 @pytest.mark.parametrize(
