@@ -22,7 +22,7 @@ from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.sources import campaign_of, log_sources
+from psdmc.calibration.sources import LogNaming, campaign_of, log_sources
 from psdmc.calibration.verdict.judged_record import judged_record
 from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
 from psdmc.calibration.verdict.record import Calibration, four_step_record, linear_record, with_data
@@ -63,6 +63,7 @@ def calibrate(
     regressor: Regressor | None = None,
     torque_constants: Mapping[str, float] | None = None,
     validation: str | Path | Sequence[str | Path] = (),
+    naming: LogNaming | None = None,
     progress: Progress = lambda step: None,
 ) -> Calibration:
     """Calibrate a model from a campaign (its folder or campaign.toml), a log description (log.toml) or plain logs.
@@ -70,6 +71,7 @@ def calibrate(
     regressor         the compiled model where there is one; else Newton-Euler on arrays
     torque_constants  N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
     validation        plain logs that are held out as a whole
+    naming            topic and joint names of plain logs
 
     Raises InputError where a file is missing or a log cannot be used.
     """
@@ -81,11 +83,13 @@ def calibrate(
     paths, held = _paths(sources), _paths(validation)
     campaign = campaign_of(paths)
     if campaign is not None:
-        _require_plain(campaign, options, held)
+        _require_plain(campaign, options, held, naming or LogNaming())
         runs = read_campaign(campaign, model.joint_names)
         return calibrate_campaign(model, runs, options, regressor, torque_constants, progress)
     progress("reading logs")
-    found = log_sources(paths, held, model.joint_names, options.linear, options.choice, progress)
+    found = log_sources(
+        paths, held, model.joint_names, options.linear, options.choice, naming or LogNaming(), progress
+    )
     options = replace(options, linear=found.linear)
     constants = {**found.constants, **(torque_constants or {})}
     return calibrate_logs(model, found.logs, options, regressor, constants or None, progress)
@@ -95,10 +99,13 @@ def _paths(sources: str | Path | Sequence[str | Path]) -> list[Path]:
     return [Path(source) for source in ([sources] if isinstance(sources, str | Path) else sources)]
 
 
-def _require_plain(campaign: Path, options: CalibrateOptions, validation: list[Path]) -> None:
+def _require_plain(
+    campaign: Path, options: CalibrateOptions, validation: list[Path], naming: LogNaming
+) -> None:
     """InputError where what is for plain logs is given with a campaign."""
     given = [flag for flag, value in options.choice.by_flag().items() if value is not None]
     given += ["--validate"] if validation else []
+    given += naming.flags
     if given:
         are = "is" if len(given) == 1 else "are"
         raise InputError(

@@ -14,6 +14,7 @@ from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
 from psdmc.calibration.identify.linear_fit import LinearOptions
 from psdmc.calibration.logs.open_log import open_log
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 from psdmc.progress import Progress
 
@@ -29,6 +30,34 @@ class LogSources:
     logs: tuple[AnyLog, ...]
     linear: LinearOptions
     constants: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class LogNaming:
+    """How plain logs name things.
+
+    topic   of a bag's joint states; empty: its only one, or /joint_states
+    joints  the model's joint by the log's, where they differ
+    """
+
+    topic: str = ""
+    joints: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def flags(self) -> list[str]:
+        """Options of the command line that say so."""
+        return (["--topic"] if self.topic else []) + (["--joint-map"] if self.joints else [])
+
+    def opened(self, path: Path, progress: Progress) -> AnyLog:
+        """A log with the model's joint names; InputError where it has no joint of a given name."""
+        log = open_log(path, progress, topic=self.topic)
+        unknown = [quoted(name) for name in self.joints if name not in log.joint_names]
+        if unknown:
+            has = listed([quoted(name) for name in log.joint_names])
+            raise InputError(f"{log.name}: --joint-map: no joint(s) {listed(unknown)}", f"the log has {has}")
+        names = tuple(self.joints.get(name, name) for name in log.joint_names)
+        sliding = None if log.sliding is None else tuple(self.joints.get(name, name) for name in log.sliding)
+        return replace(log, joint_names=names, sliding=sliding)
 
 
 def campaign_of(paths: Sequence[Path]) -> Path | None:
@@ -50,6 +79,7 @@ def log_sources(
     joint_names: tuple[str, ...],
     linear: LinearOptions,
     choice: FitChoice,
+    naming: LogNaming,
     progress: Progress,
 ) -> LogSources:
     """Opened logs of a description or of plain files.
@@ -66,9 +96,14 @@ def log_sources(
             "name the other logs in it, each as a [[log]]",
         )
     if not described:
-        fit = [open_log(path, progress) for path in paths]
-        held = [replace(open_log(path, progress), use="validate") for path in validation]
+        fit = [naming.opened(path, progress) for path in paths]
+        held = [replace(naming.opened(path, progress), use="validate") for path in validation]
         return LogSources((*fit, *held), _options(linear, FitChoice(), choice, bool(held)))
+    if naming.flags:
+        raise InputError(
+            f"{', '.join(naming.flags)}: for plain logs, {described[0]} is a log description",
+            "write topic in its [[log]], and logged_as in its [[joint]]",
+        )
     description = read_description(described[0], joint_names)
     logs = described_logs(description, joint_names, progress)
     own = description.part(FIT)

@@ -10,11 +10,13 @@ import typer
 from psdmc.bench.defaults import ROUNDS
 from psdmc.calibration.motions.excite_options import LONGEST_DURATION, MOST_HARMONICS, ExciteOptions
 from psdmc.cli import interrupt
+from psdmc.cli.describing import describe_logs, fit_choice, parsed_joint_map
 from psdmc.cli.next_step import quoted, say_next, say_next_line
 from psdmc.cli.one_line import one_line
 from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
 from psdmc.cli.torque_constants import parsed_torque_constants
+from psdmc.errors import InputError
 
 WRONG_STATUS = 5
 """A contestant's results disagreed with the others'."""
@@ -125,8 +127,16 @@ def simulate(
 
 def calibrate(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file")],
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="campaign folder, or logs")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="MODEL.npz", help="calibrated model")],
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="LOG...", help="campaign folder, a log description (log.toml), or logs"),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="MODEL.npz", help="calibrated model; with --describe the description"
+        ),
+    ] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.html", help="write a page, with JSON beside it")
     ] = None,
@@ -150,29 +160,62 @@ def calibrate(
     keep: Annotated[
         bool, typer.Option("--keep", help="write the model file even where the verdict is: not usable")
     ] = False,
+    validate: Annotated[
+        list[Path] | None, typer.Option(metavar="LOG", help="a plain log that is held out as a whole")
+    ] = None,
+    split: Annotated[
+        str | None,
+        typer.Option(metavar="SHARE[,BLOCKS]", help="held out of plain logs: 0.3, the last part; 0.15,40"),
+    ] = None,
+    friction: Annotated[
+        list[str] | None,
+        typer.Option(metavar="TERM,...", help="of plain logs: coulomb,viscous,viscous^2,offset"),
+    ] = None,
+    topic: Annotated[
+        str | None, typer.Option(metavar="TOPIC", help="of joint states, of bags with several")
+    ] = None,
+    joint_map: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LOGGED=JOINT,...", help="plain logs' joint names, and the model's"),
+    ] = None,
+    describe: Annotated[
+        bool,
+        typer.Option("--describe", help="draft a description of [MODEL] LOG...: log.toml, or -o"),
+    ] = False,
 ) -> None:
     """Identify base parameters, friction and motor constants from logs; the verdict comes first, exit 6: not usable."""
+    given = [model, *(logs or [])]
+    if describe:
+        describe_logs(given, output, topic)
+        return
+    if len(given) < 2 or output is None:
+        lacks = "no LOG" if len(given) < 2 else "no -o MODEL.npz"
+        raise InputError(f"calibrate: {lacks}", "psdmc calibrate MODEL.npz LOG... -o CALIBRATED.npz")
+    logs = given[1:]
+    choice = fit_choice(cutoff, split, friction)
     with interrupt.at_once():
         from psdmc.calibration.calibrate import CalibrateOptions
-        from psdmc.calibration.description.table_fit import FitChoice
+        from psdmc.calibration.sources import LogNaming
         from psdmc.calibration.verdict.record import verdict_of
         from psdmc.calibration.verdict.said_once import unsaid_warnings
         from psdmc.cli.show_checks import print_accuracy, print_verdict
         from psdmc.report.calibrate_commands import calibrate_command
 
-    check_output(output, model, *logs)
-    check_report(report, model, output, *logs)
+    check_output(output, *given, *(validate or []))
+    check_report(report, output, *given, *(validate or []))
     with steps() as progress:
         record = calibrate_command(
             model,
             logs,
             output,
             report,
-            CalibrateOptions(physical=physical is not False, choice=FitChoice(cutoff=cutoff)),
+            CalibrateOptions(physical=physical is not False, choice=choice),
             parsed_torque_constants(torque_constants),
             actuators,
             progress,
             keep=keep,
+            validation=validate or [],
+            naming=LogNaming(topic or "", parsed_joint_map(joint_map)),
         )
     verdict = verdict_of(record)
     print_verdict(verdict)

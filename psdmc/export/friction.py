@@ -40,8 +40,26 @@ def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
         value = row.get("value")
         if row.get("joint") in joints and isinstance(value, float | int) and math.isfinite(value):
             found.setdefault(row["joint"], {})[row["name"]] = float(value)
-    exponents = kept.get("prediction", {}).get("exponents", ())
-    return {name: _of(values, joints[name], exponents) for name, values in found.items()}
+    law = kept.get("prediction", {})
+    exponents, coupled = law.get("exponents", ()), _coupled(law.get("coupling", ()), list(model.joint_names))
+    return {
+        name: JointFriction(0.0, 0.0, (COUPLED,)) if name in coupled else _of(values, joints[name], exponents)
+        for name, values in found.items()
+    }
+
+
+COUPLED = "friction of motors that drive several joints together"
+
+
+def _coupled(matrix: Sequence[Sequence[float]], names: Sequence[str]) -> set[str]:
+    """Joints that share a motor with another one, of the coupling matrix of the calibration."""
+    return {
+        names[k]
+        for i, row in enumerate(matrix)
+        for j, value in enumerate(row)
+        if i != j and value
+        for k in (i, j)
+    }
 
 
 def _of(values: Mapping[str, float], joint: Joint, exponents: Sequence[float]) -> JointFriction:

@@ -64,6 +64,12 @@ def linear_friction(model: DynamicsModel) -> LinearFriction:
             f"{name}: calibrated by a campaign: its friction is LuGre's, with a state",
             "`psdmc calibrate --actuators DIR` writes it as C",
         )
+    if kept["prediction"].get("coupling"):
+        raise InputError(
+            f"{name}: calibrated with a coupling: its friction is of motors that drive several joints together, which C "
+            "does not have",
+            "leave --friction out; `psdmc show` has its numbers",
+        )
     if model.mechanism.has_followers:
         raise InputError(f"{name}: friction is of joints that follow no other", "lock those that do")
     try:

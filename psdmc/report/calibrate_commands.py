@@ -20,6 +20,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite import Excitation
 from psdmc.calibration.motions.trajectory import write_trajectory
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
+from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
 from psdmc.errors import InputError
@@ -78,6 +79,8 @@ def calibrate_command(
     actuators: str | Path | None = None,
     progress: Progress = silent,
     keep: bool = False,
+    validation: Sequence[str | Path] = (),
+    naming: LogNaming | None = None,
 ) -> Calibration:
     """Calibrate a model file from a campaign or from logs.
 
@@ -85,6 +88,8 @@ def calibrate_command(
     report     an HTML page, with the numbers as JSON beside it
     actuators  a folder for C: friction and motors
     keep       whether model and C are written even where the verdict is `not usable`
+    validation  plain logs that are held out as a whole
+    naming     topic and joint names of plain logs
     """
     known = load(model)
     record = calibrate(
@@ -93,6 +98,8 @@ def calibrate_command(
         options,
         regressor=CompiledWhenAsked(known, progress),
         torque_constants=torque_constants,
+        validation=validation,
+        naming=naming,
         progress=progress,
     )
     if report is not None:

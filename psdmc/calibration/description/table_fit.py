@@ -61,6 +61,16 @@ def _given(table: TomlTable, key: str, low: float, high: float) -> float | None:
     return table.number(key, low, high) if table.has(key) else None
 
 
+def split_of(shares: Sequence[float]) -> SplitOptions | str:
+    """The split of a share, and of a number of blocks where there are two numbers; else what is wrong."""
+    share, blocks = shares[0], shares[1] if len(shares) > 1 else 0.0
+    if len(shares) > 2 or not 0.0 <= share <= LARGEST_HELD_OUT:
+        return f"{', '.join(f'{x:g}' for x in shares)}: expected a share from 0 to {LARGEST_HELD_OUT:g}"
+    if not (0 <= blocks <= MOST_BLOCKS and blocks == int(blocks)):
+        return f"{blocks:g} blocks, expected a whole number from 0 to {MOST_BLOCKS}"
+    return SplitOptions(share, int(blocks))
+
+
 def _split(table: TomlTable) -> SplitOptions:
     usual = LinearOptions().split
     share = table.number("held_out", 0.0, LARGEST_HELD_OUT, usual.held_out)

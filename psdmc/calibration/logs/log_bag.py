@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +40,11 @@ STEPS = 1_000_000
 """Instructions that every bag may take."""
 
 
-def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) -> AnyLog:
+def read_bag(path: Path, topic: str = "", held: int | None = None) -> AnyLog:
     """The joint states of one topic; effort is read as motor torque.
 
     path   a bag's folder, or a bare .db3 or .mcap file of it
+    topic  empty: /joint_states, or the only one of joint states
     held   bytes of rows in memory, beyond which they go to a temporary file and a StoredLog is returned; None: all
 
     Time is each message's header stamp. InputError where the bag is damaged, the topic is missing, or its messages
@@ -59,6 +60,7 @@ def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) 
         elif _packs_messages(file.parent):
             require_packed_messages(file)
     with decoding(str(path), "a ROS 2 bag"):
+        topic = _topic(path, topic)
         names, stamps, store, has_velocity = _kept(path, topic, held)
     name = path.name or str(path)
     n = len(names)
@@ -75,6 +77,39 @@ def read_bag(path: Path, topic: str = "/joint_states", held: int | None = None) 
         date=date_of(float(stamps[0])),
     )
     return log if store.on_disk else log.held()
+
+
+USUAL_TOPIC = "/joint_states"
+MOST_TOPICS = 10_000
+
+
+def _topic(path: Path, wanted: str) -> str:
+    """The topic to read; InputError where joint states are on none, or on several of other names."""
+    found = topics_of(path)
+    if wanted in found or (not wanted and USUAL_TOPIC in found):
+        return wanted or USUAL_TOPIC
+    if not wanted and len(found) == 1:
+        return found[0]
+    has = f"it has them on {listed([quoted(topic) for topic in found])}" if found else "it has none"
+    what = f"on topic {quoted(wanted)}" if wanted else "that could be meant alone"
+    hint = (
+        "name one: --topic, or topic in a log description"
+        if found
+        else "record joint states with positions and efforts"
+    )
+    raise InputError(f"{path}: no {MESSAGE_TYPE} {what}: {has}", hint)
+
+
+def topics_of(path: Path) -> tuple[str, ...]:
+    """The topics of joint states in a bag."""
+    if path.suffix.lower() == ".db3" and not (path.parent / METADATA).exists():
+        return _sqlite_topics(path)
+    _require_rosbags()
+    from rosbags.highlevel import AnyReader
+
+    folder = path if is_folder(path) or path.suffix.lower() == ".mcap" else path.parent
+    with AnyReader([folder]) as reader:
+        return tuple(dict.fromkeys(c.topic for c in reader.connections if c.msgtype == MESSAGE_TYPE))
 
 
 def _kept(path: Path, topic: str, held: int | None) -> tuple[tuple[str, ...], Array, RowStore, bool]:
@@ -169,10 +204,9 @@ def _require_alike(row: Any, number: int, names: tuple[str, ...], path: str) -> 
 
 
 def _messages(path: Path, topic: str) -> Iterator[Any]:
-    try:
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise InputError("ROS 2 bags need rosbags", "pip install 'psdmc[calibrate]'") from error
+    _require_rosbags()
+    from rosbags.typesys import Stores, get_typestore
+
     store = get_typestore(Stores.ROS2_HUMBLE)
     for raw in _raw_messages(path, topic):
         if len(raw) > LARGEST_MESSAGE:
@@ -181,6 +215,13 @@ def _messages(path: Path, topic: str) -> Iterator[Any]:
                 "record the joints' states alone on that topic",
             )
         yield store.deserialize_cdr(raw, MESSAGE_TYPE)
+
+
+def _require_rosbags() -> None:
+    try:
+        import rosbags.typesys  # noqa: F401
+    except ImportError as error:
+        raise InputError("ROS 2 bags need rosbags", "pip install 'psdmc[calibrate]'") from error
 
 
 LARGEST_MESSAGE = 1024**2
@@ -201,13 +242,19 @@ def _raw_messages(path: Path, topic: str) -> Iterator[bytes]:
             yield bytes(raw)
 
 
-def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
-    """Blobs of a bag's table `messages`; InputError for a view of that name, whose evaluation might never end."""
+def _sqlite_topics(path: Path) -> tuple[str, ...]:
+    """Topics of joint states in a bag's table `topics`."""
+    with _opened_sqlite(path) as connection:
+        found = connection.execute(
+            "SELECT name FROM topics WHERE type = ? LIMIT ?", (MESSAGE_TYPE, MOST_TOPICS)
+        )
+        return tuple(dict.fromkeys(str(name) for (name,) in found))
+
+
+@contextmanager
+def _opened_sqlite(path: Path) -> Iterator[sqlite3.Connection]:
+    """A bag as the SQLite file it is; InputError for views of its tables' names, whose evaluation might never end."""
     tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('messages', 'topics')"
-    query = (
-        "SELECT data FROM messages JOIN topics ON topics.id = messages.topic_id "
-        "WHERE topics.name = ? AND topics.type = ? ORDER BY messages.timestamp, messages.id"
-    )
     with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
         connection.execute("PRAGMA trusted_schema = OFF")
         connection.set_progress_handler(lambda: 1, STEPS + STEPS_PER_BYTE * path.stat().st_size)
@@ -216,6 +263,16 @@ def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
                 f"{path}: not a ROS 2 bag: no tables 'messages' and 'topics'",
                 "give a .db3 or .mcap file that ros2 bag recorded, or its folder",
             )
+        yield connection
+
+
+def _sqlite_messages(path: Path, topic: str) -> Iterator[bytes]:
+    """Blobs of a bag's table `messages`."""
+    query = (
+        "SELECT data FROM messages JOIN topics ON topics.id = messages.topic_id "
+        "WHERE topics.name = ? AND topics.type = ? ORDER BY messages.timestamp, messages.id"
+    )
+    with _opened_sqlite(path) as connection:
         for (data,) in connection.execute(query, (topic, MESSAGE_TYPE)):
             if not isinstance(data, bytes):
                 raise InputError(

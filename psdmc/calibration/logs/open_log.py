@@ -23,17 +23,20 @@ SMALL_FILE = 64 * 1024**2
 """Bytes of a table that is read at once."""
 
 
-def open_log(path: str | Path, progress: Progress = lambda step: None, held: int = HELD_BYTES) -> AnyLog:
+def open_log(
+    path: str | Path, progress: Progress = lambda step: None, held: int = HELD_BYTES, topic: str = ""
+) -> AnyLog:
     """A log of any size from a file that read_log takes.
 
     held      bytes of rows in memory; where there are more, they go to a temporary file and a StoredLog is returned
     progress  called with how much of a large file has been read
+    topic     of a bag's joint states; empty: its only one, or /joint_states
 
     InputError as of read_log.
     """
     path = Path(path)
     if path.suffix.lower() in BAGS or is_folder(path):
-        return read_bag(path, held=held)
+        return read_bag(path, topic, held)
     require_format(path)
     with opened(path, LARGEST_STORED) as file:
         size = file.seek(0, 2)

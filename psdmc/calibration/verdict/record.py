@@ -249,9 +249,17 @@ def linear_record(
                 options.offset,
                 coupling=options.coupling,
             ),
-            notes=weak_notes("linear fit", problem.names, seen),
+            notes=(*_coupled_notes(options), *weak_notes("linear fit", problem.names, seen)),
         ),
         values[: model.l],
+    )
+
+
+def _coupled_notes(options: LinearOptions) -> tuple[str, ...]:
+    if not options.coupling:
+        return ()
+    return (
+        "friction is of the motors, which are called like the joints: some of them drive several together",
     )
 
 

@@ -1,0 +1,54 @@
+"""`psdmc calibrate --describe`: from logs, and a model where one is given, to the draft of a log description."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from psdmc.atomic import write_whole
+from psdmc.calibration.campaign_file import is_campaign
+from psdmc.calibration.description.draft import drafted
+from psdmc.calibration.logs.table_files import column_names
+from psdmc.errors import InputError
+from psdmc.model.load import load
+
+MODEL_ARRAYS = {"manifest", "B"}
+"""Arrays that model files have and logs do not."""
+
+
+def describe_command(
+    given: Sequence[str | Path], output: str | Path, topic: str = ""
+) -> tuple[Path | None, tuple[str, ...]]:
+    """Write a description's draft; returns the model among the paths, and quantities without a column.
+
+    given   paths of logs, the first one perhaps a model file, whose joints are then described
+
+    InputError where a log cannot be read, or there is a file of the output's name.
+    """
+    paths, output = [Path(path) for path in given], Path(output)
+    model = paths.pop(0) if is_model_file(paths[0]) else None
+    if not paths:
+        raise InputError(
+            f"{model}: a model, and no log to describe", "psdmc calibrate --describe MODEL.npz LOG"
+        )
+    for path in paths:
+        if is_campaign(path):
+            raise InputError(
+                f"{path}: no log, but a campaign or a description", "give a log: a table or a bag"
+            )
+    if output.exists() or output.is_symlink():
+        raise InputError(f"{output}: exists already, and is left as it is", "give another name: -o FILE.toml")
+    names = None if model is None else load(model).joint_names
+    draft = drafted(paths, output, names, topic)
+    write_whole(output, draft.text)
+    return model, draft.missing
+
+
+def is_model_file(path: Path) -> bool:
+    """Whether a file is an .npz with a model's arrays."""
+    if path.suffix.lower() != ".npz" or not path.is_file():
+        return False
+    try:
+        return set(column_names(path)) >= MODEL_ARRAYS
+    except InputError:
+        return False
