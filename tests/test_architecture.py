@@ -85,11 +85,12 @@ OUTSIDE = {
 ROOMS = {
     "calibration": {
         "logs": set(),
-        "identify": {"logs"},
+        "columns": {"logs"},
+        "identify": {"logs", "columns"},
         "description": {"logs", "identify"},
         "motions": {"logs", "identify"},
         "plant": {"logs", "identify", "motions"},
-        "verdict": {"logs", "identify"},
+        "verdict": {"logs", "columns", "identify"},
     },
     "lower": {"expanded": set()},
 }

@@ -106,6 +106,7 @@ def _require_plain(
     given = [flag for flag, value in options.choice.by_flag().items() if value is not None]
     given += ["--validate"] if validation else []
     given += naming.flags
+    given += [f"[{name}]" for name in options.linear.tables]
     if given:
         are = "is" if len(given) == 1 else "are"
         raise InputError(
@@ -169,8 +170,8 @@ def calibrate_logs(
 ) -> Calibration:
     """The result of one linear fit: theta_b, friction and offsets as one vector."""
     motors = motors_of_logs(model.joint_names, logs, torque_constants)
+    linear = options.linear.for_robot(model.mechanism)
     progress("linear fit")
-    linear = options.linear
     found = calibrate_linear(
         model.mechanism, regressor, model.l, logs, linear, motors, model.theta_b, progress
     )
@@ -181,8 +182,8 @@ def calibrate_logs(
     )
 
     def consistent() -> Calibration:
-        bounded = found.problem.never_negative
-        near = nearest_physical(model, solved.values, solved.whitening, bounded, options.consistency)
+        bounded, limits = found.problem.never_negative, found.problem.limits
+        near = nearest_physical(model, solved.values, solved.whitening, bounded, options.consistency, limits)
         record = with_data(linear_record(model, found, near.values, linear), logs)
         return judged_record(record, logs, plain, near.distance, linear.check)
 

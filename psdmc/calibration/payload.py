@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.calibration.identify.least_squares import Estimate
 from psdmc.calibration.identify.linear_fit import LinearOptions, friction_names
@@ -17,12 +18,13 @@ from psdmc.calibration.identify.physical_load import about_centre, nearest_load
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.quality import qualities
 from psdmc.calibration.identify.visibility import IDENTIFIED, WEAK, Visibility, visibility
+from psdmc.calibration.logs.filter import States
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.open_log import open_log
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.payload_found import PayloadFound, load_numbers
-from psdmc.calibration.verdict.delivered import delivered
+from psdmc.calibration.verdict.delivered import beside, delivered
 from psdmc.calibration.verdict.verdict import JointFigures, Verdict
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.errors import InputError
@@ -84,6 +86,7 @@ def identify_payload(
         friction if same_law else None,
         known,
         progress,
+        _beside(model),
     )
     return _result(model, place.name, found, checked_logs, known)
 
@@ -114,6 +117,19 @@ def _of_calibration(
         coupling=law.coupling,
     )
     return std, options, friction, found.constants or None
+
+
+def _beside(model: DynamicsModel) -> Callable[[States, NDArray[np.intp]], Array] | None:
+    """The torque of what the model's calibration found beside rigid bodies and plain friction."""
+    if not isinstance(model.provenance.get("calibration"), Mapping):
+        return None
+    found = delivered(model)
+    if found.columns.by_load:
+        raise InputError(
+            f"{model.mechanism.name}: friction that grows with the load: a load is not told apart from it",
+            "calibrate the robot without `load` in [friction]",
+        )
+    return beside(found, np.ones(len(found.columns), dtype=bool))
 
 
 def _result(

@@ -214,6 +214,7 @@ def emit_c(
     from psdmc.cli.one_line import one_line
     from psdmc.emit.names import identifier
     from psdmc.lower.admitted import run_time_only
+    from psdmc.model.linear_friction import beyond_friction
     from psdmc.model.load import load
 
     found = load(model)
@@ -241,6 +242,8 @@ def emit_c(
         print(f"note: in C '{one_line(asked)}' is {identifier(asked)}")
     for note in run_time_only(found, wanted):
         print(f"note: {note}")
+    for what in beyond_friction(found):
+        print(f"note: not in the package, though calibrated: {what}; add its torque to inverse dynamics'")
     say_next("build", folder)
 
 

@@ -27,6 +27,8 @@ def print_calibration(kept: Mapping[str, Any]) -> None:
     if len(logs) > MOST_LOGS:
         print(f"and {len(logs) - MOST_LOGS} more logs")
     print_table(_joints(kept))
+    if kept.get("springs"):
+        print_table(_springs(kept["springs"]))
     print()
 
 
@@ -51,6 +53,12 @@ def _joints(kept: Mapping[str, Any]) -> Table:
         figures = [_number(held_out.get("r2"), ".4f"), _number(held_out.get("rmse"), ".3g")]
         rows.append((joint, *figures, *(_row(by_joint.get((joint, name))) for name, _ in names)))
     return Table(("joint", "R^2 held out", "RMSE held out", *heads), rows)
+
+
+def _springs(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """A line for each value of a spring."""
+    each = [(one_line(row["spring"]), row["name"], _row(row), row["unit"]) for row in rows]
+    return Table(("spring", "value", "found", "unit"), each)
 
 
 def _row(row: Mapping[str, Any] | None) -> str:

@@ -75,6 +75,8 @@ def _of(values: Mapping[str, float], joint: Joint, exponents: Sequence[float]) -
         lost.append(
             f"a viscous law that is no line (the line nearest to it up to {top:.3g} {joint.type.position_unit}/s is)"
         )
+    if any(name.startswith(("stribeck_", "load_friction", "coulomb_asymmetry")) for name in values):
+        lost.append("Stribeck effect, asymmetry and load dependence of friction")
     if values.get("offset"):
         lost.append("the constant torque (offset)")
     if constant < 0.0 or damping < 0.0:

@@ -1,10 +1,11 @@
-"""Friction of a model that was calibrated from one log: Coulomb, viscous terms and a constant, per joint."""
+"""Friction of a model that was calibrated from one log: Coulomb, viscous terms and a constant, per joint; where they were
+fitted, Coulomb friction that differs between the directions and the Stribeck effect."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,16 +21,26 @@ Array = NDArray[np.float64]
 MOST_TERMS = 8
 """Viscous terms of a joint: fits have one or two."""
 LARGEST_EXPONENT = 8.0
+ASYMMETRY = "coulomb_asymmetry"
+STRIBECK = "stribeck_"
+"""Before a Stribeck velocity in the name of a value."""
+LOAD = "load_friction"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearFriction:
-    """Friction torque of n joints:  tanh(v / sign_speed) (coulomb + sum over k of viscous[k] |v|^exponents[k]) + offset.
+    """Friction torque of n joints, with s = tanh(v / sign_speed):
+
+    s (coulomb + sum over k of viscous[k] |v|^exponents[k] + sum over k of stribeck[k] exp(-(v / stribeck_speeds[k])^2))
+    + |s| asymmetry + offset
 
     coulomb, offset  (n,)    N m (N)
     viscous          (n, k)  N m (s/rad)^d
     exponents        k of them, not negative
     sign_speed       rad/s (m/s) over which friction changes sign, so that it is smooth
+    asymmetry        (n,)    N m (N); empty where no joint has one
+    stribeck         (n, k)  N m (N), at k stribeck_speeds, rad/s (m/s); both empty where no joint has it
+    beyond           what else the calibration found beside rigid bodies, in words without names
     """
 
     coulomb: Array
@@ -37,6 +48,10 @@ class LinearFriction:
     offset: Array
     exponents: tuple[float, ...]
     sign_speed: float
+    asymmetry: Array = field(default_factory=lambda: np.zeros(0))
+    stribeck: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    stribeck_speeds: tuple[float, ...] = ()
+    beyond: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.coulomb)
@@ -44,12 +59,32 @@ class LinearFriction:
         object.__setattr__(self, "offset", frozen_array(self.offset, (n,), "offset"))
         shape = (n, len(self.exponents))
         object.__setattr__(self, "viscous", frozen_array(self.viscous, shape, "viscous"))
+        uneven = (n if len(self.asymmetry) else 0,)
+        object.__setattr__(self, "asymmetry", frozen_array(self.asymmetry, uneven, "asymmetry"))
+        peaks = (n, len(self.stribeck_speeds)) if self.stribeck_speeds else (0, 0)
+        object.__setattr__(self, "stribeck", frozen_array(self.stribeck, peaks, "stribeck"))
 
     def torque(self, qd: ArrayLike) -> Array:
         """(..., n) N m (N) at speeds (..., n), to be added to what the rigid bodies take."""
         v = np.asarray(qd, dtype=np.float64)
         size = self.coulomb + sum(self.viscous[:, k] * np.abs(v) ** d for k, d in enumerate(self.exponents))
-        return np.asarray(np.tanh(v / self.sign_speed) * size + self.offset)
+        for k, speed in enumerate(self.stribeck_speeds):
+            size = size + self.stribeck[:, k] * np.exp(-((v / speed) ** 2))
+        sign = np.tanh(v / self.sign_speed)
+        uneven = np.abs(sign) * self.asymmetry if len(self.asymmetry) else 0.0
+        return np.asarray(sign * size + uneven + self.offset)
+
+
+def beyond_friction(model: DynamicsModel) -> tuple[str, ...]:
+    """What a calibration found that neither rigid bodies nor `linear_friction` have, in words without names; none where
+    the model was not calibrated."""
+    kept = model.provenance.get("calibration")
+    if not isinstance(kept, Mapping):
+        return ()
+    springs = len({str(row.get("spring")) for row in kept.get("springs", [])})
+    joints = sum(row.get("name") == LOAD for row in kept.get("friction", []))
+    by_load = f"friction that grows with the load, of {joints} joint(s)" if joints else ""
+    return tuple(filter(None, (f"{springs} spring(s)" if springs else "", by_load)))
 
 
 def linear_friction(model: DynamicsModel) -> LinearFriction:
@@ -73,7 +108,7 @@ def linear_friction(model: DynamicsModel) -> LinearFriction:
     if model.mechanism.has_followers:
         raise InputError(f"{name}: friction is of joints that follow no other", "lock those that do")
     try:
-        return _read(kept, model.joint_names)
+        return replace(_read(kept, model.joint_names), beyond=beyond_friction(model))
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"{name}: the friction in the model file is damaged: {error}", "calibrate again"
@@ -98,7 +133,30 @@ def _read(kept: Mapping[str, Any], joints: tuple[str, ...]) -> LinearFriction:
         offset=np.array([values.get((joint, "offset"), 0.0) for joint in joints]),
         exponents=exponents,
         sign_speed=speed,
+        **_further(values, joints),
     )
+
+
+def _further(values: Mapping[tuple[str, str], float], joints: tuple[str, ...]) -> dict[str, Any]:
+    """Asymmetry and the Stribeck effect, which only some joints may have; nothing where none has."""
+    names = {name for _, name in values}
+    found: dict[str, Any] = {}
+    if ASYMMETRY in names:
+        found["asymmetry"] = np.array([values.get((joint, ASYMMETRY), 0.0) for joint in joints])
+    speeds = sorted(_stribeck_speed(name) for name in names if str(name).startswith(STRIBECK))
+    if len(speeds) > MOST_TERMS:
+        raise ValueError(f"{len(speeds)} Stribeck velocities")
+    if speeds:
+        peaks = [[values.get((joint, f"{STRIBECK}{v!r}"), 0.0) for v in speeds] for joint in joints]
+        found |= {"stribeck": np.array(peaks), "stribeck_speeds": tuple(speeds)}
+    return found
+
+
+def _stribeck_speed(name: str) -> float:
+    speed = float(name.removeprefix(STRIBECK))
+    if not 0.0 < speed < math.inf or f"{STRIBECK}{speed!r}" != name:
+        raise ValueError(f"a Stribeck velocity is {shown(name)}")
+    return speed
 
 
 def _finite(value: object, what: str) -> float:

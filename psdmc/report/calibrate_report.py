@@ -62,6 +62,7 @@ class ReportView:
     accuracy_table: str
     parameter_table: str
     joint_table: str
+    spring_table: str
     fact_table: str
     figures: tuple[FigureView, ...]
 
@@ -97,6 +98,7 @@ def report_html(record: Calibration, found: Excitation | None = None) -> str:
         accuracy_table=accuracy_table(record),
         parameter_table=parameter_table(record),
         joint_table=joint_table(record),
+        spring_table=spring_table(record),
         fact_table=fact_table(record),
         figures=tuple(figures),
     )
@@ -206,6 +208,14 @@ def joint_table(record: Calibration) -> str:
     head = ["Joint", *(f"{name.replace('_', ' ')} [{units[name]}]" for name in names)]
     rows = [[joint, *(_number(by_key.get((joint, name))) for name in names)] for joint in record.joint_names]
     return table(head, rows)
+
+
+def spring_table(record: Calibration) -> str:
+    """Values of springs; empty where the fit has none."""
+    if not record.springs:
+        return ""
+    rows = [[row.joint, row.name, _number(row), row.unit] for row in record.springs]
+    return table(["Spring", "Quantity", "Value", "Unit"], rows)
 
 
 def _number(row: NumberRow | None) -> str:

@@ -75,6 +75,52 @@ def test_c_is_the_formula(arm: DynamicsModel, real: str, limit: float, tmp_path:
         assert np.array_equal(qd, tau_f)
 
 
+ASYMMETRY, PEAK, SLOW = np.array([0.5, -0.3]), np.array([0.6, 0.25]), 0.0123456789
+
+
+def uneven(model: DynamicsModel) -> DynamicsModel:
+    """With an asymmetry and a Stribeck effect at the first joint, and a spring, which is no friction."""
+    kept = with_friction(model).provenance["calibration"]
+    joints = model.joint_names
+    further = [
+        {"joint": joint, "name": "coulomb_asymmetry", "value": float(ASYMMETRY[k])}
+        for k, joint in enumerate(joints)
+    ]
+    further.append({"joint": joints[0], "name": f"stribeck_{SLOW!r}", "value": float(PEAK[0])})
+    springs = [{"spring": "*/ x", "name": "stiffness", "value": 1.0}]
+    whole = {**kept, "friction": [*kept["friction"], *further], "springs": springs}
+    return replace(model, provenance={**model.provenance, "calibration": whole})
+
+
+@pytest.mark.parametrize(("real", "limit"), [("float64", 1e-14), ("float32", 2e-6)])
+def test_asymmetry_and_stribeck_in_c(real: str, limit: float, tmp_path: Path) -> None:
+    view = package(uneven(bundled_model("two_link_full")), real)
+    library = Direct(view, shared_library(view, tmp_path, ["-O1"]))
+    peak = PEAK * [1.0, 0.0]
+    for v in np.vstack([np.zeros(2), 0.02 * np.random.default_rng(0).normal(size=(20, 2)), [[1.0, -1.0]]]):
+        qd, tau_f = v.astype(real), np.empty(2, real)
+        library("friction", qd, tau_f)
+        at = qd.astype(float)
+        sign = np.tanh(at / SIGN_SPEED)
+        expected = formula(at) + sign * peak * np.exp(-((at / SLOW) ** 2)) + np.abs(sign) * ASYMMETRY
+        assert np.abs(tau_f - expected).max() < limit * 4.0
+    header = (tmp_path / "include" / "arm" / "arm.h").read_text(encoding="utf-8")
+    assert "what this function does not have: 1 spring(s). */" in header
+    assert "*/ x" not in header
+
+
+@pytest.mark.parametrize(
+    "name", ["stribeck_", "stribeck_inf", "stribeck_-1.0", "stribeck_1e-3", "stribeck_*/"]
+)
+def test_a_forged_stribeck_velocity_is_refused(name: str) -> None:
+    model = with_friction(bundled_model("two_link_full"))
+    kept = model.provenance["calibration"]
+    rows = [*kept["friction"], {"joint": model.joint_names[0], "name": name, "value": 1.0}]
+    forged = {**model.provenance, "calibration": {**kept, "friction": rows}}
+    with pytest.raises(InputError, match="damaged"):
+        package(replace(model, provenance=forged))
+
+
 MAIN = """
 #include <cstdio>
 #include "arm/arm.hpp"

@@ -6,7 +6,7 @@ Each top-level key is a Table with a file of its own; `tables.TABLES` lists them
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -40,7 +40,7 @@ class LogDescription:
         """The linear fit's options with what all tables say."""
         for table in TABLES:
             options = table.options(options, self.part(table))
-        return options
+        return replace(options, tables_from=str(self.path))
 
 
 def read_description(path: str | Path, joint_names: tuple[str, ...] | None = None) -> LogDescription:

@@ -12,6 +12,7 @@ from psdmc.calibration.description.table_joints import JOINTS
 from psdmc.calibration.description.table_logs import LOGS
 from psdmc.calibration.description.table_quantities import EFFORT, POSITION, VELOCITY
 from psdmc.calibration.description.table_time import TIME
+from psdmc.calibration.description.tables_of_columns import FRICTION, SPRINGS
 
 TABLES: tuple[Table[Any], ...] = (
     LOGS,
@@ -23,4 +24,6 @@ TABLES: tuple[Table[Any], ...] = (
     JOINTS,
     COUPLING,
     FIT,
+    SPRINGS,
+    FRICTION,
 )

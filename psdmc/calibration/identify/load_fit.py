@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from psdmc.calibration.identify.linear_rows import Block
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
-from psdmc.calibration.logs.filter import smoothed_rows, stretches
+from psdmc.calibration.logs.filter import States, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.errors import InputError
@@ -75,18 +75,23 @@ def fit_load(
     friction: Array | None,
     theta_std: Array,
     progress: Progress,
+    beside: Callable[[States, NDArray[np.intp]], Array] | None = None,
 ) -> LoadFit:
     """The load and the friction that explain what the model without the load leaves of checked logs' torques.
 
     onto_theta  (l, 10) theta_b that a load adds (psdmc.model.payload.load_map)
     friction    (n, f) the model's own, in the order of friction_names; None: unknown
     theta_std   (l,) standard deviations of the model's theta_b, taken as independent; zero where it has none
+    beside      (rows, n) torque at rows of states that the model has beside rigid bodies and plain friction; None: none
     """
     chain = model.mechanism
     load = LoadRegressor(regressor, onto_theta)
     problem, _ = linear_problem(chain, load, LOAD, logs, options, motors, progress)
     known = _known_columns(regressor, logs, options)
     rigid = known @ model.known_theta_b()
+    if beside is not None:
+        each = (stretches(log, options.filter, options.check, options.stretch) for log in logs)
+        rigid = rigid + np.concatenate([beside(part.states, part.at) for parts in each for part in parts])
     used = np.flatnonzero(theta_std > 0.0)
     blocks = _considering(problem, known[:, :, used])
     sizes = torque_sizes(problem.torque[~problem.held_out])

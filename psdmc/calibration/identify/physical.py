@@ -72,21 +72,26 @@ def nearest_physical(
     whitening: Array,
     never_negative: NDArray[np.bool_] | None = None,
     options: PhysicalOptions | None = None,
+    limits: Array | None = None,
 ) -> Physical:
     """The parameters that a real robot could have, nearest to an estimate of the whole vector.
 
     values          (l + k,)  theta_b and whatever was estimated with it, friction and offsets
     whitening       (l + k, l + k)  W: the cost of v is |W (v - values)|^2, in variances (Estimate.whitening)
     never_negative  (l + k,)  entries that may not be negative
+    limits          (m, l + k)  whose products with the vector may not be negative either
 
     For a linear fit that cost is what v adds to its sum of squares: one problem with its weights, and the prior where
     the data show nothing. Raises InputError where cvxpy is missing, NotPhysical where no solution is found.
     """
     cp: Any = require_cvxpy()
     bounded = np.zeros(len(values), dtype=bool) if never_negative is None else never_negative
+    sides = np.zeros((0, len(values))) if limits is None else limits
     for k, share in enumerate(EASED):
         try:
-            near = _nearest(cp, model, values, share * whitening, bounded, options or PhysicalOptions())
+            near = _nearest(
+                cp, model, values, share * whitening, bounded, sides, options or PhysicalOptions()
+            )
         except NotPhysical:
             if k == len(EASED) - 1:
                 raise
@@ -107,6 +112,7 @@ def _nearest(
     values: Array,
     whitening: Array,
     bounded: NDArray[np.bool_],
+    limits: Array,
     options: PhysicalOptions,
 ) -> Physical:
     """The solution of one attempt; NotPhysical where the solver finds none, or one that is not physical."""
@@ -126,6 +132,10 @@ def _nearest(
     if extra is not None and bounded[l:].any():
         held = np.flatnonzero(bounded[l:])
         constraints.append(extra[held] >= -values[l:][held] / size[held])
+    if extra is not None and len(limits):
+        constraints.append(
+            limits[:, :l] @ theta + (limits[:, l:] * size) @ extra >= -limits[:, l:] @ values[l:]
+        )
     settle = SETTLING * cp.sum_squares(inner - known_inner(model))
     problem = cp.Problem(cp.Minimize(loss + settle + divergence), constraints)
     with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; the result is checked below

@@ -35,6 +35,7 @@ class Prediction:
     exponents   of the viscous terms, linear law;  offset  whether each joint has one
     coupling    C of q_joint = C q_motor, linear law: friction is of motors; empty: of joints
     runs        constants of the friction runs by joint, LuGre
+    columns     tables of springs and further friction, linear law (columns.read_columns)
     """
 
     law: Law
@@ -44,20 +45,25 @@ class Prediction:
     offset: bool = False
     runs: Mapping[str, FrictionRunConstants] = field(default_factory=dict)
     coupling: Matrix = ()
+    columns: Mapping[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """Plain values, which read back the same."""
-        return {
-            "law": self.law,
-            "steps": {
-                name: {"filter": asdict(step.filter), "split": asdict(step.split)}
-                for name, step in self.steps.items()
-            },
-            "sign_speed": self.sign_speed,
-            "exponents": list(self.exponents),
-            "offset": self.offset,
-            "runs": {joint: asdict(constants) for joint, constants in self.runs.items()},
-        } | ({"coupling": [list(row) for row in self.coupling]} if self.coupling else {})
+        return (
+            {
+                "law": self.law,
+                "steps": {
+                    name: {"filter": asdict(step.filter), "split": asdict(step.split)}
+                    for name, step in self.steps.items()
+                },
+                "sign_speed": self.sign_speed,
+                "exponents": list(self.exponents),
+                "offset": self.offset,
+                "runs": {joint: asdict(constants) for joint, constants in self.runs.items()},
+            }
+            | ({"coupling": [list(row) for row in self.coupling]} if self.coupling else {})
+            | ({"columns": self.columns} if self.columns else {})
+        )
 
 
 def prediction_from_json(kept: Mapping[str, Any]) -> Prediction:
@@ -68,6 +74,7 @@ def prediction_from_json(kept: Mapping[str, Any]) -> Prediction:
     }
     runs = {joint: FrictionRunConstants(**constants) for joint, constants in kept["runs"].items()}
     coupling = tuple(tuple(map(float, row)) for row in kept.get("coupling", ()))
+    exponents, columns = tuple(kept["exponents"]), kept.get("columns", {})
     return Prediction(
-        kept["law"], steps, kept["sign_speed"], tuple(kept["exponents"]), kept["offset"], runs, coupling
+        kept["law"], steps, kept["sign_speed"], exponents, kept["offset"], runs, coupling, columns
     )

@@ -6,14 +6,17 @@ The regressor is not used where one log was fitted: torques come from Newton-Eul
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from psdmc.calibration.columns.columns import Columns, read_columns
 from psdmc.calibration.identify.coupling import coupling_of
+from psdmc.calibration.identify.extra import motion_of
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.friction import FrictionResult, judge_friction, prepared_runs
 from psdmc.calibration.identify.friction_fit import JointFriction
@@ -44,12 +47,15 @@ class Delivered:
 
     friction         by joint and parameter name
     constants        N m/A by joint, empty where torques were logged
+    columns, extra   springs and further friction, and their values (m,)
     """
 
     model: DynamicsModel
     prediction: Prediction
     friction: Mapping[tuple[str, str], float]
     constants: Mapping[str, float]
+    columns: Columns = field(default_factory=Columns)
+    extra: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def theta_b(self) -> Array:
@@ -73,12 +79,40 @@ def delivered(model: DynamicsModel) -> Delivered:
             f"the model of '{model.mechanism.name}' holds no calibration that torques can be predicted from",
             "run `psdmc calibrate` first",
         )
-    return Delivered(
-        model,
-        prediction_from_json(kept["prediction"]),
-        {(row["joint"], row["name"]): float(row["value"]) for row in kept["friction"]},
-        {row["joint"]: float(row["value"]) for row in kept["motors"]},
-    )
+    prediction = prediction_from_json(kept["prediction"])
+    columns = read_columns(prediction.columns, model.mechanism, model.mechanism.name, prediction.offset)
+    friction = {(row["joint"], row["name"]): float(row["value"]) for row in kept["friction"]}
+    springs = {(row["spring"], row["name"]): float(row["value"]) for row in kept.get("springs", [])}
+    extra = [
+        (springs if sprung else friction)[unknown.owner, unknown.name]
+        for unknown, sprung in zip(columns.unknowns, columns.of_springs.tolist(), strict=True)
+    ]
+    constants = {row["joint"]: float(row["value"]) for row in kept["motors"]}
+    return Delivered(model, prediction, friction, constants, columns, np.array(extra, dtype=np.float64))
+
+
+def sprung(found: Delivered) -> Callable[[States, NDArray[np.intp]], Array] | None:
+    """(rows, n) torque of the springs alone, filtered like a log's, as a function of states and rows; None where there are
+    none."""
+    return beside(found, found.columns.of_springs)
+
+
+def beside(found: Delivered, held: NDArray[np.bool_]) -> Callable[[States, NDArray[np.intp]], Array] | None:
+    """The same of some of the extra columns (m,), none of which depends on the load."""
+    if not held.any():
+        return None
+    values = np.where(held, found.extra, 0.0)
+
+    def torque(states: States, at: NDArray[np.intp]) -> Array:
+        def rows(own: slice) -> Array:
+            law = found.prediction
+            q, qd = states.q[own], states.qd[own]
+            motion = motion_of(q, qd, law.sign_speed, coupling=coupling_of(law.coupling))
+            return np.asarray(found.columns.values(motion) @ values)
+
+        return smoothed_rows(states, at, rows)
+
+    return torque
 
 
 def reread(model: DynamicsModel) -> DynamicsModel:
@@ -128,7 +162,7 @@ def _log_parts(
 
 
 def _torque(found: Delivered, states: States, rows: slice) -> Array:
-    """(rows, n) motor torque before the filter: rigid bodies and friction."""
+    """(rows, n) motor torque before the filter: rigid bodies, friction, springs."""
     q, qd, qdd = states.q[rows], states.qd[rows], states.qdd[rows]
     rigid = recursive.torques(found.model.mechanism, found.model.standard_parameters(), [q, qd, qdd])
     law = found.prediction
@@ -136,10 +170,11 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
     speed = qd if coupling is None else coupling.to_motors(qd)
     terms = friction_terms(speed, law.sign_speed, law.exponents, law.offset)
     names = friction_names(law.exponents, law.offset)
+    extra = found.columns.values(motion_of(q, qd, law.sign_speed, rigid, coupling)) @ found.extra
     for name, term in zip(names, terms, strict=True):
         torque = term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
         rigid = rigid + (torque if coupling is None else coupling.torque_of_joints(torque))
-    return rigid
+    return np.asarray(rigid + extra)
 
 
 def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:

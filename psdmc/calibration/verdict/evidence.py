@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.calibration.identify.coupling import Coupling
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.logs.filter import stretches
+from psdmc.calibration.logs.filter import States, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import FilterOptions
@@ -22,6 +23,10 @@ SIGN_SPEED = 0.03
 """rad/s over which Coulomb friction changes sign, as in the linear fit."""
 MOST_ROWS = 4000
 """Samples that a verdict uses; longer logs are thinned further, evenly."""
+
+
+Torque = Callable[[States, NDArray[np.intp]], Array]
+"""(rows, n) N m (N) at rows of a log's states."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +45,7 @@ class Evidence:
     regressor   of the model
     q, qd, qdd  (N, n)
     sign        (N, n)  smooth sign of the motors' speed, filtered like the torque: Coulomb friction's column
-    torque      (N, n)  of the motors, N m (N), filtered, without what the tool weighs
+    torque      (N, n)  of the motors, N m (N), filtered, without what the tool weighs and springs take
     noise       (n,)    RMS of the sensor noise that passes the filter, from what lies above its cut-off
     coupling    of the motors that drive several joints together; None: motor k drives joint k
     """
@@ -123,16 +128,25 @@ def evidence_of(
     motors: Motors,
     options: FilterOptions,
     coupling: Coupling | None = None,
+    springs: Torque | None = None,
 ) -> Evidence:
-    """Samples of all motions, one after the other; InputError where a log cannot be used."""
-    parts = [_samples(model, motion, motors, options, coupling) for motion in motions]
+    """Samples of all motions, one after the other; InputError where a log cannot be used.
+
+    springs   their torque (rows, n) at rows of states; it is taken off, as what a tool weighs. None: no springs
+    """
+    parts = [_samples(model, motion, motors, options, coupling, springs) for motion in motions]
     q, qd, qdd, sign, torque = (np.concatenate(x) for x in zip(*(part[:5] for part in parts), strict=True))
     noise = np.sqrt(np.mean([part[5] ** 2 for part in parts], axis=0))
     return Evidence(model, regressor, q, qd, qdd, sign, torque, noise, coupling).thinned(MOST_ROWS)
 
 
 def _samples(
-    model: DynamicsModel, motion: Motion, motors: Motors, options: FilterOptions, coupling: Coupling | None
+    model: DynamicsModel,
+    motion: Motion,
+    motors: Motors,
+    options: FilterOptions,
+    coupling: Coupling | None,
+    springs: Torque | None,
 ) -> tuple[Array, Array, Array, Array, Array, Array]:
     """For one motion: q, qd, qdd, sign and torque of its samples, and the RMS noise that passes the filter if noise has
     the same density below the cut-off as above."""
@@ -145,6 +159,8 @@ def _samples(
         torque = motors.torque(states.effort)[at]
         if motion.tool is not None:
             torque = torque - payload_torque(model.mechanism, states.q[at], motion.tool.mass, motion.tool.com)
+        if springs is not None:
+            torque = torque - springs(states, at)
         own = slice(at[0], at[-1] + 1)
         above += np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
         count += at[-1] + 1 - at[0]

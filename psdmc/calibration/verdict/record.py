@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.calibration.identify.four_steps import FourSteps
 from psdmc.calibration.identify.linear_fit import LinearOptions, LinearResult
@@ -76,6 +77,7 @@ class Calibration:
     notes       remarks without consequences for its use
     facts       plain values: ranks, condition numbers, singular values, delay, options
     verdict     whether it can be used; None before it was judged
+    springs     values of springs, whose names stand in place of a joint's
     """
 
     robot: str
@@ -91,36 +93,42 @@ class Calibration:
     prediction: Prediction | None = None
     notes: tuple[str, ...] = ()
     verdict: Verdict | None = None
+    springs: tuple[NumberRow, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Plain values; numbers that are not finite become null."""
         judged = {} if self.verdict is None else {"verdict": self.verdict.as_json()}
-        return judged | {
-            "robot": self.robot,
-            "method": self.method,
-            "joints": list(self.joint_names),
-            "base_parameters": [
-                {
-                    "name": row.name,
-                    "group": row.group,
-                    "value": row.value,
-                    "std": _finite(row.std),
-                    "relative": _finite(row.relative),
-                    "unit": row.unit,
-                    "equation": row.equation,
-                    "identifiable": row.identifiable,
-                    "visibility": row.visibility,
-                }
-                for row in self.parameters
-            ],
-            "motors": [_number(row) for row in self.motors],
-            "friction": [_number(row) for row in self.friction],
-            "quality": {step.step: _quality(step) for step in self.steps},
-            "warnings": list(self.warnings),
-            "notes": list(self.notes),
-            "prediction": None if self.prediction is None else self.prediction.as_json(),
-            "facts": self.facts,
-        }
+        sprung = {"springs": [_spring(row) for row in self.springs]} if self.springs else {}
+        return (
+            judged
+            | sprung
+            | {
+                "robot": self.robot,
+                "method": self.method,
+                "joints": list(self.joint_names),
+                "base_parameters": [
+                    {
+                        "name": row.name,
+                        "group": row.group,
+                        "value": row.value,
+                        "std": _finite(row.std),
+                        "relative": _finite(row.relative),
+                        "unit": row.unit,
+                        "equation": row.equation,
+                        "identifiable": row.identifiable,
+                        "visibility": row.visibility,
+                    }
+                    for row in self.parameters
+                ],
+                "motors": [_number(row) for row in self.motors],
+                "friction": [_number(row) for row in self.friction],
+                "quality": {step.step: _quality(step) for step in self.steps},
+                "warnings": list(self.warnings),
+                "notes": list(self.notes),
+                "prediction": None if self.prediction is None else self.prediction.as_json(),
+                "facts": self.facts,
+            }
+        )
 
 
 def _finite(value: float) -> float | None:
@@ -137,6 +145,11 @@ def _number(row: NumberRow) -> dict[str, Any]:
         "seen": row.seen,
         "visibility": row.visibility,
     }
+
+
+def _spring(row: NumberRow) -> dict[str, Any]:
+    kept = _number(row)
+    return {"spring": kept.pop("joint"), **kept}
 
 
 def _quality(step: StepQuality) -> dict[str, Any]:
@@ -215,19 +228,16 @@ def linear_record(
         "residual_correlation": _by_joint(model, solved.correlation),
         "noise_factor": solved.noise_factor,
     }
-    each = [(joint, name) for joint in model.joint_names for name in problem.friction]
-    friction = tuple(
-        NumberRow(
-            joint,
-            name,
-            float(values[k]),
-            float(solved.std[k]),
-            _friction_unit(name),
-            seen.words[k] == IDENTIFIED,
-            seen.words[k],
-        )
-        for k, (joint, name) in enumerate(each, start=model.l)
-    )
+    std = solved.std
+
+    def row(k: int, owner: str, name: str, unit: str) -> NumberRow:
+        word = seen.words[k]
+        return NumberRow(owner, name, float(values[k]), float(std[k]), unit, word == IDENTIFIED, word)
+
+    friction = [row(k, *own, _friction_unit(own[1])) for k, own in enumerate(problem.plain, start=model.l)]
+    unknowns = enumerate(problem.columns.unknowns, start=problem.first_extra)
+    extra = [row(k, unknown.owner, unknown.name, unknown.unit) for k, unknown in unknowns]
+    of_springs = problem.columns.of_springs
     step = StepOptions(options.filter, options.split, options.fit)
     return with_model(
         Calibration(
@@ -237,7 +247,8 @@ def linear_record(
             model=model,
             parameters=_parameter_rows(model, values, solved.std, ["all"] * model.l, seen),
             motors=_motor_rows(model, found.motors, None),
-            friction=friction,
+            friction=(*friction, *_chosen(extra, ~of_springs)),
+            springs=_chosen(extra, of_springs),
             steps=(),
             warnings=(*found.warnings, *visibility_warnings("linear fit", problem.names, seen)),
             facts=facts,
@@ -248,6 +259,7 @@ def linear_record(
                 options.exponents,
                 options.offset,
                 coupling=options.coupling,
+                columns=problem.columns.content,
             ),
             notes=(*_coupled_notes(options), *weak_notes("linear fit", problem.names, seen)),
         ),
@@ -261,6 +273,10 @@ def _coupled_notes(options: LinearOptions) -> tuple[str, ...]:
     return (
         "friction is of the motors, which are called like the joints: some of them drive several together",
     )
+
+
+def _chosen(rows: Sequence[NumberRow], wanted: NDArray[np.bool_]) -> tuple[NumberRow, ...]:
+    return tuple(row for row, is_wanted in zip(rows, wanted.tolist(), strict=True) if is_wanted)
 
 
 def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration:

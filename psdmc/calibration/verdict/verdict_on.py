@@ -10,6 +10,7 @@ from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.verdict.delivered import delivered, sprung
 from psdmc.calibration.verdict.evidence import Motion, evidence_of
 from psdmc.calibration.verdict.findings import Demand
 from psdmc.calibration.verdict.judge import judge
@@ -32,8 +33,9 @@ def with_verdict_on_logs(
     model   as it was given, whose theta_b is the file's; record holds the calibrated one
     """
     matrix = () if record.prediction is None else record.prediction.coupling
+    springs = sprung(delivered(record.model))
     motions = [Motion(log) for log in logs]
-    evidence = evidence_of(model, regressor, motions, motors, options, coupling_of(matrix))
+    evidence = evidence_of(model, regressor, motions, motors, options, coupling_of(matrix), springs)
     demand = Demand("linear fit", _fitted(record, "All"), record.facts["rank"])
     return with_verdict(record, judge(record, evidence, [demand], limits))
 

@@ -1,0 +1,43 @@
+"""Keys of a description's effects that several kinds read: yes or no, one joint, some joints."""
+
+from __future__ import annotations
+
+from psdmc.calibration.logs.toml_tables import TomlTable, shown
+from psdmc.calibration.logs.wording import listed, quoted
+from psdmc.robot.mechanism import Mechanism
+
+
+def flag(table: TomlTable, key: str) -> bool:
+    """true or false; false where it is missing."""
+    value = table.content.get(key, False)
+    if not isinstance(value, bool):
+        table.faults.append(f"{table.where}: {key}: found {shown(value)}, expected true or false")
+        return False
+    return value
+
+
+def joint_of(table: TomlTable, chain: Mechanism) -> int:
+    """The joint that `joint` names; a fault where there is none."""
+    name = table.text("joint")
+    if name in chain.joint_names:
+        return chain.joint_names.index(name)
+    if name:
+        table.faults.append(
+            f"{table.where}: joint {quoted(name)} is not the robot's, it has {listed(chain.joint_names)}"
+        )
+    return 0
+
+
+def joints_of(value: object, where: str, chain: Mechanism, faults: list[str]) -> tuple[int, ...]:
+    """The joints that a value means: true all, false none, a list of names those."""
+    if isinstance(value, bool):
+        return tuple(range(len(chain))) if value else ()
+    if not isinstance(value, list) or any(not isinstance(name, str) for name in value):
+        faults.append(f"{where}: found {shown(value)}, expected true, false, or a list of joint names")
+        return ()
+    odd = [quoted(name) for name in value if name not in chain.joint_names]
+    if odd:
+        faults.append(
+            f"{where}: joint(s) {listed(odd)} are not the robot's, it has {listed(chain.joint_names)}"
+        )
+    return tuple(k for k, name in enumerate(chain.joint_names) if name in value)

@@ -1,0 +1,32 @@
+"""A gas spring between two points of two bodies: a pushing force, nearly constant, that grows as it is shortened."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from psdmc.calibration.columns.effect import Effect, Kind, Unknown
+from psdmc.calibration.columns.flags import flag
+from psdmc.calibration.columns.spring import Spring, push, rub, stretch
+from psdmc.calibration.columns.ways import anchored_way
+from psdmc.calibration.logs.toml_tables import TomlTable
+from psdmc.robot.mechanism import Mechanism
+
+LONGEST = 200.0
+"""m, of a spring."""
+
+
+def _read(table: TomlTable, chain: Mechanism) -> tuple[Effect, ...]:
+    """`length` (m): where the force is stated; left out: the length with all joints at zero."""
+    name, way = table.text("name"), anchored_way(table, chain)
+    if table.faults:
+        return ()
+    at_zero = float(way.length(np.zeros((1, len(chain))))[0][0])
+    reference = table.number("length", 0.0, LONGEST, at_zero)
+    unknowns, laws = [Unknown(name, "force", "N"), Unknown(name, "rate", "N/m")], [push, stretch]
+    if flag(table, "friction"):
+        unknowns.append(Unknown(name, "friction", "N"))
+        laws.append(rub)
+    return (Spring(tuple(unknowns), tuple(laws), way, reference),)
+
+
+KIND = Kind("gas", "springs", ("from", "to", "length", "friction"), _read)

@@ -1,0 +1,30 @@
+"""A spring about (or along) one joint's own axis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from psdmc.calibration.columns.effect import Effect, Kind, Unknown
+from psdmc.calibration.columns.flags import joint_of
+from psdmc.calibration.columns.spring import Spring, stretch
+from psdmc.calibration.columns.ways import AlongJoints
+from psdmc.calibration.logs.toml_tables import TomlTable
+from psdmc.robot.mechanism import Mechanism
+
+FARTHEST = 1e3
+"""rad (m), of the position at rest."""
+
+
+def _read(table: TomlTable, chain: Mechanism) -> tuple[Effect, ...]:
+    """`rest` (rad, m): the joint's position without torque; left out: zero, as the joint's offset holds the rest."""
+    name, rest = table.text("name"), table.number("rest", -FARTHEST, FARTHEST, 0.0)
+    joint = joint_of(table, chain)
+    if table.faults:
+        return ()
+    own = chain.joints[joint].type
+    unit = f"{own.effort_unit.replace(' ', '')}/{own.position_unit}"
+    way = AlongJoints(np.eye(len(chain))[joint], own.position_unit)
+    return (Spring((Unknown(name, "stiffness", unit),), (stretch,), way, rest),)
+
+
+KIND = Kind("torsional", "springs", ("joint", "rest"), _read)

@@ -1,0 +1,155 @@
+"""What a spring's length is, as a function of the joints: a line between two points of two bodies, or a sum of joint
+coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.toml_tables import TomlTable, is_number
+from psdmc.calibration.logs.wording import listed, quoted
+from psdmc.dynamics.frames import frames_of
+from psdmc.dynamics.kinematics import frame_placement, jacobian
+from psdmc.robot.mechanism import BASE, Mechanism, Placement
+
+LARGEST_POINT = 100.0
+"""m, of an anchor from its link's frame."""
+LARGEST_RATIO = 1e3
+"""m/rad or a plain number: length that a joint gives a spring per unit of its position."""
+STATES, SEED = 200, 30_211
+"""Random poses in which a spring's length is looked at before a fit."""
+SHORTEST = 1e-3
+"""m, of a spring between two points: nearer to each other they have no direction."""
+LEAST_CHANGE = 1e-6
+"""m: a length that changes by less over all poses moves no joint."""
+
+
+class Way(Protocol):
+    """A length s of the joints' positions, and its slopes.
+
+    unit  of the length: m or rad
+    """
+
+    @property
+    def unit(self) -> str: ...
+
+    def length(self, q: Array) -> tuple[Array, Array]:
+        """(N,) length and (N, n) its slopes, of positions (N, n)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BetweenAnchors:
+    """The distance of two points, each fixed to a body; points (3,) in the body's joint frame, or the base frame."""
+
+    chain: Mechanism
+    bodies: tuple[int, int]
+    points: tuple[Array, Array]
+    unit: str = "m"
+
+    def length(self, q: Array) -> tuple[Array, Array]:
+        ends = [self._end(body, point, q) for body, point in zip(self.bodies, self.points, strict=True)]
+        (start, moving_start), (stop, moving_stop) = ends
+        apart = stop - start
+        size = np.maximum(np.linalg.norm(apart, axis=1), 1e-12)
+        slopes = np.einsum("nc,nck->nk", apart / size[:, None], moving_stop - moving_start)
+        return size, np.asarray(slopes)
+
+    def _end(self, body: int, point: Array, q: Array) -> tuple[Array, Array]:
+        """(N, 3) position in the base frame, (N, 3, n) its slopes."""
+        if body == BASE:
+            return np.broadcast_to(point, (len(q), 3)), np.zeros((len(q), 3, q.shape[1]))
+        frames, place = frames_of(self.chain), Placement(np.eye(3), point)
+        states = [q[:, k] for k in range(q.shape[1])]
+        _, origin = frame_placement(frames, body, place, states)
+        rows = jacobian(frames, body, place, states)[:3]
+        shape = q.shape[:1]
+        slopes = [[np.broadcast_to(entry, shape) for entry in row] for row in rows]
+        position = np.stack([np.broadcast_to(entry, shape) for entry in origin], axis=1)
+        return position, np.moveaxis(np.array(slopes), 2, 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AlongJoints:
+    """The sum of joint positions times ratios (n,): a cable over pulleys, or one joint itself."""
+
+    ratios: Array
+    unit: str
+
+    def length(self, q: Array) -> tuple[Array, Array]:
+        return q @ self.ratios, np.broadcast_to(self.ratios, q.shape)
+
+
+def anchored_way(table: TomlTable, chain: Mechanism) -> Way:
+    """The way between `from` and `to`, each { link, point } with the point (m) in the link's frame as the robot's file has
+    it; faults where there is none."""
+    ends = [_anchor(table, key, chain) for key in ("from", "to")]
+    way = BetweenAnchors(chain, (ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]))
+    if not table.faults:
+        _require_line(way, table, chain)
+    return way
+
+
+def _anchor(table: TomlTable, key: str, chain: Mechanism) -> tuple[int, Array]:
+    own = TomlTable(table.content.get(key, {}), f"{table.where}: {key}", ("link", "point"), table.faults)
+    link, point = own.text("link"), np.array(own.triple("point", LARGEST_POINT))
+    if link == chain.base_name:
+        return BASE, point
+    for body, joint in enumerate(chain.joints):
+        if joint.link_name == link:
+            return body, joint.link_frame.rotation @ point + joint.link_frame.translation
+    for frame in chain.frames:
+        if frame.name == link:
+            return frame.joint, frame.placement.rotation @ point + frame.placement.translation
+    if link:
+        known = [
+            chain.base_name,
+            *(joint.link_name for joint in chain.joints),
+            *(f.name for f in chain.frames),
+        ]
+        table.faults.append(
+            f"{own.where}: link {quoted(link)} is not the robot's, it has {listed(list(dict.fromkeys(known)))}"
+        )
+    return BASE, point
+
+
+def _require_line(way: BetweenAnchors, table: TomlTable, chain: Mechanism) -> None:
+    """A fault where the two points do not move against each other, or meet."""
+    size, _ = way.length(poses(chain))
+    if np.ptp(size) < LEAST_CHANGE:
+        table.faults.append(f"{table.where}: no joint changes the distance of `from` and `to`")
+    elif size.min() < SHORTEST:
+        table.faults.append(
+            f"{table.where}: `from` and `to` come within {size.min():.2g} m of each other: a line of no direction"
+        )
+
+
+def jointed_way(table: TomlTable, chain: Mechanism) -> Way:
+    """The way along `joints`, a table of joint names with the length that each gives per unit of its position."""
+    value = table.content.get("joints")
+    given = value if isinstance(value, dict) else {}
+    if not given:
+        table.faults.append(f"{table.where}: joints: expected a table such as {{ J2 = 0.05, J3 = -0.05 }}")
+    ratios = np.zeros(len(chain))
+    for name, ratio in given.items():
+        if name not in chain.joint_names:
+            table.faults.append(
+                f"{table.where}: joint {quoted(name)} is not the robot's, it has {listed(chain.joint_names)}"
+            )
+        elif not is_number(ratio) or not 0.0 < abs(ratio) <= LARGEST_RATIO:
+            table.faults.append(f"{table.where}: joints: {quoted(name)}: expected a number, not zero")
+        else:
+            ratios[chain.joint_names.index(name)] = float(ratio)
+    return AlongJoints(ratios, "m")
+
+
+def poses(chain: Mechanism) -> Array:
+    """(STATES, n) random positions within the limits, half a turn or half a metre where there are none."""
+    rng = np.random.default_rng(SEED)
+    wide = np.array([np.pi if joint.type.position_unit == "rad" else 0.5 for joint in chain.joints])
+    lower = np.maximum([joint.limits.lower for joint in chain.joints], -wide)
+    upper = np.minimum([joint.limits.upper for joint in chain.joints], wide)
+    return np.asarray(rng.uniform(np.minimum(lower, upper), np.maximum(lower, upper), (STATES, len(chain))))

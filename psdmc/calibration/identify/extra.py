@@ -1,0 +1,59 @@
+"""What the linear fit must know of extra columns beside their rows: believable sizes, and limits between values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from psdmc.calibration.columns.columns import Columns
+from psdmc.calibration.columns.effect import Motion
+from psdmc.calibration.columns.ways import poses
+from psdmc.calibration.identify.coupling import Coupling
+from psdmc.calibration.identify.prior import NO_EFFECT, ORDINARY_SPEED, SEED
+from psdmc.calibration.logs.log import Array
+from psdmc.robot.mechanism import Mechanism
+
+
+def motion_of(
+    q: Array, qd: Array, sign_speed: float, load: Array | None = None, coupling: Coupling | None = None
+) -> Motion:
+    """The motion for columns, of joints' positions, speeds and rigid torques (N, n): with a coupling, motors rub."""
+    if coupling is None:
+        return Motion(q, qd, qd, sign_speed, load)
+    of_motors = None if load is None else coupling.torque_of_motors(load)
+    return Motion(q, qd, coupling.to_motors(qd), sign_speed, of_motors, coupling.inverse)
+
+
+def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Array) -> Array:
+    """(m,) believable size of each value: the one that explains a joint's whole torque where its column is largest.
+
+    sizes  (n,) N m, of the joints' torques
+    """
+    if not len(columns):
+        return np.zeros(0)
+    q = poses(chain)
+    speeds = np.geomspace(1e-3, 1.0, len(q))[:, None] * ORDINARY_SPEED
+    qd = speeds * np.random.default_rng(SEED).choice([-1.0, 1.0], q.shape)
+    load = np.broadcast_to(sizes, q.shape)
+    effect = np.abs(columns.values(motion_of(q, qd, sign_speed, load))).max(axis=0)
+    acts = effect > NO_EFFECT * effect.max(axis=0, initial=0.0)
+    scale = np.min(np.where(acts, sizes[:, None] / np.where(acts, effect, 1.0), np.inf), axis=0)
+    return np.where(np.isfinite(scale), scale, 1.0)
+
+
+def limits_of(columns: Columns, plain: Sequence[tuple[str, str]], l: int) -> Array:
+    """(k, l + n f + m) rows whose products with the vector may not be negative: values within that of their owner.
+
+    plain  n f joints and names of plain friction
+    """
+    rows: list[Array] = []
+    width = l + len(plain) + len(columns)
+    for k, unknown in enumerate(columns.unknowns, start=l + len(plain)):
+        if not unknown.within:
+            continue
+        for sign in (1.0, -1.0):
+            row = np.zeros(width)
+            row[l + list(plain).index((unknown.owner, unknown.within))], row[k] = 1.0, sign
+            rows.append(row)
+    return np.reshape(rows, (-1, width))
