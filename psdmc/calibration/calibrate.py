@@ -8,13 +8,15 @@ from pathlib import Path
 
 from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.description.table_fit import FitChoice
+from psdmc.calibration.fitted_logs import LogFit
+from psdmc.calibration.identify.essential import EssentialOptions
 from psdmc.calibration.identify.four_steps import FourSteps, Runs, calibrate_four_steps, checked_runs
+from psdmc.calibration.identify.knowledge import knowledge_of
 from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibration.identify.motor_constants import motors_of_logs
 from psdmc.calibration.identify.physical import (
     NotPhysical,
     PhysicalOptions,
-    nearest_physical,
     require_cvxpy,
 )
 from psdmc.calibration.identify.physical_steps import physical_steps
@@ -25,7 +27,7 @@ from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.sources import LogNaming, campaign_of, log_sources
 from psdmc.calibration.verdict.judged_record import judged_record
 from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
-from psdmc.calibration.verdict.record import Calibration, four_step_record, linear_record, with_data
+from psdmc.calibration.verdict.record import Calibration, four_step_record, with_data
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.calibration.verdict.verdict_on import with_verdict_on_campaign, with_verdict_on_logs
 from psdmc.errors import InputError
@@ -45,6 +47,9 @@ class CalibrateOptions:
     consistency  options of the physical estimate
     verdict      limits of the verdict
     choice       of the linear fit's options, before what a log description says; for plain logs only
+    prior_confidence  relative standard deviation of the file's masses, radii of gyration and inertias, which then count as
+                 knowledge; None: none is stated. For plain logs
+    essential    how parameters that the data do not need are dropped; None: all are kept. For plain logs
     """
 
     physical: bool = True
@@ -53,6 +58,8 @@ class CalibrateOptions:
     consistency: PhysicalOptions = field(default_factory=PhysicalOptions)
     verdict: VerdictOptions = field(default_factory=VerdictOptions)
     choice: FitChoice = field(default_factory=FitChoice)
+    prior_confidence: float | None = None
+    essential: EssentialOptions | None = None
 
 
 def calibrate(
@@ -107,6 +114,8 @@ def _require_plain(
     given += ["--validate"] if validation else []
     given += naming.flags
     given += [f"[{name}]" for name in options.linear.tables]
+    given += ["--prior-confidence"] if options.prior_confidence is not None else []
+    given += ["--essential"] if options.essential is not None else []
     if given:
         are = "is" if len(given) == 1 else "are"
         raise InputError(
@@ -171,22 +180,14 @@ def calibrate_logs(
     """The result of one linear fit: theta_b, friction and offsets as one vector."""
     motors = motors_of_logs(model.joint_names, logs, torque_constants)
     linear = options.linear.for_robot(model.mechanism)
+    known = knowledge_of(
+        model, linear.tables, linear.tables_from, options.prior_confidence, options.essential
+    )
     progress("linear fit")
     found = calibrate_linear(
         model.mechanism, regressor, model.l, logs, linear, motors, model.theta_b, progress
     )
-    solved = found.estimate
-    progress("reading the result back")
-    plain = judged_record(
-        with_data(linear_record(model, found, solved.values, linear), logs), logs, check=linear.check
-    )
-
-    def consistent() -> Calibration:
-        bounded, limits = found.problem.never_negative, found.problem.limits
-        near = nearest_physical(model, solved.values, solved.whitening, bounded, options.consistency, limits)
-        record = with_data(linear_record(model, found, near.values, linear), logs)
-        return judged_record(record, logs, plain, near.distance, linear.check)
-
-    result = _physical(plain, consistent, options, progress)
+    fit = LogFit(model, logs, linear, options.physical, options.consistency, known, progress)
+    result = fit.record(found)
     progress("verdict")
     return with_verdict_on_logs(result, model, regressor, logs, motors, linear.filter, options.verdict)

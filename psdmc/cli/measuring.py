@@ -157,6 +157,13 @@ def calibrate(
     cutoff: Annotated[
         float | None, typer.Option(metavar="HZ", help="of the filter of plain logs; 8, or less for slow logs")
     ] = None,
+    essential: Annotated[
+        bool, typer.Option("--essential", help="leave out parameters that the data do not need (F-test)")
+    ] = False,
+    prior_confidence: Annotated[
+        float | None,
+        typer.Option(metavar="SHARE", help="standard deviation of the file's masses and inertias, 0.1: 10 %"),
+    ] = None,
     keep: Annotated[
         bool, typer.Option("--keep", help="write the model file even where the verdict is: not usable")
     ] = False,
@@ -195,6 +202,7 @@ def calibrate(
     choice = fit_choice(cutoff, split, friction)
     with interrupt.at_once():
         from psdmc.calibration.calibrate import CalibrateOptions
+        from psdmc.calibration.identify.essential import EssentialOptions
         from psdmc.calibration.sources import LogNaming
         from psdmc.calibration.verdict.record import verdict_of
         from psdmc.calibration.verdict.said_once import unsaid_warnings
@@ -209,7 +217,12 @@ def calibrate(
             logs,
             output,
             report,
-            CalibrateOptions(physical=physical is not False, choice=choice),
+            CalibrateOptions(
+                physical=physical is not False,
+                choice=choice,
+                prior_confidence=prior_confidence,
+                essential=EssentialOptions() if essential else None,
+            ),
             parsed_torque_constants(torque_constants),
             actuators,
             progress,

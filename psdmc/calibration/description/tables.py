@@ -12,7 +12,7 @@ from psdmc.calibration.description.table_joints import JOINTS
 from psdmc.calibration.description.table_logs import LOGS
 from psdmc.calibration.description.table_quantities import EFFORT, POSITION, VELOCITY
 from psdmc.calibration.description.table_time import TIME
-from psdmc.calibration.description.tables_of_columns import FRICTION, SPRINGS
+from psdmc.calibration.description.tables_of_columns import BODIES, ESSENTIAL, FRICTION, PRIOR, SPRINGS
 
 TABLES: tuple[Table[Any], ...] = (
     LOGS,
@@ -26,4 +26,7 @@ TABLES: tuple[Table[Any], ...] = (
     FIT,
     SPRINGS,
     FRICTION,
+    PRIOR,
+    BODIES,
+    ESSENTIAL,
 )

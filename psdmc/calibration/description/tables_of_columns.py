@@ -1,5 +1,6 @@
-"""`[[springs]]` and `[friction]`: columns of the fit beside rigid bodies and plain friction. What is in them is read where
-the robot is known (psdmc.calibration.columns)."""
+"""Tables that are read where the robot is known: `[[springs]]` and `[friction]`, columns of the fit beside rigid bodies and
+plain friction (psdmc.calibration.columns); `[prior]`, `[[bodies]]`, `[essential]`, what is known before the fit
+(psdmc.calibration.identify.knowledge)."""
 
 from __future__ import annotations
 
@@ -22,3 +23,4 @@ def _kept(key: str) -> Table[object]:
 
 
 SPRINGS, FRICTION = _kept("springs"), _kept("friction")
+PRIOR, BODIES, ESSENTIAL = _kept("prior"), _kept("bodies"), _kept("essential")

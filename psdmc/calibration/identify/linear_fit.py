@@ -77,6 +77,8 @@ class LinearResult:
     problem    the rows of the fit
     prior      the values in unseen directions
     motors     that made torques of what was logged
+    dropped    (l + n f + m,)  entries that are left at the prior, as the data do not need them; None: none
+    stated     whether a prior of theta_b was joined with the data
     """
 
     estimate: Estimate
@@ -84,6 +86,13 @@ class LinearResult:
     prior: Prior
     motors: Motors
     warnings: tuple[str, ...]
+    dropped: NDArray[np.bool_] | None = None
+    stated: bool = False
+
+    @property
+    def samples(self) -> int:
+        """Independent samples that were fitted, all joints together."""
+        return int((~self.problem.held_out).sum()) * len(self.problem.chain)
 
     @property
     def theta_b(self) -> Array:

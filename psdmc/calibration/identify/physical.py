@@ -33,6 +33,34 @@ SETTLING = 1e-6
 it determines what theta_b leaves open and changes nothing that theta_b fixes."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Bounds:
+    """Rows R (k, 11 n) and sides r (k,) of standard parameters x: R x >= r.
+
+    names  k of them, for messages
+    """
+
+    rows: Array
+    sides: Array
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def reached(self, x: Array) -> tuple[str, ...]:
+        """Names of those that x (11 n,) does no more than fulfil."""
+        if not self.names:
+            return ()
+        room = self.rows @ x - self.sides
+        near = room < REACHED * np.maximum(np.abs(self.rows) @ np.abs(x), np.abs(self.sides))
+        return tuple(name for name, is_near in zip(self.names, near.tolist(), strict=True) if is_near)
+
+
+REACHED = 1e-5
+"""Distance from a bound, relative to its terms, below which the solver has stopped there."""
+NO_BOUNDS = Bounds(np.zeros((0, 0)), np.zeros(0), ())
+
+
 class NotPhysical(InputError):
     """No parameters that a real robot could have were found near an estimate."""
 
@@ -73,6 +101,8 @@ def nearest_physical(
     never_negative: NDArray[np.bool_] | None = None,
     options: PhysicalOptions | None = None,
     limits: Array | None = None,
+    fixed: NDArray[np.bool_] | None = None,
+    bounds: Bounds = NO_BOUNDS,
 ) -> Physical:
     """The parameters that a real robot could have, nearest to an estimate of the whole vector.
 
@@ -80,6 +110,8 @@ def nearest_physical(
     whitening       (l + k, l + k)  W: the cost of v is |W (v - values)|^2, in variances (Estimate.whitening)
     never_negative  (l + k,)  entries that may not be negative
     limits          (m, l + k)  whose products with the vector may not be negative either
+    fixed           (l + k,)  entries that stay as they are
+    bounds          of standard parameters
 
     For a linear fit that cost is what v adds to its sum of squares: one problem with its weights, and the prior where
     the data show nothing. Raises InputError where cvxpy is missing, NotPhysical where no solution is found.
@@ -87,17 +119,27 @@ def nearest_physical(
     cp: Any = require_cvxpy()
     bounded = np.zeros(len(values), dtype=bool) if never_negative is None else never_negative
     sides = np.zeros((0, len(values))) if limits is None else limits
+    held = np.zeros(len(values), dtype=bool) if fixed is None else fixed
+    demands = _Demands(bounded, sides, held, bounds)
     for k, share in enumerate(EASED):
         try:
-            near = _nearest(
-                cp, model, values, share * whitening, bounded, sides, options or PhysicalOptions()
-            )
+            near = _nearest(cp, model, values, share * whitening, demands, options or PhysicalOptions())
         except NotPhysical:
             if k == len(EASED) - 1:
                 raise
         else:
             return replace(near, distance=near.distance / share)
     raise InternalError("no physical estimate was tried")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Demands:
+    """What the solution must fulfil beside being physical, as of nearest_physical."""
+
+    never_negative: NDArray[np.bool_]
+    limits: Array
+    fixed: NDArray[np.bool_]
+    bounds: Bounds
 
 
 EASED = (1.0, 0.1, 0.01, 1e-3)
@@ -111,11 +153,11 @@ def _nearest(
     model: DynamicsModel,
     values: Array,
     whitening: Array,
-    bounded: NDArray[np.bool_],
-    limits: Array,
+    demands: _Demands,
     options: PhysicalOptions,
 ) -> Physical:
     """The solution of one attempt; NotPhysical where the solver finds none, or one that is not physical."""
+    bounded, limits = demands.never_negative, demands.limits
     l, span = model.l, model.mechanism.parameter_span
     inner = cp.Variable(span.shape[1])
     size = 1.0 / np.linalg.norm(whitening, axis=0)[l:]
@@ -136,6 +178,11 @@ def _nearest(
         constraints.append(
             limits[:, :l] @ theta + (limits[:, l:] * size) @ extra >= -limits[:, l:] @ values[l:]
         )
+    if len(demands.bounds):
+        constraints.append(demands.bounds.rows @ x >= demands.bounds.sides)
+    still = np.flatnonzero(demands.fixed)
+    constraints += [theta[k] == values[k] for k in still[still < l]]
+    constraints += [extra[k - l] == 0 for k in still[still >= l]] if extra is not None else []
     settle = SETTLING * cp.sum_squares(inner - known_inner(model))
     problem = cp.Problem(cp.Minimize(loss + settle + divergence), constraints)
     with warnings.catch_warnings():  # cvxpy warns of reduced accuracy; the result is checked below
@@ -145,7 +192,8 @@ def _nearest(
         except cp.error.SolverError:
             raise NotPhysical("physical consistency: clarabel failed") from None
     if inner.value is None:
-        raise NotPhysical(f"physical consistency: clarabel found no solution ({problem.status})")
+        within = f" within the {len(demands.bounds)} bounds of [[bodies]]" if len(demands.bounds) else ""
+        raise NotPhysical(f"physical consistency: clarabel found no solution{within} ({problem.status})")
     found = np.asarray(span @ inner.value)
     require_physical(model, found)
     rest = np.zeros(0) if extra is None else values[l:] + size * np.asarray(extra.value)
@@ -153,6 +201,7 @@ def _nearest(
         raise NotPhysical(f"physical consistency: friction came out at {float(rest[bounded[l:]].min()):.3g}")
     rest = np.where(bounded[l:], np.maximum(rest, 0.0), rest)
     whole = np.concatenate([model.B @ found, rest])
+    whole = np.where(demands.fixed, values, whole)
     return Physical(found, whole, float(np.linalg.norm(whitening @ (whole - values))))
 
 

@@ -66,6 +66,22 @@ def visibility(
     return Visibility(tuple(words), share < limit)
 
 
+DROPPED = "not essential: kept at "
+BY_PRIOR = "by the stated prior more than by the data"
+
+
+def as_fitted(
+    seen: Visibility, kept_at: Sequence[str], dropped: NDArray[np.bool_], stated: int
+) -> Visibility:
+    """The words of unknowns of which some were dropped, and the first `stated` have a prior of stated confidence."""
+    words = [
+        f"{DROPPED}{kept_at[k]}" if dropped[k] else BY_PRIOR if k < stated and not known else word
+        for k, (word, known) in enumerate(zip(seen.words, seen.determined, strict=True))
+    ]
+    by_prior = np.arange(len(words)) < stated
+    return Visibility(tuple(words), (seen.determined | by_prior) & ~dropped)
+
+
 def _unseen(names: Sequence[str], j: int, share: Array, together: Array, limit: float, kept_at: str) -> str:
     if share[j] > INVISIBLE_SHARE:
         return f"not visible: kept at {kept_at}"
@@ -87,7 +103,7 @@ def visibility_warnings(step: str, names: Sequence[str], found: Visibility) -> t
     ]
     groups: dict[str, list[str]] = {}
     for name, words in zip(names, found.words, strict=True):
-        if words not in (IDENTIFIED, WEAK) and not words.startswith(TOGETHER_WORDS):
+        if words not in (IDENTIFIED, WEAK) and not words.startswith((TOGETHER_WORDS, DROPPED)):
             groups.setdefault(words, []).append(name)
     alone = tuple(f"{step}: {', '.join(own)}: {words}" for words, own in groups.items())
     if not together:

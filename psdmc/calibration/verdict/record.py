@@ -19,6 +19,7 @@ from psdmc.calibration.identify.steps import CalibrationOptions, StepOptions, St
 from psdmc.calibration.identify.visibility import (
     IDENTIFIED,
     Visibility,
+    as_fitted,
     visibility,
     visibility_warnings,
     weak_notes,
@@ -220,6 +221,8 @@ def linear_record(
     problem, solved = found.problem, found.estimate
     kept_at = _kept_at(model, values, found.prior.scale)
     seen = visibility(problem.names, values, solved.std, solved.unseen, kept_at)
+    dropped = np.zeros(len(values), dtype=bool) if found.dropped is None else found.dropped
+    seen = as_fitted(seen, kept_at, dropped, model.l if found.stated else 0)
     facts = {
         "rank": solved.rank,
         "unknowns": len(values),

@@ -1,0 +1,125 @@
+"""Records of one linear fit: as it is, physically consistent, and without the parameters that are not essential."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from psdmc.calibration.identify.essential import Essential, EssentialOptions, essential
+from psdmc.calibration.identify.knowledge import Knowledge
+from psdmc.calibration.identify.linear_fit import LinearOptions, LinearResult
+from psdmc.calibration.identify.physical import NotPhysical, Physical, PhysicalOptions, nearest_physical
+from psdmc.calibration.identify.stated_prior import theta_covariance, with_prior
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.verdict.judged_record import judged_record
+from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
+from psdmc.calibration.verdict.record import Calibration, linear_record, with_data, with_model
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.progress import Progress
+
+MOST_NAMED = 12
+"""Dropped parameters that a note names."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogFit:
+    """What all records of one fit share.
+
+    physical     whether a physically consistent record is wanted
+    consistency  its options
+    """
+
+    model: DynamicsModel
+    logs: Sequence[AnyLog]
+    linear: LinearOptions
+    physical: bool
+    consistency: PhysicalOptions
+    known: Knowledge
+    progress: Progress
+
+    def record(self, found: LinearResult) -> Calibration:
+        """The record that is delivered: with the prior, without what is not essential, physically consistent, each where it
+        is wanted."""
+        if len(self.known.bounds) and not self.physical:
+            raise InputError(
+                "[[bodies]] bounds masses or centres of mass, and the unconstrained fit knows none",
+                "leave out --no-physical, or the bounds",
+            )
+        found = self._with_prior(found)
+        self.progress("reading the result back")
+        whole = self._consistent(found)
+        return whole if self.known.essential is None else self._essential(found, whole, self.known.essential)
+
+    def _with_prior(self, found: LinearResult) -> LinearResult:
+        if not self.known.confidence:
+            return found
+        covariance = theta_covariance(self.model, dict(self.known.confidence))
+        joined = with_prior(found.estimate, self.model.known_theta_b(), covariance)
+        return replace(found, estimate=joined, stated=True)
+
+    def _essential(self, found: LinearResult, whole: Calibration, options: EssentialOptions) -> Calibration:
+        self.progress("essential parameters")
+        lesser = essential(found.estimate, found.prior.values, found.samples, options)
+        fewer = self._consistent(replace(found, estimate=lesser.estimate, dropped=lesser.dropped))
+        return with_price(fewer, whole, lesser, found.problem.names)
+
+    def _consistent(self, found: LinearResult) -> Calibration:
+        """The physically consistent record where it is wanted and exists; else the unconstrained one, with a note."""
+        plain = judged_record(self._of(found, found.estimate.values), self.logs, check=self.linear.check)
+        if not self.physical:
+            return plain
+        self.progress("physical consistency")
+        try:
+            near = self._nearest(found)
+        except NotPhysical as error:
+            return replace(plain, facts={**plain.facts, NOT_PHYSICAL: error.message})
+        record = self._of(found, near.values)
+        reached = self.known.bounds.reached(near.x)
+        if reached:
+            record = replace(
+                record, notes=(*record.notes, f"bounds of [[bodies]] that are reached: {'; '.join(reached)}")
+            )
+        return judged_record(record, self.logs, plain, near.distance, self.linear.check)
+
+    def _nearest(self, found: LinearResult) -> Physical:
+        options = self.consistency
+        if found.stated:  # the file's bodies are in the estimate: resembling them must not count twice
+            options = replace(options, known_body=options.unknown_body)
+        problem, solved = found.problem, found.estimate
+        return nearest_physical(
+            self.model,
+            solved.values,
+            solved.whitening,
+            problem.never_negative,
+            options,
+            problem.limits,
+            found.dropped,
+            self.known.bounds,
+        )
+
+    def _of(self, found: LinearResult, values: Array) -> Calibration:
+        return with_data(linear_record(self.model, found, values, self.linear), self.logs)
+
+
+def with_price(
+    fewer: Calibration, whole: Calibration, lesser: Essential, names: Sequence[str]
+) -> Calibration:
+    """The record of the essential parameters with what was dropped and what that costs, both by their files' figures."""
+    gone = [name for name, is_dropped in zip(names, lesser.dropped.tolist(), strict=True) if is_dropped]
+    before, after = whole.steps[-1].joints, fewer.steps[-1].joints
+    cost = {name: before[name].held_out.r2 - after[name].held_out.r2 for name in after}
+    facts = {"dropped": gone, "essential_cost_r2": cost, "f_of_dropped": lesser.f, "f_limit": lesser.limit}
+    words = ", ".join(f"{name} {-price:+.4f}" for name, price in cost.items())
+    more = f" and {len(gone) - MOST_NAMED} more" if len(gone) > MOST_NAMED else ""
+    note = (
+        f"essential parameters: {len(names) - len(gone)} of {len(names)} are kept; {len(gone)} are not told from the prior"
+        + (
+            f" (F = {lesser.f:.2f}, at most {lesser.limit:.2f}): {', '.join(gone[:MOST_NAMED])}{more}"
+            if gone
+            else ""
+        )
+        + f"; held-out R^2 moved by {words}"
+    )
+    return with_model(replace(fewer, facts={**fewer.facts, **facts}, notes=(*fewer.notes, note)))

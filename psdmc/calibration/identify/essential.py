@@ -1,0 +1,145 @@
+"""Essential parameters: those that the data do not tell from the prior are left there, one after the other, as long as an
+F-test over all that were left does not object.
+
+The statistic is Wald's, with the covariance that is reported: residuals that are correlated count by what they are worth.
+Backward elimination of the largest relative standard deviation is that of Khalil and Dombre (2002, section 12.4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from psdmc.calibration.identify.least_squares import ROUNDING, Estimate
+from psdmc.calibration.identify.physical import whitening_of
+from psdmc.calibration.logs.log import Array
+
+
+@dataclass(frozen=True, slots=True)
+class EssentialOptions:
+    """How parameters are dropped.
+
+    relative      standard deviation, as a share of the value, above which a parameter is tried
+    significance  of the F-test: the chance of keeping parameters that all are the prior's
+    """
+
+    relative: float = 0.5
+    significance: float = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Essential:
+    """An estimate with some entries at the prior, the others refitted.
+
+    dropped  (m,)  those entries
+    f        the statistic over all of them;  limit  that it may not exceed, NaN where none was dropped
+    """
+
+    estimate: Estimate
+    dropped: NDArray[np.bool_]
+    f: float
+    limit: float
+
+
+def essential(solved: Estimate, start: Array, samples: int, options: EssentialOptions) -> Essential:
+    """The estimate without what it does not need.
+
+    start    (m,)  the prior's values, which dropped entries take
+    samples  independent ones that were fitted, all joints together
+    """
+    problem = _Problem(solved, start, max(samples - solved.rank, 1))
+    dropped, needed = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
+    while True:
+        values, std = problem.restricted(dropped)
+        size = np.maximum(np.abs(values), np.finfo(float).tiny)
+        relative = np.where(dropped | needed, 0.0, std / size)
+        worst = int(np.argmax(relative))
+        if relative[worst] <= options.relative:
+            break
+        tried = dropped.copy()
+        tried[worst] = True
+        if problem.f(tried) <= problem.limit(tried, options.significance):
+            dropped = tried
+        else:
+            needed[worst] = True
+    f, limit = problem.f(dropped), problem.limit(dropped, options.significance)
+    return Essential(_reduced(solved, problem, dropped), dropped, f, limit)
+
+
+class _Problem:
+    """The cost of any vector, in variances: |W (v - values)|^2, W by the reported covariance and the prior's."""
+
+    def __init__(self, solved: Estimate, start: Array, freedom: int) -> None:
+        self.values, self.start, self.freedom = solved.values, start, freedom
+        whitening = whitening_of(solved.total_covariance + solved.prior_covariance)
+        self.information = whitening.T @ whitening
+
+    def restricted(self, dropped: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """The least values with the dropped ones at the prior, and standard deviations of the others."""
+        covariance = self.covariance(dropped)
+        free = ~dropped
+        moved = np.where(dropped, self.start - self.values, 0.0)
+        values = self.values + moved
+        values[free] -= (covariance @ (self.information @ moved))[free]
+        return values, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+    def covariance(self, dropped: NDArray[np.bool_]) -> Array:
+        """(m, m) of the others where the dropped ones are known; zero for these."""
+        free = np.flatnonzero(~dropped)
+        covariance = np.zeros_like(self.information)
+        own = self.information[np.ix_(free, free)]
+        size = 1.0 / np.sqrt(np.diag(own))
+        covariance[np.ix_(free, free)] = np.linalg.inv(own * np.outer(size, size)) * np.outer(size, size)
+        return covariance
+
+    def f(self, dropped: NDArray[np.bool_]) -> float:
+        """Growth of the cost per dropped entry."""
+        if not dropped.any():
+            return 0.0
+        away = self.restricted(dropped)[0] - self.values
+        return float(away @ self.information @ away) / int(dropped.sum())
+
+    def limit(self, dropped: NDArray[np.bool_], significance: float) -> float:
+        count = int(dropped.sum())
+        return float(stats.f.isf(significance, count, self.freedom)) if count else float("nan")
+
+
+def _reduced(solved: Estimate, problem: _Problem, dropped: NDArray[np.bool_]) -> Estimate:
+    """The estimate of the free entries; hidden directions are those that are left with the dropped ones known.
+
+    What is kept stands for what was dropped beside it. Its standard deviation is that of itself: the whole fit's, and how
+    far dropping has moved it.
+    """
+    values, _ = problem.restricted(dropped)
+    moved = np.where(dropped, 0.0, values - solved.values)
+    whole = np.where(np.outer(dropped, dropped), 0.0, problem.covariance(np.zeros_like(dropped)))
+    hidden = _within(solved.unseen, dropped)
+    covariance = problem.covariance(dropped)
+    share = np.sum(hidden**2, axis=1)
+    return replace(
+        solved,
+        values=values,
+        covariance=covariance,
+        considered=np.zeros((len(values), 0)),
+        total_covariance=whole + np.outer(moved, moved),
+        unseen=hidden,
+        prior_std=0.0,  # what hidden directions leave open is in the covariance
+        identifiable=(share < HIDDEN) & ~dropped,
+        rank=int((~dropped).sum()) - hidden.shape[1],
+    )
+
+
+HIDDEN = 1e-2
+"""Share (squared) of a parameter in hidden directions from which it is not identifiable, as in FitOptions."""
+
+
+def _within(unseen: Array, dropped: NDArray[np.bool_]) -> Array:
+    """Directions of a subspace that have nothing of the dropped entries."""
+    if not unseen.shape[1] or not dropped.any():
+        return unseen
+    _, values, axes = np.linalg.svd(unseen[dropped])
+    rank = int(np.sum(values > np.sqrt(ROUNDING)))
+    return np.asarray(unseen @ axes[rank:].T)

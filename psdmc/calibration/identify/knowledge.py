@@ -1,0 +1,189 @@
+"""What a user knows of the bodies before the fit: confidence in the file's values, and bounds, from the tables `prior` and
+[[bodies]] of a description."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from psdmc.calibration.identify.essential import EssentialOptions
+from psdmc.calibration.identify.physical import NO_BOUNDS, Bounds
+from psdmc.calibration.identify.stated_prior import Confidence, body_confidence
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.toml_tables import TomlTable, is_number, require_none, shown
+from psdmc.calibration.logs.wording import listed, quoted
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
+
+SHARES = (1e-4, 100.0)
+"""Of a mass or inertia: standard deviations that can be stated."""
+COM_STDS = (1e-5, 10.0)
+"""m, of a centre of mass."""
+HEAVIEST = 1e5
+"""kg, of a link."""
+FARTHEST = 100.0
+"""m, of a centre of mass from its link's frame."""
+AXES = ("x", "y", "z")
+HINT = "docs/how-to/priors.md describes these tables"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Knowledge:
+    """What is known before the fit.
+
+    confidence  by number of the link; empty: nothing is stated
+    bounds      of masses and centres of mass
+    essential   how parameters are dropped; None: all are kept
+    """
+
+    confidence: Mapping[int, Confidence] = field(default_factory=dict)
+    bounds: Bounds = NO_BOUNDS
+    essential: EssentialOptions | None = None
+
+
+def knowledge_of(
+    model: DynamicsModel,
+    tables: Mapping[str, Any],
+    where: str,
+    share: float | None = None,
+    essential: EssentialOptions | None = None,
+) -> Knowledge:
+    """What tables and options say; InputError where they are wrong, or state confidence in values that the file lacks.
+
+    share  relative standard deviation of every link's mass, radius of gyration and inertia; None: what `prior` says
+    """
+    faults: list[str] = []
+    if share is not None and not SHARES[0] <= share <= SHARES[1]:
+        faults.append(
+            f"prior confidence: found {share:g}, expected a number from {SHARES[0]:g} to {SHARES[1]:g}"
+        )
+    stated = share if share is not None else _share(tables.get("prior"), faults)
+    wanted = essential or _essential(tables.get("essential"), faults)
+    bodies = _Bodies(model, faults)
+    bodies.read(tables.get("bodies", []))
+    require_none(faults, where, HINT)
+    found = dict(bodies.confidence)
+    if stated is not None:
+        links = enumerate(model.mechanism.parameters)
+        found = {k: found.get(k, body_confidence(link, stated)) for k, link in links}
+    if found:
+        _require_values(model)
+    return Knowledge(found, bodies.bounds(), wanted)
+
+
+def _require_values(model: DynamicsModel) -> None:
+    if model.theta_b is None:
+        raise InputError(
+            f"{model.mechanism.name}: a confidence in the file's values is stated, but it lacks some or all inertias",
+            "leave the confidence out, or give masses and inertias in the robot's file",
+        )
+
+
+def _share(value: object, faults: list[str]) -> float | None:
+    if value is None:
+        return None
+    table = TomlTable(value, "prior", ("confidence",), faults)
+    return table.number("confidence", *SHARES) if isinstance(value, dict) else None
+
+
+def _essential(value: object, faults: list[str]) -> EssentialOptions | None:
+    if value is None:
+        return None
+    table, usual = TomlTable(value, "essential", ("relative", "significance"), faults), EssentialOptions()
+    return EssentialOptions(
+        table.number("relative", 0.01, 100.0, usual.relative),
+        table.number("significance", 1e-6, 0.5, usual.significance),
+    )
+
+
+class _Bodies:
+    """The entries of [[bodies]]: `link`, and any of `mass`, `com` (bounds) and `confidence`."""
+
+    def __init__(self, model: DynamicsModel, faults: list[str]) -> None:
+        self.model, self.faults = model, faults
+        self.confidence: dict[int, Confidence] = {}
+        self._rows: list[tuple[Array, float, str]] = []
+
+    def bounds(self) -> Bounds:
+        width = PARAMETERS_PER_LINK * len(self.model.mechanism)
+        rows = np.reshape([row for row, _, _ in self._rows], (-1, width))
+        return Bounds(
+            rows, np.array([side for _, side, _ in self._rows]), tuple(name for *_, name in self._rows)
+        )
+
+    def read(self, value: object) -> None:
+        if not isinstance(value, list):
+            self.faults.append(f"bodies: found {shown(value)}, expected [[bodies]]")
+            return
+        seen: set[int] = set()
+        for k, entry in enumerate(value, start=1):
+            table = TomlTable(entry, f"body {k}", ("link", "mass", "com", "confidence"), self.faults)
+            link = self._link(table)
+            if link in seen:
+                self.faults.append(f"{table.where}: link {quoted(table.text('link'))} a second time")
+            if link is not None:
+                seen.add(link)
+                self._entry(table, link)
+
+    def _link(self, table: TomlTable) -> int | None:
+        name = table.text("link")
+        names = [joint.link_name for joint in self.model.mechanism.joints]
+        if name in names:
+            return names.index(name)
+        if name:
+            self.faults.append(
+                f"{table.where}: link {quoted(name)} does not move, moving links are {listed(names)}"
+            )
+        return None
+
+    def _entry(self, table: TomlTable, link: int) -> None:
+        name = self.model.mechanism.joints[link].link_name
+        if table.has("mass"):
+            low, high = self._pair(table, "mass", 0.0, HEAVIEST)
+            self._bound(link, 0, low, high, None, f"mass of {name}")
+        if table.has("com"):
+            com = TomlTable(table.content["com"], f"{table.where}: com", AXES, self.faults)
+            for axis, letter in enumerate(AXES):
+                if com.has(letter):
+                    low, high = self._pair(com, letter, -FARTHEST, FARTHEST)
+                    self._bound(link, 1 + axis, low, high, 0, f"centre of mass of {name}, {letter}")
+        if table.has("confidence"):
+            own = TomlTable(
+                table.content["confidence"],
+                f"{table.where}: confidence",
+                ("mass", "com", "inertia"),
+                self.faults,
+            )
+            self.confidence[link] = Confidence(
+                own.number("mass", *SHARES), own.number("com", *COM_STDS), own.number("inertia", *SHARES)
+            )
+
+    def _pair(self, table: TomlTable, key: str, low: float, high: float) -> tuple[float, float]:
+        value = table.content[key]
+        if _is_pair(value) and low <= value[0] < value[1] <= high:
+            return float(value[0]), float(value[1])
+        self.faults.append(
+            f"{table.where}: {key}: found {_pair_shown(value)}, expected [low, high] from {low:g} to {high:g}"
+        )
+        return low, high
+
+    def _bound(self, link: int, place: int, low: float, high: float, times: int | None, name: str) -> None:
+        """x[place] from `low` to `high`, times the mass where x[place] is a moment."""
+        for sign, side, word in ((1.0, low, "least"), (-1.0, -high, "most")):
+            row = np.zeros(PARAMETERS_PER_LINK * len(self.model.mechanism))
+            row[PARAMETERS_PER_LINK * link + place] = sign
+            if times is not None:
+                row[PARAMETERS_PER_LINK * link + times] = -side
+            self._rows.append((row, side if times is None else 0.0, f"{name}: {word} {sign * side:g}"))
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(is_number, value))
+
+
+def _pair_shown(value: Any) -> str:
+    return str(value) if _is_pair(value) else shown(value)

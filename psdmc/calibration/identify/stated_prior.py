@@ -1,0 +1,109 @@
+"""The file's bodies as knowledge with a stated confidence: a normal prior of theta_b, and the estimate that joins it with
+the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psdmc.calibration.identify.least_squares import Estimate
+from psdmc.calibration.identify.physical import whitening_of
+from psdmc.calibration.logs.log import Array
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.inertia import six_of
+from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK
+
+VAGUE = 10.0
+"""Relative standard deviation of what nothing is stated of: ten times its size."""
+
+
+@dataclass(frozen=True, slots=True)
+class Confidence:
+    """How well a link's body is known: standard deviations.
+
+    mass     share of the file's
+    com      m
+    inertia  share of the file's moments about the centre of mass, and of the drive inertia
+    """
+
+    mass: float
+    com: float
+    inertia: float
+
+
+def body_confidence(link: Array, share: float) -> Confidence:
+    """The same share of mass, radius of gyration and inertia, of a link's standard parameters (11,)."""
+    mass, inertia = max(float(link[0]), np.finfo(float).tiny), _about_centre(link)
+    return Confidence(share, share * float(np.sqrt(max(np.trace(inertia), 0.0) / (2.0 * mass))), share)
+
+
+def theta_covariance(model: DynamicsModel, stated: dict[int, Confidence]) -> Array:
+    """(l, l) of theta_b, from what is stated of links by number; the others are vaguely known."""
+    covariance = np.zeros((PARAMETERS_PER_LINK * len(model.mechanism),) * 2)
+    for k, link in enumerate(model.mechanism.parameters):
+        own = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
+        covariance[own, own] = _covariance(link, stated.get(k, body_confidence(link, VAGUE)))
+    return np.asarray(model.B @ covariance @ model.B.T)
+
+
+def _covariance(link: Array, own: Confidence) -> Array:
+    """(11, 11) of one link's standard parameters, to first order in mass, centre of mass, inertia and drive inertia."""
+    mass, inertia = float(link[0]), _about_centre(link)
+    com = link[1:4] / mass if mass > 0 else np.zeros(3)
+    axes = np.abs(np.diag(inertia))
+    std = np.zeros(11)
+    std[0] = own.mass * mass
+    std[1:4] = own.com
+    std[4:10] = own.inertia * six_of(np.sqrt(np.outer(axes, axes)))
+    std[DRIVE] = own.inertia * abs(float(link[DRIVE]))
+    slopes = np.zeros((PARAMETERS_PER_LINK, 11))
+    slopes[0, 0] = 1.0
+    slopes[1:4, 0], slopes[1:4, 1:4] = com, mass * np.eye(3)
+    slopes[4:10, 0] = six_of(com @ com * np.eye(3) - np.outer(com, com))
+    for axis, unit in enumerate(np.eye(3)):
+        turned = 2.0 * (com @ unit) * np.eye(3) - np.outer(com, unit) - np.outer(unit, com)
+        slopes[4:10, 1 + axis] = mass * six_of(turned)
+    slopes[4:10, 4:10], slopes[DRIVE, DRIVE] = np.eye(6), 1.0
+    return np.asarray((slopes * std**2) @ slopes.T)
+
+
+def _about_centre(link: Array) -> Array:
+    """(3, 3) inertia about the centre of mass."""
+    xx, xy, yy, xz, yz, zz = link[4:BODY_PARAMETERS]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    mass = float(link[0])
+    if not mass > 0:
+        return inertia
+    com = link[1:4] / mass
+    return np.asarray(inertia - mass * (com @ com * np.eye(3) - np.outer(com, com)))
+
+
+def with_prior(solved: Estimate, theta_b: Array, covariance: Array) -> Estimate:
+    """The estimate that is likeliest by data and prior together (maximum a posteriori; both normal).
+
+    theta_b, covariance   (l,), (l, l)  of the prior of the vector's first l entries
+
+    Hidden directions are kept for what is said of visibility; standard deviations are those of both together.
+    """
+    l, m = len(theta_b), len(solved.values)
+    by_data = whitening_of(solved.total_covariance + solved.prior_covariance)
+    by_prior = np.zeros((l, m))
+    by_prior[:, :l] = whitening_of(covariance)
+    both: Array = np.asarray(np.linalg.qr(np.vstack([by_data, by_prior]), mode="r"), dtype=np.float64)
+    start = np.concatenate([theta_b, solved.values[l:]])
+    pulled = by_prior.T @ (by_prior @ (start - solved.values))
+    values = solved.values + np.linalg.solve(both, np.linalg.solve(both.T, pulled))
+    inverse = np.linalg.inv(both)
+    total = inverse @ inverse.T
+    of_theta = np.arange(m) < l
+    return replace(
+        solved,
+        values=values,
+        covariance=total,
+        considered=np.zeros((m, 0)),
+        total_covariance=total,
+        prior_std=0.0,
+        whitening=both,
+        identifiable=solved.identifiable | of_theta,
+    )
