@@ -59,7 +59,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 def _jacobians(found: Arrays, given: Mapping[str, Array], slopes: tuple[Array, Array]) -> Arrays:
     by_q, by_qd, by_tau = (found[name] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))
-    by_state, by_torque = semi_implicit_on_arrays(by_q, by_qd, by_tau, step_on_arrays(given), *slopes)
+    by_state, by_torque = semi_implicit_on_arrays(by_q, by_qd, by_tau, step_on_arrays(given), slopes)
     return {"A": by_state, "B": by_torque}
 
 

@@ -89,10 +89,11 @@ def _plus_one(i: int, row: list[Scalar]) -> list[Scalar]:
 
 
 def semi_implicit_on_arrays(
-    by_q: Array, by_qd: Array, by_tau: Array, dt: Array, by_start: Array, by_way: Array
+    by_q: Array, by_qd: Array, by_tau: Array, dt: Array, slopes: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """(k, 2 nv, 2 nv) and (k, 2 nv, nv): `semi_implicit` on arrays, as matrices of the two half steps; by_start and by_way
-    (k, nv, nv) are how `integrate` moves with either of its arguments."""
+    """(k, 2 nv, 2 nv) and (k, 2 nv, nv): `semi_implicit` on arrays, as matrices of the two half steps; `slopes` (k, nv, nv)
+    are how `integrate` moves with either of its arguments."""
+    by_start, by_way = slopes
     n, h = by_q.shape[-1], dt[..., None]
     unit, none = np.broadcast_to(np.eye(n), by_q.shape), np.zeros_like(by_q)
     kick = np.block([[unit, none], [h * by_q, unit + h * by_qd]])

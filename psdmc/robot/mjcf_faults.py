@@ -58,9 +58,13 @@ def _tendons(mujoco: Any, model: Any) -> Iterator[str]:
 
 
 def _balls(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
-    for k in range(model.njnt):
-        if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_BALL:
-            yield f"ball joint {shown(names.joint(k))}; three hinges on one body turn likewise"
+    for k in _of_balls(mujoco, model):
+        if model.dof_armature[model.jnt_dofadr[k]] > 0.0:
+            yield f"armature of ball joint {shown(names.joint(k))}, a drive's inertia about three axes"
+
+
+def _of_balls(mujoco: Any, model: Any) -> list[int]:
+    return [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_BALL]
 
 
 def followers(mujoco: Any, model: Any, names: Names) -> dict[str, Follows]:
@@ -97,6 +101,12 @@ def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
         ],
         "bodies that a program moves (mocap) stand where they are": [
             names.body(b) for b in bodies if model.body_mocapid[b] >= 0
+        ],
+        "q of ball joints is a quaternion x y z w, MuJoCo's w x y z": [
+            names.joint(j) for j in _of_balls(mujoco, model)
+        ],
+        "limits of ball joints are not read": [
+            names.joint(j) for j in _of_balls(mujoco, model) if model.jnt_limited[j]
         ],
         "drive inertia of a free joint is left out": [
             names.joint(j)

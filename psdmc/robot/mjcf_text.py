@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from psdmc.robot.limits import TINIEST
 from psdmc.robot.mjcf_faults import Follows
 from psdmc.robot.mjcf_names import Names, free_name
-from psdmc.robot.source_words import DRIVE, NOTE
+from psdmc.robot.source_words import BALL, DRIVE, NOTE
 
 Array = NDArray[np.float64]
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
@@ -108,8 +108,11 @@ def _body(writer: _Writer, body: int) -> None:
 
 
 def _at_reference(writer: _Writer, j: int, origin: Array, turn: Array, axis: Array) -> tuple[Array, Array]:
-    """A joint's frame, so that its q is the file's: turned about, or shifted along, its axis by minus its reference."""
+    """A joint's frame, so that its q is the file's: turned about, or shifted along, its axis by minus its reference, which
+    ball joints have not."""
     model, mujoco = writer.model, writer.mujoco
+    if _is_ball(writer, j):
+        return origin, turn
     reference = float(model.qpos0[model.jnt_qposadr[j]])
     if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE:
         return origin - reference * _rotated(mujoco, turn, axis), turn
@@ -121,6 +124,9 @@ def _at_reference(writer: _Writer, j: int, origin: Array, turn: Array, axis: Arr
 
 def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array, Array]) -> None:
     model, name = writer.model, writer.names.joint(j)
+    if _is_ball(writer, j):
+        _ball(writer, j, writer.joint(name, "floating", parent, child, place))
+        return
     slides = model.jnt_type[j] == writer.mujoco.mjtJoint.mjJNT_SLIDE
     limited, forced = bool(model.jnt_limited[j]), bool(model.jnt_actfrclimited[j])
     kind = "prismatic" if slides else "revolute" if limited else "continuous"
@@ -133,16 +139,31 @@ def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array
         limits["effort"] = _number(np.abs(model.jnt_actfrcrange[j]).max())
     if limits:
         SubElement(element, "limit", limits)
-    dof = int(model.jnt_dofadr[j])
-    damping, friction = model.dof_damping[dof], model.dof_frictionloss[dof]
-    if damping > 0.0 or friction > 0.0:
-        SubElement(element, "dynamics", damping=_number(damping), friction=_number(friction))
+    _dynamics(writer, j, element)
     if name in writer.follows:
         rule = writer.follows[name]
         numbers = {"multiplier": _number(rule.ratio), "offset": _number(rule.offset)}
         SubElement(element, "mimic", {"joint": rule.leader, **numbers})
-    if model.dof_armature[dof] > 0.0:
-        SubElement(element, DRIVE, inertia=_number(model.dof_armature[dof]))
+    armature = model.dof_armature[model.jnt_dofadr[j]]
+    if armature > 0.0:
+        SubElement(element, DRIVE, inertia=_number(armature))
+
+
+def _is_ball(writer: _Writer, j: int) -> bool:
+    return bool(writer.model.jnt_type[j] == writer.mujoco.mjtJoint.mjJNT_BALL)
+
+
+def _ball(writer: _Writer, j: int, element: Element) -> None:
+    """What makes a floating joint a ball joint, to psdmc."""
+    _dynamics(writer, j, element)
+    SubElement(element, BALL)
+
+
+def _dynamics(writer: _Writer, j: int, element: Element) -> None:
+    model, dof = writer.model, int(writer.model.jnt_dofadr[j])
+    damping, friction = model.dof_damping[dof], model.dof_frictionloss[dof]
+    if damping > 0.0 or friction > 0.0:
+        SubElement(element, "dynamics", damping=_number(damping), friction=_number(friction))
 
 
 def _origin(parent: Element, place: Array, turn: Array) -> None:

@@ -15,6 +15,7 @@ import pinocchio
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Array
 from psdmc.robot.numerals import words
+from psdmc.robot.source_words import ball_names
 from psdmc.robot.urdf_words import ATTRIBUTES
 from psdmc.robot.xml_text import parse_xml
 
@@ -47,13 +48,30 @@ def pinocchio_model(
     wanted = tostring(
         dynamics_of(root, movable, {"continuous": "revolute", **(kinds or {})}), encoding="unicode"
     )
+    balls = () if kinds else [JOINT_PREFIX + name for name in ball_names(root)]
     try:
         if free_root is None:
-            return pinocchio.buildModelFromXML(wanted)
-        return pinocchio.buildModelFromXML(wanted, pinocchio.JointModelFreeFlyer(), JOINT_PREFIX + free_root)
+            return _with_balls(pinocchio.buildModelFromXML(wanted), balls)
+        root_joint = pinocchio.JointModelFreeFlyer()
+        return _with_balls(pinocchio.buildModelFromXML(wanted, root_joint, JOINT_PREFIX + free_root), balls)
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"{source}: Pinocchio cannot read it: {reason}", "check_urdf may say more") from None
+
+
+def _with_balls(model: pinocchio.Model, balls: Collection[str]) -> pinocchio.Model:
+    """The model with these free joints as spherical ones, which no URDF can have."""
+    if not balls:
+        return model
+    found = pinocchio.Model()
+    found.name, found.gravity = model.name, model.gravity
+    for k in range(1, model.njoints):
+        about = pinocchio.JointModelSpherical() if model.names[k] in balls else model.joints[k]
+        found.addJoint(model.parents[k], about, model.jointPlacements[k], model.names[k])
+        found.inertias[k] = model.inertias[k]
+    for frame in list(model.frames)[1:]:
+        found.addFrame(frame, False)
+    return found
 
 
 def locked_at(model: pinocchio.Model, held: Mapping[str, float]) -> pinocchio.Model:

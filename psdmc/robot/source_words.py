@@ -1,4 +1,5 @@
-"""Words of psdmc's own in the URDF that it makes of an MJCF: drive inertias and notes, in a name space that others skip."""
+"""Words of psdmc's own in the URDF that it makes of an MJCF: drive inertias, ball joints and notes, in a name space that
+others skip."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from xml.etree.ElementTree import Element
 
 from psdmc.errors import InputError
 from psdmc.robot.draft import Draft
+from psdmc.robot.joints import FREE, SPHERICAL
 from psdmc.robot.limits import DRIVE_INERTIA
 from psdmc.robot.mechanism import DRIVE as DRIVE_PLACE
 from psdmc.robot.xml_text import number, parse_xml
@@ -14,6 +16,8 @@ from psdmc.robot.xml_text import number, parse_xml
 SPACE = "urn:psdmc:source"
 DRIVE = f"{{{SPACE}}}drive"
 """Of a <joint>: inertia, kg m^2 (kg), of its drive."""
+BALL = f"{{{SPACE}}}ball"
+"""Of a floating <joint>: it turns about every axis, and stays where it is."""
 NOTE = f"{{{SPACE}}}note"
 """Of the <robot>: text, one sentence for `show`."""
 
@@ -39,7 +43,20 @@ def with_source_words(draft: Draft, text: str, source: str) -> Draft:
     has_drive = tuple(
         drive or joint.name in drives for drive, joint in zip(draft.drives, draft.joints, strict=True)
     )
-    return replace(draft, parameters=tuple(parameters), drives=has_drive, notes=(*notes, *draft.notes))
+    balls = ball_names(root)
+    joints = tuple(replace(own, type=SPHERICAL) if own.name in balls else own for own in draft.joints)
+    return replace(
+        draft, joints=joints, parameters=tuple(parameters), drives=has_drive, notes=(*notes, *draft.notes)
+    )
+
+
+def ball_names(robot: Element) -> tuple[str, ...]:
+    """Joints of a text of psdmc's own making that are ball joints."""
+    return tuple(
+        joint.get("name", "")
+        for joint in robot.findall("joint")
+        if joint.find(BALL) is not None and joint.get("type") == FREE.urdf_words[0]
+    )
 
 
 def _drive(joint: Element) -> float:

@@ -228,9 +228,9 @@ def test_a_serial_arm_keeps_its_factors() -> None:
 def test_functions_of_joints_of_one_coordinate_are_refused() -> None:
     model = derived("anymal_b", True)[1]
     with pytest.raises(
-        InputError, match=r"no frame_velocity_derivatives: .*joint 'root_joint' moves freely"
+        InputError, match=r"no rk4_step_derivatives: .*joint 'root_joint' moves freely"
     ) as caught:
-        lower(model, "factored", ("gravity", "frame_velocity_derivatives"))
+        lower(model, "factored", ("gravity", "rk4_step_derivatives"))
     assert caught.value.hint == "leave it out: --functions gravity"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from psdmc.compiler import derive
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
+from psdmc.model.random_states import on_joints
 from psdmc.robot.load import load_robot, load_robot_text
 from psdmc.robot.mujoco_reading import force_from_mujoco, to_mujoco
 from psdmc.verification.check import check_model
@@ -47,6 +49,17 @@ GRIPPER = """<mujoco><compiler angle="radian"/><worldbody>
 <body name="r" pos="0 -.1 .05"><joint name="right" axis="1 1 0" ref=".3"/><geom type="box" size=".01 .02 .05"/></body></body>
 </worldbody><equality><joint name="same" joint1="right" joint2="left" polycoef=".1 -1.5 0 0 0"/></equality></mujoco>"""
 
+BALLS = """<mujoco><option gravity="0.3 0 -9.5"/><worldbody>
+<body name="torso" pos="0 0 1" euler="10 20 30">
+ <joint name="waist" axis="0 1 1" pos=".02 0 .1"/><joint name="spine" type="ball" pos=".1 .05 0" damping=".3"/>
+ <joint name="tail" type="slide" axis="1 1 0" ref=".2"/><geom type="box" size=".3 .2 .1" pos=".05 0 0"/>
+ <body name="arm" pos=".3 .2 0" euler="5 6 7"><joint name="shoulder" type="ball" range="0 90" limited="true"/>
+  <geom type="capsule" size=".03" fromto="0 0 0 .1 0 -.4"/>
+  <body name="hand" pos=".1 0 -.4"><joint name="elbow" axis="1 0 0"/><joint type="ball" pos="0 .01 .02"/>
+   <geom type="ellipsoid" size=".1 .05 .02" pos="0 0 -.1"/></body></body>
+ <body name="leg" pos="0 -.2 0"><joint name="hip" type="ball" pos="0 .1 0"/><geom type="box" size=".1 .05 .3"/></body>
+</body></worldbody></mujoco>"""
+
 
 def written(folder: Path, text: str, name: str = "robot.xml") -> Path:
     (folder / name).write_text(text, encoding="utf-8")
@@ -79,10 +92,14 @@ def states(count: int, nq: int, nv: int) -> tuple[np.ndarray, np.ndarray, np.nda
 
 def places(model, robot: DynamicsModel) -> list[int]:
     """Where MuJoCo has psdmc's joints, which are in another order on bodies that branch."""
+    return [int(model.jnt_dofadr[j]) for j in joint_numbers(model, robot)]
+
+
+def joint_numbers(model, robot: DynamicsModel) -> list[int]:
+    """MuJoCo's numbers of psdmc's joints, of those without a name too."""
     numbers = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in robot.joint_names]
-    named = [j for j in numbers if j >= 0]
-    rest = [j for j in range(model.njnt) if j not in named]
-    return [int(model.jnt_dofadr[rest.pop(0) if j < 0 else j]) for j in numbers]
+    rest = [j for j in range(model.njnt) if j not in numbers]
+    return [rest.pop(0) if j < 0 else j for j in numbers]
 
 
 def agrees(ours: np.ndarray, theirs: np.ndarray) -> None:
@@ -196,7 +213,7 @@ def test_pinocchios_reading_of_the_same_file_gives_the_same_torques(tmp_path: Pa
     )
 
 
-@pytest.mark.parametrize("text", [ARM, FLYING, GRIPPER], ids=["arm", "flying", "gripper"])
+@pytest.mark.parametrize("text", [ARM, FLYING, GRIPPER, BALLS], ids=["arm", "flying", "gripper", "balls"])
 def test_a_model_file_holds_all_that_check_needs(text: str, tmp_path: Path) -> None:
     """Also without the MJCF and its includes: the source is embedded as psdmc has translated it."""
     path = written(tmp_path, text)
@@ -259,10 +276,83 @@ def test_constraints_are_refused_by_name(more: str, message: str, tmp_path: Path
     assert "take them out of the file" in str(refused.value.hint)
 
 
-def test_ball_joints_are_refused_by_name(tmp_path: Path) -> None:
-    text = with_more("").replace('<joint name="j2"/>', '<joint name="shoulder" type="ball"/>')
+def balls_agree(path: Path) -> DynamicsModel:
+    """psdmc's torques are those of MuJoCo's own model of the file, its quaternions w x y z; a free root comes first."""
+    robot, model = derive(path, snap=0.0), of_file(path)
+    given = states(20, robot.nq, robot.nv)
+    q, qd, qdd = on_joints(robot.mechanism, given[0]), *given[1:]
+    ours, flies = robot.inverse_dynamics(q, qd, qdd), robot.mechanism.types[0].word == "free"
+    if flies:
+        q, qd, qdd = to_mujoco(q, qd, qdd)
+    theirs, at, order = np.zeros((len(q), model.nq)), 0, []
+    for kind, j in zip(robot.mechanism.types, joint_numbers(model, robot), strict=True):
+        own, first = q[:, at : at + kind.nq], int(model.jnt_qposadr[j])
+        theirs[:, first : first + kind.nq] = own[:, [3, 0, 1, 2]] if kind.word == "spherical" else own
+        order += [int(model.jnt_dofadr[j]) + k for k in range(kind.nv)]
+        at += kind.nq
+    rates = [np.zeros_like(qd) for _ in range(2)]
+    for whole, own in zip(rates, (qd, qdd), strict=True):
+        whole[:, order] = own
+    tau = torques(model, theirs, *rates)[:, order]
+    agrees(ours, force_from_mujoco(q, tau) if flies else tau)
+    return robot
 
-    with pytest.raises(InputError, match="ball joint 'shoulder'; three hinges"):
+
+def balled(seed: int) -> str:
+    """A random tree with a ball joint for each body's last hinge: MuJoCo takes no turn behind one on the same body."""
+
+    def last_turns(joints: re.Match[str]) -> str:
+        before, hinge, behind = joints[0].rpartition('type="hinge"')
+        behind = re.sub(r'^ axis="[^"]*"( pos="[^"]*") ref="[^"]*" armature="[^"]*"', r"\1", behind)
+        return f'{before}type="ball"{behind}' if hinge else joints[0]
+
+    return re.sub(r"(<joint [^>]*/>)+", last_turns, random_mjcf(seed))
+
+
+@pytest.mark.parametrize("text", [BALLS, *map(balled, (0, 1, 2, 3, 4, 6, 7, 8))])
+def test_ball_joints_turn_as_mujocos(text: str, tmp_path: Path) -> None:
+    """Alone on a body, before and behind other joints, about other points than the body's origin."""
+    robot = balls_agree(written(tmp_path, text))
+
+    assert "spherical" in [kind.word for kind in robot.mechanism.types]
+    assert all(row.passed for row in check_model(robot))
+
+
+def test_ball_joints_of_a_robot_that_flies(tmp_path: Path) -> None:
+    root = '<body name="root" pos="0 0 1"><freejoint/><geom size=".1"/><body name="torso"'
+    text = BALLS.replace('<body name="torso"', root).replace("</worldbody>", "</body></worldbody>")
+    robot = balls_agree(written(tmp_path, text))
+
+    words = [kind.word for kind in robot.mechanism.types]
+    assert (words[0], words.count("spherical")) == ("free", 4)
+    assert all(row.passed for row in check_model(robot))
+
+
+def test_a_ball_joint_can_be_held(tmp_path: Path) -> None:
+    robot = derive(written(tmp_path, BALLS), lock={"spine": 0.0, "hip": 0.0})
+
+    assert [kind.word for kind in robot.mechanism.types].count("spherical") == 2
+    assert all(row.passed for row in check_model(robot))
+
+
+def test_what_is_left_out_of_ball_joints_is_said(tmp_path: Path) -> None:
+    robot = derive(written(tmp_path, BALLS))
+    notes = robot.mechanism.notes
+
+    assert (
+        "q of ball joints is a quaternion x y z w, MuJoCo's w x y z: 'spine', 'shoulder', 'joint5', 'hip'"
+        in notes
+    )
+    assert "limits of ball joints are not read: 'shoulder'" in notes
+    assert any("'spine'" in note and "damping" in note for note in notes)
+
+
+def test_a_drive_of_a_ball_joint_is_refused_by_name(tmp_path: Path) -> None:
+    text = with_more("").replace('<joint name="j2"/>', '<joint name="shoulder" type="ball" armature=".1"/>')
+
+    with pytest.raises(
+        InputError, match="not modelled: armature of ball joint 'shoulder', a drive's inertia"
+    ):
         load_robot(written(tmp_path, text))
 
 
