@@ -154,9 +154,9 @@ def place_of(
 ) -> tuple[str, int]:
     """Table and place (from 0) of a column by its name or number."""
     if table is not None and table not in tables:
-        raise refused(
-            f"{where}: table {quoted(table)}, expected one of {listed([quoted(t) for t in tables])}"
-        )
+        known = f"expected one of {listed([quoted(t) for t in tables])}"
+        said = known if tuple(tables) != ("",) else "but its log is one file: expected none"
+        raise refused(f"{where}: table {quoted(table)}, {said}")
     among = {table: tables[table]} if table is not None else tables
     if isinstance(column, int):
         if len(among) > 1:
@@ -180,9 +180,8 @@ def _no_column(column: str, count: int, among: Mapping[str, Columns], where: str
     files = " and ".join(columns.name for columns in among.values())
     names = [quoted(name) for columns in among.values() for name in columns.names]
     if count:
-        return refused(
-            f"{where}: column {quoted(column)} stands {count} times in {files}, expected its number"
-        )
+        asked = "its table, too" if len(among) > 1 else "its number"
+        return refused(f"{where}: column {quoted(column)} stands {count} times in {files}, expected {asked}")
     has = f"which has {listed(names)}" if names else "which has no header: expected its number"
     return refused(f"{where}: no column {quoted(column)} in {files}, {has}")
 

@@ -18,6 +18,7 @@ MOST_LISTED = 4
 
 def doubts(found: Findings) -> Iterator[str]:
     """All doubts."""
+    yield from _sampled_slowly(found)
     yield from _few(found)
     yield from _fair(found)
     yield from _earlier_steps(found)
@@ -34,6 +35,37 @@ def doubts(found: Findings) -> Iterator[str]:
 def fits_poorly(found: Findings) -> bool:
     """Whether R^2 or gains raise a doubt. Only then are other readings of the log's columns considered."""
     return any(True for _ in (*_fair(found), *_odd_gains(found)))
+
+
+def _sampled_slowly(found: Findings) -> Iterator[str]:
+    """Doubts about plain logs whose differences are no good accelerations up to the filter's cut-off."""
+    step = None if found.record.prediction is None else found.record.prediction.steps.get("all")
+    rates = [
+        (log["rows"] - 1) / log["seconds"] for log in found.record.facts.get("data", ()) if log["seconds"] > 0
+    ]
+    if step is None or not rates:
+        return
+    rate, cutoff = min(rates), step.filter.cutoff
+    lost = acceleration_lost(cutoff / rate)
+    sound = cutoff_for(found.limits.acceleration_lost) * rate
+    if lost > found.limits.acceleration_lost:
+        yield (
+            f"sampled at {rate:.3g} Hz and filtered at {cutoff:g} Hz: accelerations of the fastest motion come out up to "
+            f"{lost:.0%} too small, and inertias too large; a cut-off of {sound:.2g} Hz or less avoids that"
+        )
+
+
+def acceleration_lost(share: float) -> float:
+    """Share by which a second difference is smaller than the second derivative of a sine, whose frequency is `share` of
+    the sampling rate: 1 - (2 - 2 cos w) / w^2, w = 2 pi share."""
+    w = 2.0 * np.pi * share
+    return float(1.0 - (2.0 - 2.0 * np.cos(w)) / w**2)
+
+
+def cutoff_for(lost: float) -> float:
+    """The largest frequency, in units of the sampling rate, whose acceleration loses no more than this share: by the
+    first terms of the series, w^2 / 12 - w^4 / 360."""
+    return float(np.sqrt(15.0 - np.sqrt(225.0 - 360.0 * lost)) / (2.0 * np.pi))
 
 
 def _few(found: Findings) -> Iterator[str]:
