@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
+from lowered import lowered
 from random_trees import RandomTree
 
 from psdmc.derivation.derive import derive_model
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
-from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.robot.mechanism import BASE
@@ -48,7 +48,7 @@ def shape(name: str, seed: int = 1) -> tuple[RandomTree, DynamicsModel]:
 
 @cache
 def kernels(name: str, seed: int = 1) -> dict[str, Kernel]:
-    return lower(shape(name, seed)[1], "factored", FUNCTIONS, theta_variants=False)
+    return lowered(shape(name, seed)[1], "factored", FUNCTIONS, theta_variants=False)
 
 
 def package_of(name: str, options: EmitOptions, functions: Sequence[str] = FUNCTIONS) -> PackageView:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -42,8 +43,11 @@ def compiled(package: PackageView, optimised: bool) -> Path:
 
 
 def wrapper(folder: Path) -> Path:
-    """A program to name in CC, which the package's own build files then call: the compiler without optimisation."""
+    """A program to name in CC, which the package's own build files then call, and which is `cc` where its folder comes first
+    in PATH: the compiler without optimisation."""
     script = folder / "cc"
-    script.write_text(f'#!/bin/sh\nexec {shlex.join(find_compiler().command)} "$@" -O0\n', encoding="utf-8")
+    program, *options = find_compiler().command
+    words = [str(shutil.which(program)), *options]
+    script.write_text(f'#!/bin/sh\nexec {shlex.join(words)} "$@" -O0\n', encoding="utf-8")
     script.chmod(0o755)
     return script

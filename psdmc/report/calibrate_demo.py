@@ -41,12 +41,8 @@ def run_demo(
     variants: tuple[str, ...] = ("sensors",),
     workers: int = 2,
     say: Callable[[str], None] = print,
-    plan: CampaignOptions = WHOLE,
 ) -> dict[str, Comparison]:
-    """Plan, simulate, calibrate and report each variant; returns each result's comparison with the truth.
-
-    plan  options of the campaign
-    """
+    """Plan, simulate, calibrate and report each variant; returns each result's comparison with the truth."""
     begin = time.monotonic()
 
     def step(text: str) -> None:
@@ -56,7 +52,7 @@ def run_demo(
     unknown = replace(model, theta_b=None)
     robot = compile_model(model, functions=["regressor"])
     step("searching an exciting motion")
-    runs, found = plan_campaign(model.mechanism, robot, model.l, plan)
+    runs, found = plan_campaign(model.mechanism, robot, model.l, WHOLE)
     step(
         f"condition {found.condition:.2f}, best random one {found.random_conditions[0]:.2f}: {found.gain:.2f} times"
     )

@@ -1,7 +1,5 @@
-"""The whole demonstration on the virtual Denso, in a short form of `make calibrate-demo`: a campaign of half the length,
-its slow motions logged at 250 Hz and its sines a third as many, whose exciting motion is searched for among a fortieth of
-the candidates. `make test-demo`: the long one by the same bounds, and imperfect sensors, which `make test` tries on a
-smaller arm (test_four_steps.py)."""
+"""The whole demonstration on the virtual Denso, as `make calibrate-demo` runs it: `make test-demo`. `make test` tries the
+same steps by the same comparison on an arm of two joints (test_four_steps.py)."""
 
 from __future__ import annotations
 
@@ -10,32 +8,21 @@ from pathlib import Path
 
 import pytest
 
-from psdmc.calibration.campaign import CampaignOptions
-from psdmc.calibration.motions.excite import ExciteOptions
-from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.calibration.truth import Comparison
-from psdmc.report.calibrate_demo import WHOLE, run_demo
+from psdmc.report.calibrate_demo import run_demo
 
 ROOT = Path(__file__).resolve().parents[2]
-SHORT = CampaignOptions(
-    sweep=SweepOptions(seconds=60.0, period=4e-3),
-    sines=SineOptions(ratio=8.0),
-    excite=ExciteOptions(evaluations=3000, random=200, seconds=600.0),
-    gravity_runs=1,
-    repeats=3,
-    table="npz",
-)
-"""The search ends by its count, not by the clock: the motion is the same on every machine."""
-LONG = os.environ.get("PSDMC_DEMO") == "whole"
-PLAN = WHOLE if LONG else SHORT
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(os.environ.get("PSDMC_DEMO") != "whole", reason="make test-demo takes it"),
+]
 
 
 def found(variant: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Comparison:
     monkeypatch.chdir(ROOT)
-    return run_demo(folder, (variant,), workers=1, plan=PLAN)[variant]
+    return run_demo(folder, (variant,), workers=1)[variant]
 
 
-@pytest.mark.slow
 def test_the_virtual_denso_is_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     ideal = found("ideal", tmp_path, monkeypatch)
 
@@ -48,8 +35,6 @@ def test_the_virtual_denso_is_found_again(tmp_path: Path, monkeypatch: pytest.Mo
     )
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not LONG, reason="make test-demo takes it")
 def test_imperfect_sensors_leave_the_truth_within_its_uncertainty(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

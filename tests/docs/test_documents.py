@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -25,6 +26,7 @@ def test_blocks_run(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "document").mkdir()
     monkeypatch.chdir(tmp_path / "document")
     monkeypatch.setenv("CC", str(wrapper(tmp_path)))
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")  # what they call `cc` likewise
 
     assert run(document, tmp_path / "document") > 0
 

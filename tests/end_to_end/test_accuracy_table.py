@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 import pytest
 from answers import Questions, compiled_answers, errors, numpy_answers, program_answers, too_large
+from lowered import lowered
 from robots_at_hand import BUNDLED, FOREIGN, GENERIC, NAMES, loaded, subject
 from unoptimised import compiled as library
 
@@ -19,13 +20,10 @@ from psdmc.compiler import provenance
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_view
-from psdmc.functions import DEFAULT
-from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of
-from psdmc.toolchain.kept_kernels import lowered_once
 
 FEW = 100
 """States at which generic robots' other functions are evaluated from E and P: theirs are the largest."""
@@ -59,14 +57,12 @@ def test_the_model_in_numpy(name: str):
     assert not too_large(told(robot.label, found))
 
 
-@pytest.mark.parametrize("name", SHOWN)
+@pytest.mark.parametrize("name", NAMES if WHOLE else tuple(name for name in SHOWN if name not in GENERIC))
 def test_its_program_and_its_c(name: str):
     robot = subject(name, expand=name not in GENERIC)  # E and P of those are too large to be lowered
     questions = Questions(robot)
 
-    costs = repr(EmitOptions().target.costs)
-    parts = (robot.model.content_hash, "auto", costs, *DEFAULT)  # the key that psdmc.compile uses
-    kernels = lowered_once(parts, lambda: lower(robot.model))
+    kernels = lowered(robot.model)
 
     found = errors(questions, program_answers(kernels, robot.model, questions))
     found |= errors(questions, compiled_answers(compiled(name, robot.model, kernels), robot.model, questions))

@@ -84,9 +84,10 @@ def test_the_installed_wheel_does_what_readme_shows_first(built: Path, tmp_path:
     """In an environment of its own that shares nothing but the dependencies, far from the checkout."""
     (wheel,) = built.glob("*.whl")
     environment = tmp_path / "environment"
-    venv.create(environment, with_pip=True, symlinks=True)
+    venv.create(environment, symlinks=True)
     python = environment / "bin" / "python"
-    subprocess.run([python, "-m", "pip", "install", "-q", "--no-deps", "--no-index", wheel], check=True)
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "-q"]
+    subprocess.run([*pip, "--no-deps", "--no-index", str(wheel)], check=True)
     folder = next((environment / "lib").glob("python*/site-packages"))
     beside = "".join(f"import site; site.addsitedir({path!r})\n" for path in site.getsitepackages())
     (folder / "dependencies.pth").write_text(beside, encoding="utf-8")

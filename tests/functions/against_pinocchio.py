@@ -10,6 +10,7 @@ from functools import cache, cached_property
 import numpy as np
 import pytest
 from direct import Direct
+from lowered import lowered
 from random_chains import Oracle, random_chain
 from robots_at_hand import Subject, drawn, subject
 from unoptimised import compiled
@@ -18,7 +19,6 @@ from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
 from psdmc.functions import DEFAULT, RECIPES
-from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
@@ -27,7 +27,6 @@ from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.robot.reference import Reference
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of
-from psdmc.toolchain.kept_kernels import lowered_once
 
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
 """`make test-accuracy`: more robots, and all that are compiled whole optimised."""
@@ -142,9 +141,7 @@ def kernels(name: str) -> dict[str, Kernel]:
 @cache
 def _lowered(name: str, functions: tuple[str, ...]) -> dict[str, Kernel]:
     """Once for both precisions, and once for all workers of a test run."""
-    model = robot(name).model
-    parts = (model.content_hash, "factored", *functions)
-    return lowered_once(parts, lambda: lower(model, "factored", functions))
+    return lowered(robot(name).model, "factored", functions)
 
 
 def matches_pinocchio(function: str, name: str, real: str = "float64") -> None:

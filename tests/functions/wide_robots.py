@@ -7,13 +7,13 @@ from functools import cache, cached_property
 
 import numpy as np
 import pinocchio as pin
+from lowered import lowered
 from random_trees import TREES, RandomTree
 from unoptimised import without_optimisation
 
 import psdmc
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
-from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import on_joints
 from psdmc.program.interpret import interpret
@@ -94,7 +94,7 @@ def is_pinocchios(function: str, name: str, exact: float = EXACT, in_c: bool = T
     own, recipe = wide_robot(name), RECIPES[function]
     expected = recipe.pinocchio(own.pinocchio, own.given)
     _compare(expected, recipe.reference(own.arrays, own.given), exact)
-    kernels = lower(own.model, "factored", [function], theta_variants=recipe.signature.theta)
+    kernels = lowered(own.model, functions=[function])  # by the factored lowering: there is no E
     given = {q.name: own.given[q.name].reshape(COUNT, -1) for q in recipe.signature.inputs}
     for kernel in kernels.values():
         for program in (kernel.single, kernel.batch):

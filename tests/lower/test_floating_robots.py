@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from bundled import bundled_model
-from pinocchio_robots import PinocchioRobot, robot_at_hand
+from pinocchio_robots import robot_at_hand
 from random_trees import TREES, RandomTree, assert_near
+from whole_robots import ROBOTS, WHOLE, derived, lowered
 
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError, InputError
@@ -18,34 +18,11 @@ from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics
 from psdmc.lower.kernels import lower
 from psdmc.lower.search import SINGLE, Search
-from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
-from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Sizes
 
 COUNT = 20
-FUNCTIONS = (
-    "inverse_dynamics",
-    "forward_dynamics",
-    "mass_matrix",
-    "nonlinear_effects",
-    "gravity",
-    "regressor",
-    "jacobian",
-    "kinetic_energy",
-    "potential_energy",
-    "momentum",
-    "com_jacobian",
-    "centre_of_mass",
-    "centroidal_momentum_matrix",
-    "mass_matrix_inverse",
-)
-COUNTED = FUNCTIONS[:3]
-"""All that is asked of the second quadruped."""
-
-ROBOTS = [("anymal_b", True), ("solo12", True), ("allegro", False)]
-WHOLE = [("anymal_b", True), ("allegro", False)]
 AT_MOST = {
     ("anymal_b", "inverse_dynamics"): 1310,
     ("anymal_b", "mass_matrix"): 662,
@@ -61,18 +38,6 @@ AT_MOST = {
 
 on_whole = pytest.mark.parametrize(("name", "floating"), WHOLE)
 on_each = pytest.mark.parametrize(("name", "floating"), ROBOTS)
-
-
-@cache
-def derived(name: str, floating: bool) -> tuple[PinocchioRobot, DynamicsModel]:
-    robot = robot_at_hand(name, floating)
-    return robot, derive_model(robot.mechanism, expand=False)
-
-
-@cache
-def lowered(name: str, floating: bool) -> dict[str, Kernel]:
-    functions = FUNCTIONS if (name, floating) in WHOLE else COUNTED
-    return lower(derived(name, floating)[1], "factored", functions, theta_variants=False)
 
 
 def run(name: str, floating: bool, function: str, **given: np.ndarray) -> np.ndarray:

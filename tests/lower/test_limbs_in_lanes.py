@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from limbed import FUNCTIONS, SHAPES, kernels, limbed, shape
-from pinocchio_robots import PinocchioRobot, robot_at_hand
+from whole_robots import ROBOTS, derived, lowered
 
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.frames import BASE
@@ -37,8 +37,6 @@ SAME = 1e-13
 """Of each entry's largest value: rounding of the same sums in another order."""
 SOLVED = 1e-10
 """The same of accelerations, which a mass matrix's condition magnifies."""
-
-ROBOTS = {"anymal_b": True, "solo12": True, "allegro": False}
 
 
 def sizes_of(model: DynamicsModel) -> Sizes:
@@ -111,15 +109,10 @@ def test_any_equal_limbs(
         )
 
 
-def robot(name: str) -> tuple[PinocchioRobot, DynamicsModel]:
-    found = robot_at_hand(name, ROBOTS[name])
-    return found, derive_model(found.mechanism, expand=False)
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_real_robots_limbs_run_in_lanes_and_agree_with_pinocchio(name: str) -> None:
-    theirs, model = robot(name)
-    made = lower(model, "factored", FUNCTIONS, theta_variants=False)
+@pytest.mark.parametrize(("name", "floating"), ROBOTS)
+def test_real_robots_limbs_run_in_lanes_and_agree_with_pinocchio(name: str, floating: bool) -> None:
+    theirs, model = derived(name, floating)
+    made = lowered(name, floating)
     q, qd, qdd = theirs.motion(COUNT)
     tau = theirs.each(pin.rnea, q, qd, qdd)
     states, sizes = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}, sizes_of(model)

@@ -64,6 +64,7 @@ def test_no_call_takes_more_than_16_kib(target: str, package: Path, tmp_path: Pa
     assert _of_one_state(deepest) <= MOST_OF_ONE_STATE, deepest
 
 
+@pytest.mark.skipif(not WHOLE, reason="make test-accuracy takes it: gcc's time at -O3")
 @pytest.mark.parametrize("target", TAKEN)
 def test_derivatives_take_what_the_documents_say(target: str, tmp_path: Path) -> None:
     if shutil.which("gcc") is None:
