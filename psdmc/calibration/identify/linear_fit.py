@@ -191,7 +191,7 @@ def calibrate_linear(
     return found
 
 
-LOAD_ROUNDS = 3
+LOAD_ROUNDS = 2
 """Fits after the first where friction depends on the load: each takes the load of the one before, whose error it inherits
 times the coefficient of friction, some hundredths."""
 

@@ -13,6 +13,8 @@ from sprung_plant import Run, recorded, torsional_spring
 from psdmc.calibration.columns.columns import read_columns
 from psdmc.calibration.columns.effect import Motion
 from psdmc.calibration.columns.kinds import kinds_of
+from psdmc.calibration.identify.coupling import Coupling
+from psdmc.calibration.identify.extra import motion_of
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError
@@ -99,6 +101,39 @@ def test_slopes_are_those_of_the_length() -> None:
     assert np.abs(columns - length(q)[:, None] * by_difference).max() < 1e-8
     assert np.abs(columns[:, 0]).max() < 1e-12
     assert np.abs(columns[:, 1]).max() > 1e-2
+
+
+def test_friction_s_columns_are_their_formulas() -> None:
+    chain = bundled_model("two_link_full").mechanism
+    tables = {"asymmetric": True, "load": [chain.joint_names[1]], "stribeck": {"speeds": [0.1, 0.7]}}
+    columns = read_columns({"friction": tables}, chain)
+    rng = np.random.default_rng(1)
+    v, load = 0.1 * rng.normal(size=(30, 2)), rng.normal(size=(30, 2))
+    found = columns.values(Motion(0 * v, v, v, 0.03, load))
+    sign, own = np.tanh(v / 0.03), np.eye(2)
+    expected = [np.abs(sign[:, k, None]) * own[k] for k in range(2)]
+    expected += [(sign * np.abs(load))[:, 1, None] * own[1]]
+    peaks = [sign * np.exp(-((v / speed) ** 2)) for speed in (0.1, 0.7)]
+    expected += [peak[:, k, None] * own[k] for k in range(2) for peak in peaks]
+    assert np.abs(found - np.stack(expected, axis=2)).max() < 1e-15
+    names = [(unknown.owner, unknown.name) for unknown in columns.unknowns]
+    assert names[-1] == (chain.joint_names[1], "stribeck_0.7")
+    assert not columns.plain_offsets
+
+
+def test_motors_that_drive_several_joints_rub_themselves() -> None:
+    """With q_joint = C q_motor: friction at the motors' speeds, by virtual work on the joints."""
+    chain = bundled_model("two_link_full").mechanism
+    matrix = np.array([[1.0, 0.0], [-0.5, 2.0]])
+    columns = read_columns({"friction": {"asymmetric": True, "load": True}}, chain)
+    rng = np.random.default_rng(1)
+    v, load = rng.normal(size=(30, 2)), rng.normal(size=(30, 2))
+    found = columns.values(motion_of(0 * v, v, 0.03, load, Coupling.of(matrix.tolist())))
+    motors = np.linalg.solve(matrix, v.T).T
+    sign, carried = np.tanh(motors / 0.03), load @ matrix
+    of_motors = np.stack([np.abs(sign) * [3.0, 0.0], sign * np.abs(carried) * [0.0, 0.2]]).sum(axis=0)
+    expected = np.linalg.solve(matrix.T, of_motors.T).T
+    assert np.abs(found @ [3.0, 0.0, 0.0, 0.2] - expected).max() < 1e-13
 
 
 LOG_TOML = """

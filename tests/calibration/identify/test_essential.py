@@ -13,6 +13,7 @@ import psdmc
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.essential import EssentialOptions, essential
 from psdmc.calibration.identify.least_squares import Estimate, FitOptions, Prior, estimate
+from psdmc.calibration.identify.physical import nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.verdict.delivered import delivered_quality
@@ -71,6 +72,32 @@ def test_what_the_data_need_stays_however_uncertain_it_looks() -> None:
     assert found.dropped.sum() == 1
     assert found.estimate.values.sum() == pytest.approx(2.0, abs=0.2)
     assert found.estimate.std[~found.dropped] > 0.3  # of itself: it stands for the other, too
+
+
+def test_together_they_are_needed_though_none_is_by_itself() -> None:
+    """Twenty values of 1.7 standard deviations: each looks uncertain, two may go, a third has F = 2.9 over 2.6."""
+    rng = np.random.default_rng(3)
+    columns = np.linalg.qr(rng.normal(size=(COUNT, 20)))[0][:, None, :]
+    noise = rng.normal(size=COUNT)
+    noise -= columns[:, 0] @ (columns[:, 0].T @ noise)
+    noise /= np.sqrt(np.sum(noise**2) / (COUNT - 20))
+    target = columns @ np.full(20, 1.7) + noise[:, None]
+    whole = estimate(columns, target, FitOptions(method="ols"), prior=Prior(np.zeros(20), np.full(20, 100.0)))
+    assert np.all(whole.std > 0.5 * np.abs(whole.values))
+    found = essential(whole, np.zeros(20), COUNT, EssentialOptions())
+    assert 2 <= found.dropped.sum() <= 5  # more than two where standard deviations allow for dependent residuals
+    assert found.f <= found.limit
+
+
+def test_what_is_dropped_stays_where_it_is_in_a_physical_robot(arm) -> None:
+    """The other parameters follow, so that bodies exist with exactly these."""
+    pytest.importorskip("cvxpy")
+    theta = np.array(arm.model.theta_b)
+    impossible, fixed = theta - 3.0 * np.abs(theta), np.arange(len(theta)) == 1
+    impossible[1] = theta[1]
+    near = nearest_physical(arm.model, impossible, 10.0 * np.eye(len(theta)), fixed=fixed)
+    assert near.values[1] == theta[1]
+    assert arm.model.B @ near.x == pytest.approx(near.values, abs=1e-5)
 
 
 def test_nothing_is_dropped_that_is_known() -> None:

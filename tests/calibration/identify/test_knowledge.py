@@ -99,6 +99,7 @@ def test_a_stated_prior_fills_what_the_data_leave_open(arm, still_elbow: Log) ->
     assert np.all(np.abs(theta - arm.model.theta_b) < 3.0 * std)
     assert "by the stated prior more than by the data" in {row.visibility for row in found.parameters}
     assert any("by the stated prior" in warning for warning in found.warnings)
+    assert found.facts["physical_distance_std"] < 1.0  # the file's bodies count once
 
 
 def test_confidence_decides_how_far_the_data_may_move(arm, log: Log) -> None:
