@@ -196,7 +196,7 @@ def test_functions_of_joints_of_one_coordinate_are_refused() -> None:
         InputError, match=r"no rk4_step_derivatives: .*joint 'root_joint' moves freely"
     ) as caught:
         lower(model, "factored", ("gravity", "rk4_step_derivatives"))
-    assert caught.value.hint == "leave it out: --functions gravity"
+    assert caught.value.hint == "leave it out: --functions forward_dynamics_derivatives,gravity"
 
 
 def test_e_and_p_of_a_free_root_are_refused() -> None:
