@@ -13,6 +13,7 @@ from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array
 from psdmc.robot.mujoco_reading import NotCompared, force_from_mujoco, mujoco_torques, to_mujoco
+from psdmc.robot.mujoco_warnings import kept_warnings
 from psdmc.robot.reference import reference
 from psdmc.robot.reference_followers import OnCoordinates
 
@@ -77,7 +78,8 @@ def read_mjcf_back(model: DynamicsModel, text: str) -> Reading:
     except ImportError:
         return Reading("MuJoCo", float("nan"), "MuJoCo is not installed")
     try:
-        found = mujoco.MjModel.from_xml_string(text)
+        with kept_warnings(mujoco):
+            found = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
         return Reading("MuJoCo", float("nan"), " ".join(str(error).split())[:REASON])
     found.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT

@@ -13,12 +13,16 @@ from typing import Any
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import shown
-from psdmc.robot.mjcf_faults import followers, left_out, refuse_constraints
+from psdmc.robot.mjcf_faults import followers, left_out, refuse_constraints, refuse_references
 from psdmc.robot.mjcf_names import Names
 from psdmc.robot.mjcf_text import tree_text
+from psdmc.robot.mujoco_warnings import kept_warnings
 
 ROOT = re.compile(r"\s*(?:<\?xml.*?\?>|<!--.*?-->|\s+)*<\s*([\w:.-]+)", re.DOTALL)
 """Up to the name of an XML text's root element."""
+
+NOT_A_NUMBER = "NaN"
+"""What MuJoCo's warning of such a number has in it."""
 
 REASON = 300
 """Characters of MuJoCo's own message that an error repeats."""
@@ -45,11 +49,12 @@ def read_mjcf(path: Path, source: str) -> MjcfRobot:
     InputError where MuJoCo is not installed or refuses the file, and where the file has what psdmc does not model.
     """
     mujoco = _mujoco(source)
-    model = _compiled(mujoco, path, source)
+    model, warned = _compiled(mujoco, path, source)
     names = Names.of(mujoco, model)
     refuse_constraints(mujoco, model, names, source)
+    refuse_references(mujoco, model, names, source)
     free = _free_root(mujoco, model, names, source)
-    notes = [f"MJCF, as MuJoCo {mujoco.__version__} compiles it", *left_out(mujoco, model, names)]
+    notes = [f"MJCF, as MuJoCo {mujoco.__version__} compiles it", *left_out(mujoco, model, names), *warned]
     gx, gy, gz = model.opt.gravity.tolist()
     follows = followers(mujoco, model, names)
     return MjcfRobot(tree_text(mujoco, model, names, follows, free, notes), (gx, gy, gz), free is not None)
@@ -66,15 +71,20 @@ def _mujoco(source: str) -> Any:
     return mujoco
 
 
-def _compiled(mujoco: Any, path: Path, source: str) -> Any:
+def _compiled(mujoco: Any, path: Path, source: str) -> tuple[Any, list[str]]:
+    """MuJoCo's model, and notes of what it warned of."""
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        with kept_warnings(mujoco) as said:
+            model = mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         raise InputError(
             f"{source}: MuJoCo refuses it: {reason[:REASON]}",
             "files that it includes, and its meshes, must be where it says: try MuJoCo's own viewer",
         ) from None
+    if any(NOT_A_NUMBER in text for text in said):
+        raise InputError(f"{source}: a number of it is NaN", "write a number there")
+    return model, [f"MuJoCo warns: {text[:REASON]}" for text in said]
 
 
 def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None:

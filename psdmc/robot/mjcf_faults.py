@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from psdmc.errors import InputError
-from psdmc.robot.limits import joined, shown
+from psdmc.robot.limits import ANGLE, LENGTH, joined, shown
 from psdmc.robot.mjcf_names import Names, named
 from psdmc.robot.tree import listed
 
@@ -31,6 +31,18 @@ def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> No
         faults.append("deformable bodies (flex)")
     if faults:
         raise InputError(f"{source}: not modelled: {joined(faults)}", REMEDY)
+
+
+def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> None:
+    """InputError that names joints whose reference position is no place that sine and cosine are exact for."""
+    ranges = {int(mujoco.mjtJoint.mjJNT_HINGE): ANGLE, int(mujoco.mjtJoint.mjJNT_SLIDE): LENGTH}
+    found = []
+    for j in range(model.njnt):
+        reference, of = float(model.qpos0[model.jnt_qposadr[j]]), ranges.get(int(model.jnt_type[j]))
+        if of is not None and (fault := of.fault(reference)):
+            found.append(f"joint {shown(names.joint(j))}: ref {reference:g} {fault}")
+    if found:
+        raise InputError(f"{source}: {joined(found)}", "write an angle within a few turns")
 
 
 def _loops(mujoco: Any, model: Any) -> Iterator[str]:

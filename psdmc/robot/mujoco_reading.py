@@ -13,6 +13,7 @@ from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, Placement
+from psdmc.robot.mujoco_warnings import kept_warnings
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference import has_assumptions
 from psdmc.robot.rotation import from_quaternion
@@ -162,7 +163,8 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
     text = dynamics_of(root, moving, {})
     SubElement(SubElement(text, "mujoco"), "compiler", COMPILER)
     try:
-        model = mujoco.MjModel.from_xml_string(tostring(text, encoding="unicode"))
+        with kept_warnings(mujoco):
+            model = mujoco.MjModel.from_xml_string(tostring(text, encoding="unicode"))
     except ValueError as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         raise NotCompared(f"MuJoCo refuses it: {shown(reason[:REASON])}") from None

@@ -17,6 +17,7 @@ from minimise import smaller_archive, smaller_lines, smaller_options, smaller_ru
 from mutate_argv import mutate_argv
 from mutate_bytes import mutate_bytes, mutate_lines
 from mutate_csv import mutate_csv
+from mutate_mjcf import mutate_mjcf
 from mutate_npz import mutate_npz
 from mutate_options import mutate_options
 from mutate_package import mutate_package
@@ -61,6 +62,7 @@ FORMATS = {
     format.name: format
     for format in (
         Format("urdf", ".urdf", target_robots.urdf, mutate_xml, (smaller_xml, *_TEXT), 0.2, 20),
+        Format("mjcf", ".xml", target_robots.mjcf, mutate_mjcf, (smaller_xml, *_TEXT), 0.08, 20),
         Format("dh", ".toml", target_robots.dh, mutate_toml, _TEXT, 0.2, 20),
         Format("options", ".json", target_robots.with_options, mutate_options, (smaller_options, *_TEXT), 0.1, 20),
         Format("model", ".npz", target_models.model, mutate_npz, _ZIP, 0.1, 10),

@@ -101,6 +101,7 @@ def _seeds(own: Path) -> dict[str, list[bytes]]:
             *(text(f"{name}.urdf").encode() for name in ("arm", "pendulum", "hand", "legs")),
             *_urdfs(robots),
         ],
+        "mjcf": [text(f"{name}_mjcf.xml").encode() for name in ("arm", "flying", "gripper")],
         "dh": [*dh, *tables],
         "options": [_with_options(*words) for words in OPTIONS],
         "model": [*_models(robots), (own / "files" / "arm.npz").read_bytes()],

@@ -7,6 +7,7 @@ from typing import Any
 
 from mutate_options import robot_and_options
 from oracle import torque_error
+from oracle_mjcf import mujoco_error
 from outcome import BrokenRule
 
 from psdmc.compiler import provenance
@@ -29,6 +30,20 @@ def urdf(data: bytes, folder: Path, deep: bool) -> None:
 
 def dh(data: bytes, folder: Path, deep: bool) -> None:
     _robot(data, folder / "robot.toml", "dh", deep, {})
+
+
+def mjcf(data: bytes, folder: Path, deep: bool) -> None:
+    """As MuJoCo compiles it, held against MuJoCo's own torques, and as the URDF that psdmc keeps of it."""
+    file = folder / "robot.xml"
+    file.write_bytes(data)
+    loaded = load_robot(file)
+    if deep:
+        _derived(loaded, "urdf")
+        error = mujoco_error(file, _model(loaded.unsnapped() if loaded.snap_report else loaded))
+        if error is not None and not error < TORQUE_LIMIT:
+            raise BrokenRule(
+                "WrongTorque", "psdmc/robot/mjcf_text.py", f"off MuJoCo by {error:.2g} of the largest"
+            )
 
 
 def with_options(data: bytes, folder: Path, deep: bool) -> None:

@@ -118,6 +118,29 @@ def standing(path: Path) -> DynamicsModel:
     return robot
 
 
+@pytest.mark.parametrize("number", ["NaN", "nan", "-NAN"])
+def test_a_number_that_is_none_is_refused_and_nothing_is_littered(
+    number: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """MuJoCo itself prints a warning, writes MUJOCO_LOG.TXT where it stands, and goes on."""
+    monkeypatch.chdir(tmp_path)
+    path = written(tmp_path, ARM.replace("0.05 0.02 0", f"0.05 {number} 0"))
+
+    with pytest.raises(InputError, match=r"a number of it is NaN|MuJoCo refuses it"):
+        load_robot(path)
+
+    assert [item.name for item in tmp_path.iterdir()] == ["robot.xml"]
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(("old", "new"), [('ref="0.1"', 'ref="2e4"'), ('ref="30"', 'ref="1e9"')])
+def test_reference_positions_far_away_are_refused_by_name(old: str, new: str, tmp_path: Path) -> None:
+    name = "slide" if "2e4" in new else "elbow"
+    with pytest.raises(InputError, match=rf"joint '{name}': ref [\d.e+]+ is out of range") as refused:
+        load_robot(written(tmp_path, ARM.replace(old, new)))
+    assert refused.value.hint
+
+
 def test_joints_anchors_references_armature_and_geometry_as_mujoco_has_them(tmp_path: Path) -> None:
     robot = standing(written(tmp_path, ARM))
 
