@@ -52,6 +52,7 @@ MENU = {
         "notation",
         "files",
         "calibration",
+        "log_description",
         "glossary",
         "CHANGELOG",
         "SECURITY",

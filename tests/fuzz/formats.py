@@ -9,6 +9,7 @@ from random import Random
 
 import target_campaigns
 import target_commands
+import target_descriptions
 import target_logs
 import target_models
 import target_packages
@@ -74,6 +75,9 @@ FORMATS = {
         Format("bag", ".yaml", target_logs.bag, mutate_lines, _TEXT, 0.01, 40, target_logs.set_up_bag),
         Format("trajectory", ".csv", target_logs.trajectory, mutate_csv, _TEXT, 0.04, 1),
         Format("campaign", ".toml", target_campaigns.campaign, mutate_toml, _TEXT, 0.04, 50, target_campaigns.set_up),
+        Format("description", ".toml", target_descriptions.description, mutate_toml, _TEXT, 0.05, 30,
+               target_descriptions.set_up),
+        Format("described-csv", ".csv", target_descriptions.described_csv, mutate_csv, _TEXT, 0.03, 2),
         Format("simulated", ".json", target_campaigns.simulated, mutate_package, _TEXT, 0.003, 1, target_campaigns.set_up),
         Format("plant", ".toml", target_campaigns.plant, mutate_toml, _TEXT, 0.05, 20, target_campaigns.set_up),
         Format("plant-robot", ".toml", target_campaigns.plant_robot, mutate_toml, _TEXT, 0.03, 20, target_campaigns.set_up),

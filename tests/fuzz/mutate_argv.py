@@ -45,6 +45,11 @@ VALUES: dict[str, tuple[str, ...]] = {
     "--frames": ("thumb,nail", "palm", "left,right", "left,left", "camera", "base", ",", "nowhere", "universe"),
     "--with": ("casadi", "casadi,casadi", "x", ""),
     "--target": ("native", "cortex-m4f", "avx2", "x", ""),
+    "--friction": ("coulomb,viscous,offset", "coulomb,viscous^0.5", "viscous", "x", ",", "coulomb,viscous^nan"),
+    "--split": ("0.3", "0.15,40", "1", "nan", "0.1,1e9", ",", "x"),
+    "--validate": ("log.csv", "log.npz", "campaign", "missing", "empty"),
+    "--topic": ("/joint_states", "x", "\u00e9", ""),
+    "--joint-map": ("shoulder=elbow,elbow=shoulder", "x=shoulder", "=", "shoulder=", "a=b=c"),
     "--cutoff": ("8", "0", "nan", "1e300"),
     "--drive-inertia": ("all", "0", "1,2", "0.1,-1", "nan", "1e300,1e300", "1,,2", ",", "x"),
     "--assume-zero": ("link1:mx", "shoulder:Ixz@com", "link9:mx", "link1", ":", "link1:", "link1:mx,link1:mx", "@com"),
@@ -72,7 +77,7 @@ VALUES: dict[str, tuple[str, ...]] = {
 
 FLAGS = ("--debug", "--version", "--help", "--no-expand", "--expand", "--terms", "--cost", "--force", "--counts",
          "--log-det", "--ideal", "--harness", "--physical",
-         "--floating", "--payload", "--edited", "--keep", "--", "-o", "-h", "-x")  # fmt: skip
+         "--floating", "--payload", "--edited", "--keep", "--describe", "--", "-o", "-h", "-x")  # fmt: skip
 SLOW = ("--seconds", "--workers", "--rounds")
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import fixtures
 import numpy as np
 from fixtures import FILES, FIT_TO_READ, FIT_TO_USE, SHORT, log, text, trajectory, write_bag, write_files
+from target_descriptions import write_described
 from target_packages import manifest_seed
 
 from psdmc.calibration.logs.log_files import columns_of, write_log
@@ -69,6 +70,7 @@ def write_seeds(below: Path) -> Path:
     for size in (SHORT, FIT_TO_READ):
         write_bag(own / "bags" / str(size[0]), size, mcap=False)
         write_bag(own / "mcap" / str(size[0]), size, mcap=True)
+    write_described(own / "described")
     for name in ("two_link.toml", "plant.toml", "campaign"):
         source = own / "files" / name
         shutil.copytree(source, own / name) if source.is_dir() else shutil.copy(source, own / name)
@@ -114,6 +116,8 @@ def _seeds(own: Path) -> dict[str, list[bytes]]:
         "bag": [(own / "bag" / "metadata.yaml").read_bytes()],
         "trajectory": [_trajectory(own)],
         "campaign": [text("campaign.toml").encode()],
+        "description": [text(f"described{kind}.toml").encode() for kind in ("", "_tables", "_bag")],
+        "described-csv": [(own / "described" / "run.csv").read_bytes().replace(b"a1,a2", b"q1,q2")],
         "simulated": [json.dumps({"motor.csv": "0" * 64, "gravity.csv": "1" * 64}).encode(), b"{}"],
         "plant": [
             text("plant.toml").encode(),

@@ -32,17 +32,22 @@ def without_delays(time: Array, store: RowStore, delays: Array, name: str) -> tu
     moved = RowStore(store.width, store.held)
     for start in range(first, stop, BLOCK_ROWS):
         own = time[start : min(start + BLOCK_ROWS, stop)]
-        moved.append(_moved(time, store, own, start, delays))
+        moved.append(_moved(time, store, own, start, delays, name))
     return time[first:stop], moved
 
 
-def _moved(time: Array, store: RowStore, own: Array, start: int, delays: Array) -> Array:
+def _moved(time: Array, store: RowStore, own: Array, start: int, delays: Array, name: str) -> Array:
     values = np.array(store.rows(start, start + len(own)))
     for delay in dict.fromkeys(delays[delays != 0.0].tolist()):
         begin, end = np.searchsorted(time, own[[0, -1]] + delay)
         low, high = max(int(begin) - NEIGHBOURS, 0), min(int(end) + NEIGHBOURS, len(time))
         columns = np.flatnonzero(delays == delay)
         around = store.rows(low, high)[:, columns]
+        if not np.isfinite(around).all():
+            raise InputError(
+                f"{name}: a column with a delay holds values that are not finite near {own[0]:.6g} s",
+                "cut the log to a clean stretch, or leave the delay out",
+            )
         inside = np.clip(own + delay, time[low], time[high - 1])
         values[:, columns] = interpolate.PchipInterpolator(time[low:high], around)(inside)
     return values

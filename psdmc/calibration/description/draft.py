@@ -14,7 +14,7 @@ from psdmc.calibration.description.columns_found import What
 from psdmc.calibration.description.draft_columns import Guess, guessed
 from psdmc.calibration.description.draft_units import spelled_unit, time_unit, unit_of, velocity_unit
 from psdmc.calibration.description.units import UNITS
-from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log import LARGEST_NUMBER, Array
 from psdmc.calibration.logs.some_columns import Columns, open_columns
 from psdmc.calibration.logs.table_text import TextForm
 from psdmc.calibration.logs.wording import quoted
@@ -115,6 +115,7 @@ def _values(columns: Columns, guess: Guess) -> dict[int, Array]:
         first = next(iter(columns.rows(places)), np.zeros((0, len(places))))
     except InputError:
         return {}
+    first = first[np.all(np.abs(first) < LARGEST_NUMBER, axis=1)]  # not a number compares as false
     return {place: first[:, k] for k, place in enumerate(places)}
 
 

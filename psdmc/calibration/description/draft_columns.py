@@ -31,17 +31,8 @@ WORDS: Mapping[What, tuple[str, ...]] = {
         "load",
     ),
     "position": (
-        "q",
-        "pos",
-        "position",
-        "positions",
-        "angle",
-        "angles",
-        "theta",
-        "enc",
-        "encoder",
-        "ang",
-        "p",
+        *("q", "pos", "position", "positions", "angle", "angles", "theta", "enc", "encoder", "ang", "p"),
+        *("deg", "degrees", "rad", "ticks", "counts"),
     ),
 }
 """Words in the names of columns; velocity before position, as 'qd' begins with 'q'."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,29 +37,37 @@ class Layout:
 def in_si(
     time: Array, store: RowStore, layout: Layout, coupling: CouplingEntry, entry: LogEntry
 ) -> tuple[Array, RowStore]:
-    """The rows in SI units, delays taken out, of joints, between the entry's start and end."""
+    """The rows in SI units, delays taken out, of joints, between the entry's start and end.
+
+    Numbers that are not finite stay what they are: the checks of a log name them.
+    """
     delays = np.array([found.delay for found in layout.columns])
     begin = time[0]
     time, store = without_delays(time, store, delays, entry.name)
-    first, stop = _kept(time - begin, entry)
-    if first >= stop:
-        lasts = f"it lasts {float(time[-1] - begin):.4g} s" if len(time) else "nothing is left of it"
-        raise refused(f"{entry.name}: no rows from {entry.start:g} to {entry.end:g} s, {lasts}")
-    maps = [(coupling.position, True), *([(coupling.velocity, True)] if layout.has_velocity else [])]
-    maps.append((coupling.effort, False))
-    n = store.width // len(maps)
-    converted = RowStore(store.width, store.held)
-    for start in range(first, stop, BLOCK_ROWS):
-        rows = (store.rows(start, min(start + BLOCK_ROWS, stop)) - layout.zeros) * layout.factors
-        for k, (matrix, is_motion) in enumerate(maps):
-            own = slice(k * n, (k + 1) * n)
-            coupled = coupling_of(matrix)
-            if coupled is not None:
-                rows[:, own] = (
-                    coupled.to_joints(rows[:, own]) if is_motion else coupled.torque_of_joints(rows[:, own])
-                )
-        converted.append(rows)
+    with np.errstate(invalid="ignore", over="ignore"):
+        first, stop = _kept(time - begin, entry)
+        if first >= stop:
+            lasts = f"it lasts {float(time[-1] - begin):.4g} s" if len(time) else "nothing is left of it"
+            raise refused(f"{entry.name}: no rows from {entry.start:g} to {entry.end:g} s, {lasts}")
+        maps = _maps(layout, coupling)
+        converted = RowStore(store.width, store.held)
+        for start in range(first, stop, BLOCK_ROWS):
+            rows = (store.rows(start, min(start + BLOCK_ROWS, stop)) - layout.zeros) * layout.factors
+            parts = np.split(rows, len(maps), axis=1)
+            converted.append(np.hstack([onto(part) for onto, part in zip(maps, parts, strict=True)]))
     return time[first:stop], converted
+
+
+def _maps(layout: Layout, coupling: CouplingEntry) -> list[Callable[[Array], Array]]:
+    """What turns a quantity's columns into the joints', in the order of a store's quantities."""
+    motions = [coupling.position, *([coupling.velocity] if layout.has_velocity else [])]
+    maps = [_same if found is None else found.to_joints for found in map(coupling_of, motions)]
+    torques = coupling_of(coupling.effort)
+    return [*maps, _same if torques is None else torques.torque_of_joints]
+
+
+def _same(values: Array) -> Array:
+    return values
 
 
 def _kept(time: Array, entry: LogEntry) -> tuple[int, int]:
