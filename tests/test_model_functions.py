@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
+from unoptimised import without_optimisation
 
 import psdmc
 from psdmc.errors import InputError
@@ -74,7 +75,8 @@ COMPILED = [
 
 @pytest.fixture(scope="module")
 def robot():
-    return psdmc.compile(bundled_model("scara"), functions=COMPILED)
+    with without_optimisation():
+        return psdmc.compile(bundled_model("scara"), functions=COMPILED)
 
 
 @pytest.mark.parametrize("name", COMPILED)

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from bundled import bundled_model
 from robots_at_hand import subject
+from unoptimised import without_optimisation
 
 import psdmc
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.toolchain.call import CompiledRobot
+
+
+@pytest.fixture(scope="module", autouse=True)
+def unoptimised() -> Iterator[None]:
+    """Which function is compiled when, not what a compiler makes of it."""
+    with without_optimisation():
+        yield
 
 
 @pytest.fixture(scope="module")

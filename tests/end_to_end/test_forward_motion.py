@@ -17,6 +17,7 @@ import pytest
 from bundled import robot_path
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from unoptimised import without_optimisation
 
 import psdmc
 
@@ -80,7 +81,8 @@ def arm(path: Path) -> PinocchioArm:
 @pytest.fixture(scope="module")
 def compiled(path: Path) -> Accelerations:
     model = psdmc.derive(path, expand=False)
-    return psdmc.compile(model, functions=["forward_dynamics"]).forward_dynamics
+    with without_optimisation():
+        return psdmc.compile(model, functions=["forward_dynamics"]).forward_dynamics
 
 
 def _motion(accelerations: Accelerations, law: Law, arm: PinocchioArm) -> Motion:

@@ -80,7 +80,7 @@ def test_the_step_of_a_1_khz_controller_compiles_and_arrives(tmp_path: Path) -> 
     flags = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
     source, library = str(EXAMPLES / "mpc_step.cpp"), "package/build/librobot.a"
     for words in (
-        ["make", "-s", "-C", "package", "CFLAGS=-O1", "build/librobot.a"],
+        ["make", "-s", "-C", "package", "CFLAGS=-O0", "build/librobot.a"],
         ["g++", "-std=c++17", "-O1", *flags, "-Ipackage/include", source, library, "-lm", "-o", "mpc"],
     ):
         subprocess.run(words, cwd=tmp_path, check=True)

@@ -154,7 +154,7 @@ def test_four_legs_pay_and_two_stubs_on_an_arm_do_not() -> None:
 
 
 def test_no_lanes_for_theta_for_batches_and_for_machines_without_vectors() -> None:
-    model = shape("four legs of a floating body")[1]
+    model = shape("three fingers on a wrist")[1]
     plain = lower(model, "factored", ["inverse_dynamics"], costs=SCALAR.costs)
     made: dict[str, Kernel] = lower(model, "factored", ["inverse_dynamics"])
     assert plain["inverse_dynamics"].limbs is None

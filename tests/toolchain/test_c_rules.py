@@ -164,7 +164,7 @@ def objects(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
                 [
                     "gcc",
                     "-std=c99",
-                    "-O1",
+                    "-O1" if number == 0 else "-O0",
                     f"-I{folder}/include",
                     "-c",
                     str(folder / source),

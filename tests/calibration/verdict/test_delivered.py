@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,6 +36,9 @@ from psdmc.model.mass_check import check_mass_matrix
 from psdmc.model.store import save
 from psdmc.report.calibrate_report import write_report
 from psdmc.toolchain.build_package import build_package
+
+FEW = ("inverse_dynamics", "forward_dynamics")
+"""Functions of the packages; of one, the default ones."""
 
 
 def written_log(log: Log, path: Path) -> Path:
@@ -73,8 +77,8 @@ def require_delivered(record: Calibration, source, folder: Path, capsys: pytest.
     assert mass.passed
 
 
-def require_package(record: Calibration, folder: Path) -> None:
-    emit_c(record.model, folder / "c")
+def require_package(record: Calibration, folder: Path, functions: Sequence[str] | None = FEW) -> None:
+    emit_c(record.model, folder / "c", functions=functions)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CC", str(wrapper(folder)))
         assert "forward_dynamics" in build_package(folder / "c")
@@ -94,7 +98,7 @@ def test_one_log(arm, log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[st
     record = calibrate(arm.model, path, regressor=arm.regressor)
 
     require_delivered(record, [read_log(path)], tmp_path, capsys)
-    require_package(record, tmp_path)
+    require_package(record, tmp_path, functions=None)
 
 
 @pytest.mark.parametrize("variant", ["noisy", "harness"])
