@@ -21,6 +21,7 @@ _MP: dict[Op, Callable[..., mpmath.mpf]] = {
     Op.NEG: lambda a: -a,
     Op.SIN: mpmath.sin,
     Op.COS: mpmath.cos,
+    Op.SQRT: mpmath.sqrt,
 }
 
 

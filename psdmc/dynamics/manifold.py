@@ -35,6 +35,25 @@ def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequen
     return [x for joint, here, own in _joints(frames, q, rates) for x in joint.coordinate_rates(here, own)]
 
 
+def rates_bent(
+    frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+) -> list[Scalar]:
+    """How `coordinate_rates` change per second while q moves at nv rates of `way`."""
+    both = zip(_joints(frames, q, rates), _joints(frames, q, way), strict=True)
+    return [x for (joint, here, own), (_, _, moved) in both for x in joint.rates_bent(here, own, moved)]
+
+
+def tangent(frames: Sequence[Frame], q: Sequence[Scalar], moved: Sequence[Scalar]) -> list[Scalar]:
+    """nv rates at which `restored(q)` moves while coordinates q, of any length, move by nq of `moved` per second."""
+    found: list[Scalar] = []
+    used = 0
+    for frame in leading(frames):
+        part = slice(used, used + frame.joint.nq)
+        found += frame.joint.tangent(q[part], moved[part])
+        used = part.stop
+    return found
+
+
 def restored(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
     """The nearest positions that the joints can have: quaternions of length one and so on."""
     return [x for joint, here, _ in _joints(frames, q, ()) for x in joint.restored(here)]

@@ -67,7 +67,9 @@ def library_files(package: PackageView) -> dict[str, str]:
     for vector in package.limb_vectors:
         files[f"src/{vector.name}.h"] = render("limbs.h.jinja", package=package, limbs=vector)
     for function in package.functions:
-        files[f"src/{function.name}.c"] = render(_template(function), package=package, function=function)
+        files[f"src/{function.name}.c"] = render(
+            _template(package, function), package=package, function=function
+        )
         for kernel in function.kernels:
             if kernel.called:
                 continue
@@ -83,8 +85,10 @@ def library_files(package: PackageView) -> dict[str, str]:
     return files
 
 
-def _template(function: FunctionView) -> str:
-    return "stages.c.jinja" if function.signature.calls else "function.c.jinja"
+def _template(package: PackageView, function: FunctionView) -> str:
+    if not function.signature.calls:
+        return "function.c.jinja"
+    return "stages_wide.c.jinja" if package.info.is_wide else "stages.c.jinja"
 
 
 def _build_files(package: PackageView) -> tuple[tuple[str, str], ...]:

@@ -8,9 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from psdmc.dynamics.frames import Frame
+from psdmc.dynamics.manifold import coordinate_rates, rates_bent, restored, tangent
 from psdmc.dynamics.scalar import Scalar
+from psdmc.dynamics.slices import leading
 from psdmc.functions import forward_dynamics_derivatives, rk4_step
 from psdmc.program.signature import Signature
+from psdmc.recipes.coordinate_maps import CoordinateMaps
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, A, B, step_on_arrays
@@ -39,11 +43,10 @@ def trace(g: Ingredients) -> Outputs:
         return found["qdd"], found["dqdd_dq"], found["dqdd_dqd"], found["dqdd_dtau"]
 
     n = len(g.still)
-    q, qd = g.inputs["q"], g.inputs["qd"]
-    state, slopes = _stepped([*q, *qd], _start(n), dt, n, at)
+    q_next, qd_next, slopes = _stepped(g.frames, g.inputs["q"], g.inputs["qd"], dt, at)
     return {
-        "q_next": state[:n],
-        "qd_next": state[n:],
+        "q_next": q_next,
+        "qd_next": qd_next,
         "A": [row[: 2 * n] for row in slopes],
         "B": [row[2 * n :] for row in slopes],
         "pivot": pivots,
@@ -56,23 +59,50 @@ def _start(n: int) -> Rows:
 
 
 def _stepped(
-    start: list[Scalar], unit: Rows, dt: Scalar, n: int, at: Callable[[Any, Any], Stage]
-) -> tuple[list[Scalar], Rows]:
-    """The state after dt and its derivatives: both are the start and a sixth of the stages' slopes, 1, 2, 2, 1 times."""
-    state, by = start, unit
+    frames: Sequence[Frame],
+    q: list[Scalar],
+    qd: list[Scalar],
+    dt: Scalar,
+    at: Callable[[Any, Any], Stage],
+) -> tuple[list[Scalar], list[Scalar], Rows]:
+    """The state after dt and its derivatives: both are the start and a sixth of the stages' slopes, 1, 2, 2, 1 times.
+
+    Slopes are those of q's coordinates and of their derivatives; these are along the tangent of q between stages.
+    """
+    nq, n, start = len(q), len(qd), [*q, *qd]
+    by = _start(n)
+    unit = [*_by_column(lambda way: coordinate_rates(frames, q, way), by[:n]), *by[n:]]
     rates: list[list[Scalar]] = []
     turns: list[Rows] = []
+
+    def moved(part: Scalar, rate: Sequence[Scalar], turn: Rows) -> tuple[list[Scalar], list[Scalar], Rows]:
+        state = [x + part * own for x, own in zip(start, rate, strict=True)]
+        rows = [_added(row, part, own) for row, own in zip(unit, turn, strict=True)]
+        along = _by_column(lambda way: tangent(frames, state[:nq], way), rows[:nq])
+        return restored(frames, state[:nq]), state[nq:], [*along, *rows[nq:]]
+
+    here, there = q, qd
     for part in (0.5 * dt, 0.5 * dt, dt, None):
-        qdd, by_q, by_qd, by_tau = at(state[:n], state[n:])
-        rates.append([*state[n:], *qdd])
-        turns.append([*by[n:], *_chained(by_q, by_qd, by_tau, by, n)])
+        qdd, by_q, by_qd, by_tau = at(here, there)
+        rates.append([*coordinate_rates(frames, here, there), *qdd])
+        turns.append([*_coordinates(frames, here, there, by), *_chained(by_q, by_qd, by_tau, by, n)])
         if part is not None:
-            state = [x + part * rate for x, rate in zip(start, rates[-1], strict=True)]
-            by = [_added(row, part, turn) for row, turn in zip(unit, turns[-1], strict=True)]
+            here, there, by = moved(part, rates[-1], turns[-1])
     sixth = (1.0 / 6.0) * dt
-    last = [x + sixth * rate for x, rate in zip(start, _weighted(rates), strict=True)]
-    weighted = [_weighted(rows) for rows in zip(*turns, strict=True)]
-    return last, [_added(row, sixth, turn) for row, turn in zip(unit, weighted, strict=True)]
+    return moved(sixth, _weighted(rates), [_weighted(rows) for rows in zip(*turns, strict=True)])
+
+
+def _coordinates(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar], by: Rows) -> Rows:
+    """Derivatives of the rates of q's coordinates by what the state's derivatives are by."""
+    n = len(qd)
+    own = _by_column(lambda way: coordinate_rates(frames, q, way), by[n:])
+    bent = _by_column(lambda way: rates_bent(frames, q, qd, way), by[:n])
+    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(own, bent, strict=True)]
+
+
+def _by_column(function: Callable[[Sequence[Scalar]], Sequence[Scalar]], rows: Rows) -> Rows:
+    """The rows whose columns are the function's values of these rows' columns."""
+    return [list(row) for row in zip(*(function(column) for column in zip(*rows, strict=True)), strict=True)]
 
 
 def _chained(by_q: Rows, by_qd: Rows, by_tau: Rows, by: Rows, n: int) -> Rows:
@@ -101,36 +131,49 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
         found = ACCELERATIONS.reference(robot, there)
         return qdd, found["dqdd_dq"], found["dqdd_dqd"], found["dqdd_dtau"]
 
-    return _on_arrays(given, at)
+    return _on_arrays(given, CoordinateMaps([frame.joint for frame in leading(robot.frames)]), at)
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
-    return _on_arrays(given, lambda q, qd: robot.forward_dynamics_derivatives(q, qd, given["tau"]))
+    """Pinocchio's accelerations and their derivatives along the stages; it has no such step of coordinates."""
+    maps = CoordinateMaps(robot.joint_types)
+    return _on_arrays(given, maps, lambda q, qd: robot.forward_dynamics_derivatives(q, qd, given["tau"]))
 
 
-def _on_arrays(given: Mapping[str, Array], at: Callable[[Array, Array], Stage]) -> Arrays:
-    """The same step on (k, n) arrays: the stages as one matrix each, of the derivatives of (q, qd)' by (q, qd, tau)."""
-    dt, n = step_on_arrays(given), given["q"].shape[-1]
-    start = np.concatenate([given["q"], given["qd"]], axis=-1)
-    unit = np.broadcast_to(np.eye(2 * n, 3 * n), (len(start), 2 * n, 3 * n))
-    push = np.broadcast_to(np.eye(3 * n)[2 * n :], (len(start), n, 3 * n))
-    rate, turn = np.zeros_like(start), np.zeros_like(unit)
-    state_after, unit_after = start.copy(), unit.copy()
+def _on_arrays(
+    given: Mapping[str, Array], maps: CoordinateMaps, at: Callable[[Array, Array], Stage]
+) -> Arrays:
+    """The same step on (k, nq) and (k, n) arrays: the stages as one matrix each, of the derivatives of the coordinates' and
+    the rates' slopes by (q, qd, tau)."""
+    dt, q0, n = step_on_arrays(given), given["q"], given["qd"].shape[-1]
+    count, step = len(q0), dt[..., None]
+    unit = np.broadcast_to(np.eye(2 * n, 3 * n), (count, 2 * n, 3 * n))
+    push = np.broadcast_to(np.eye(3 * n)[2 * n :], (count, n, 3 * n))
+    first = maps.rates(q0) @ unit[:, :n]
+
+    def moved(share: float, slopes: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array]:
+        way, kick, turn, pushed = slopes
+        coordinates = q0 + share * dt * way
+        along = maps.tangents(coordinates) @ (first + share * step * turn)
+        by = np.concatenate([along, unit[:, n:] + share * step * pushed], axis=-2)
+        return maps.restored(coordinates), given["qd"] + share * dt * kick, by
+
+    state, total, slopes = (q0, given["qd"], unit), None, None
     for reach, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
-        state, by = start + reach * dt * rate, unit + reach * dt[..., None] * turn
-        qdd, by_q, by_qd, by_tau = at(state[:, :n], state[:, n:])
-        rate = np.concatenate([state[:, n:], qdd], axis=-1)
-        turn = np.concatenate(
-            [by[:, n:], np.concatenate([by_q, by_qd], axis=-1) @ by + by_tau @ push], axis=-2
+        q, qd, by = state if slopes is None else moved(reach, slopes)
+        qdd, by_q, by_qd, by_tau = at(q, qd)
+        rates, bent = maps.rates(q), maps.bent(q, qd)
+        slopes = (
+            (rates @ qd[..., None])[..., 0],
+            qdd,
+            rates @ by[:, n:] + bent @ by[:, :n],
+            np.concatenate([by_q, by_qd], axis=-1) @ by + by_tau @ push,
         )
-        state_after += weight / 6 * dt * rate
-        unit_after += weight / 6 * dt[..., None] * turn
-    return {
-        "q_next": state_after[:, :n],
-        "qd_next": state_after[:, n:],
-        "A": unit_after[..., : 2 * n],
-        "B": unit_after[..., 2 * n :],
-    }
+        shares = [weight / 6.0 * x for x in slopes]
+        total = shares if total is None else [x + y for x, y in zip(total, shares, strict=True)]
+    assert total is not None
+    q_next, qd_next, by = moved(1.0, (total[0], total[1], total[2], total[3]))
+    return {"q_next": q_next, "qd_next": qd_next, "A": by[..., : 2 * n], "B": by[..., 2 * n :]}
 
 
 RECIPE = Recipe(
@@ -151,5 +194,4 @@ RECIPE = Recipe(
     "aba, computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
-    of_axes=True,
 )

@@ -20,6 +20,7 @@ import pinocchio
 
 from psdmc.errors import InputError, InternalError
 from psdmc.robot.dh_textbook import dh_model
+from psdmc.robot.joints import REVOLUTE, WIDE_TYPES, JointType
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
@@ -96,6 +97,12 @@ class Reference:
     def frame_ids(self) -> list[int]:
         """Pinocchio's numbers of the named frames."""
         return [self.model.getFrameId(name) for name in self.frame_names or (self.tip_name,)]
+
+    @property
+    def joint_types(self) -> list[JointType]:
+        """Of the joints in Pinocchio's order; all of one coordinate are called revolute."""
+        known = {f"JointModel{kind.pinocchio}": kind for kind in WIDE_TYPES.values()}
+        return [known.get(joint.shortname(), REVOLUTE) for joint in list(self.model.joints)[1:]]
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         return self.each(pinocchio.rnea, q, qd, qdd)

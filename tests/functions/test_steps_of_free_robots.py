@@ -5,7 +5,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from fifty_digits import fifty_digit_jacobian
 from unoptimised import without_optimisation
 from wide_robots import KINDS, is_pinocchios, wide_robot
 
@@ -13,6 +15,7 @@ import psdmc
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.manifold import difference
 from psdmc.functions import RECIPES
+from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.recipes.on_arrays import columns
 from psdmc.recipes.steps import turned
@@ -81,6 +84,42 @@ def test_the_steps_jacobians_are_difference_quotients_along_the_tangents(name: s
         way = columns(difference(frames, list(q0.T), list(q1.T)), len(q0))
         slope = np.concatenate([way, qd1 - qd0], axis=-1) / (2 * step)
         np.testing.assert_allclose(whole[:, :, j], slope, atol=1e-6 * np.abs(whole[:, :, j]).max())
+
+
+@pytest.mark.parametrize("name", ["two", "pair"])
+def test_a_runge_kutta_steps_jacobians_are_its_slopes_at_fifty_digits(name: str) -> None:
+    """Coordinate by coordinate; what these have to do with tangents is asked of Pinocchio, at both ends."""
+    own, dt = wide_robot(name), 0.2
+    recipe, nv, nq = RECIPES["rk4_step_derivatives"], own.model.nv, own.model.nq
+    given = {part: own.given[part][:1] for part in ("q", "qd", "tau")} | {"dt": np.array([dt])}
+    found = recipe.reference(own.arrays, given)
+    step = lower(own.model, "factored", ["rk4_step"], theta_variants=False)["rk4_step"].single
+    point = {part: value.reshape(-1) for part, value in given.items()}
+    blocks = [
+        [fifty_digit_jacobian(step, point, of, size, by) for by in ("q", "qd", "tau")]
+        for of, size in (("q_next", nq), ("qd_next", nv))
+    ]
+    rates = np.array([own.pinocchio.coordinate_rates(given["q"], unit[None])[0] for unit in np.eye(nv)]).T
+    end, small = found["q_next"][0], 1e-5
+
+    def along(way: np.ndarray) -> np.ndarray:
+        sides = [pin.normalize(own.pinocchio.model, end + sign * small * way) for sign in (1.0, -1.0)]
+        return pin.difference(own.pinocchio.model, sides[1], sides[0]) / (2.0 * small)
+
+    back = np.array([along(unit) for unit in np.eye(nq)]).T
+    truth = np.block(
+        [
+            [back @ blocks[0][0] @ rates, back @ blocks[0][1], back @ blocks[0][2]],
+            [blocks[1][0] @ rates, *blocks[1][1:]],
+        ]
+    )
+    whole = np.concatenate([found["A"], found["B"]], axis=-1)[0]
+    np.testing.assert_allclose(whole, truth, atol=1e-8 * np.abs(truth).max())
+
+
+@pytest.mark.parametrize("name", ["two", "pair", "hand"])
+def test_a_runge_kutta_steps_jacobians_are_made_of_pinocchios(name: str) -> None:
+    is_pinocchios("rk4_step_derivatives", name, exact=1e-9)
 
 
 @pytest.mark.parametrize("name", KINDS)

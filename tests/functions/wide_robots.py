@@ -33,6 +33,8 @@ KINDS = {"free": "FRSRLP", "standing": "RSTLRF", "spherical": "SRRSRR", "planar"
 SMALL = {
     "small": (TREES["a wrist with two fingers"], "FRSL"),
     "hand": (TREES["a wrist with two fingers"], "LSRT"),
+    "two": ((-1, 0), "TS"),
+    "pair": ((-1, 0), "FL"),
 }
 """Of four, for functions that take long to lower and to compile."""
 
@@ -96,7 +98,7 @@ def is_pinocchios(function: str, name: str, exact: float = EXACT, in_c: bool = T
     _compare(expected, recipe.reference(own.arrays, own.given), exact)
     kernels = lowered(own.model, functions=[function])  # by the factored lowering: there is no E
     given = {q.name: own.given[q.name].reshape(COUNT, -1) for q in recipe.signature.inputs}
-    for kernel in kernels.values():
+    for kernel in (kernel for kernel in kernels.values() if kernel.function.name == function):
         for program in (kernel.single, kernel.batch):
             theta = {"theta_b": own.model.theta_b} if kernel.theta else {}
             found = interpret(program, given | theta, recipe.signature.sizes(own.sizes))

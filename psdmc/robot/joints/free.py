@@ -9,9 +9,11 @@ from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Ve
 from psdmc.robot.joints.quaternion import (
     angles_between,
     inverse,
+    rates_bent,
     rates_of,
     rotation_of,
     turned_by,
+    turning,
 )
 from psdmc.robot.joints.scalars import TINY, sign, square_of, unit
 from psdmc.robot.joints.wide_joint import WideJoint
@@ -72,6 +74,16 @@ class Free(WideJoint):
 
     def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
         return (*_inward(rotation_of(q[3:]), rates[:3]), *rates_of(q[3:], rates[3:]))
+
+    def rates_bent(
+        self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+    ) -> tuple[Scalar, ...]:
+        turned = _inward(rotation_of(q[3:]), _cross(way[3:], rates[:3]))
+        return (*turned, *rates_bent(q[3:], rates[3:], way[3:]))
+
+    def tangent(self, q: Sequence[Scalar], moved: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        back = rotation_of(inverse(unit(q[3:])))
+        return (*_inward(back, moved[:3]), *turning(q[3:], moved[3:]))
 
 
 def _cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> Vector:

@@ -140,6 +140,17 @@ class JointType:
         """How the nq coordinates change per second at nv rates; linear in these."""
         return tuple(rates)
 
+    def rates_bent(
+        self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+    ) -> tuple[Scalar, ...]:
+        """How `coordinate_rates` at fixed rates change per second while q moves at nv rates of `way`."""
+        return (0.0,) * self.nq
+
+    def tangent(self, q: Sequence[Scalar], moved: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """The nv rates at which `restored(q)` moves where the coordinates q, of any length, move by nq of `moved` per
+        second."""
+        return tuple(moved)
+
     @property
     def hidden(self) -> int:
         """How many inertial parameters of its body the joint cannot tell from those of the body before it.

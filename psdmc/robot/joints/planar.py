@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
 from psdmc.robot.joints.quaternion import arc
-from psdmc.robot.joints.scalars import TINY, root, sign, sincos, unit
+from psdmc.robot.joints.scalars import TINY, root, sign, sincos, square_of, unit
 from psdmc.robot.joints.wide_joint import WideJoint
 
 
@@ -62,6 +62,18 @@ class Planar(WideJoint):
     def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
         (_, _, c, s), (vx, vy, w) = q, rates
         return (c * vx - s * vy, s * vx + c * vy, -(s * w), c * w)
+
+    def rates_bent(
+        self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+    ) -> tuple[Scalar, ...]:
+        (_, _, c, s), (vx, vy, w), turn = q, rates, way[2]
+        turned = -(turn * w)
+        return (-turn * (s * vx + c * vy), turn * (c * vx - s * vy), turned * c, turned * s)
+
+    def tangent(self, q: Sequence[Scalar], moved: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        (_, _, *pair), (dx, dy, dc, ds) = q, moved
+        (c, s), square = unit(pair), square_of(pair)
+        return (c * dx + s * dy, c * dy - s * dx, (pair[0] * ds - pair[1] * dc) / square)
 
 
 def _half(angle: Scalar) -> tuple[Scalar, Scalar, Scalar]:

@@ -76,6 +76,19 @@ def rates_of(quaternion: Sequence[Scalar], angular: Sequence[Scalar]) -> Quatern
     return product(quaternion, (x, y, z, 0.0))
 
 
+def rates_bent(quaternion: Sequence[Scalar], angular: Sequence[Scalar], way: Sequence[Scalar]) -> Quaternion:
+    """How `rates_of` change while the quaternion turns at the angular velocity `way`."""
+    return rates_of(rates_of(quaternion, way), angular)
+
+
+def turning(quaternion: Sequence[Scalar], moved: Sequence[Scalar]) -> Vector:
+    """The angular velocity, along its own frame's axes, at which a quaternion's direction turns while its entries move; of
+    any length."""
+    x, y, z, _ = product(inverse(quaternion), moved)
+    twice = 2.0 / square_of(quaternion)
+    return (twice * x, twice * y, twice * z)
+
+
 def product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Quaternion:
     """First a, then b about the axes that a has turned."""
     (x, y, z, w), (i, j, k, r) = a, b

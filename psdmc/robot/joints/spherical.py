@@ -9,9 +9,11 @@ from typing import ClassVar
 from psdmc.robot.joints.joint_type import TURNS, Rows, Scalar, Twist
 from psdmc.robot.joints.quaternion import (
     angles_between,
+    rates_bent,
     rates_of,
     rotation_of,
     turned_by,
+    turning,
 )
 from psdmc.robot.joints.scalars import unit
 from psdmc.robot.joints.wide_joint import WideJoint
@@ -53,6 +55,14 @@ class Spherical(WideJoint):
 
     def coordinate_rates(self, q: Sequence[Scalar], rates: Sequence[Scalar]) -> tuple[Scalar, ...]:
         return rates_of(q, rates)
+
+    def rates_bent(
+        self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+    ) -> tuple[Scalar, ...]:
+        return rates_bent(q, rates, way)
+
+    def tangent(self, q: Sequence[Scalar], moved: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        return turning(q, moved)
 
 
 SPHERICAL = Spherical()

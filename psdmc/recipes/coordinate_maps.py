@@ -1,0 +1,65 @@
+"""How coordinates and rates of joints go over into each other, as matrices on arrays of states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from psdmc.recipes.on_arrays import columns, matrix
+from psdmc.robot.joints import JointType
+from psdmc.robot.mechanism import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoordinateMaps:
+    """Of the joints in a row; q (k, nq), qd (k, nv)."""
+
+    joints: Sequence[JointType]
+
+    def rates(self, q: Array) -> Array:
+        """(k, nq, nv) rates of the coordinates by rates."""
+        parts = self._parts(q, None)
+        return _diagonal(
+            [_columns(partial(kind.coordinate_rates, own), kind.nv, len(q)) for kind, own, _ in parts]
+        )
+
+    def bent(self, q: Array, qd: Array) -> Array:
+        """(k, nq, nv) the same rates of the coordinates, at fixed rates, by small motions along the tangent."""
+        parts = self._parts(q, qd)
+        return _diagonal(
+            [_columns(partial(kind.rates_bent, own, way), kind.nv, len(q)) for kind, own, way in parts]
+        )
+
+    def tangents(self, q: Array) -> Array:
+        """(k, nv, nq) motions along the tangent of the restored q by those of its coordinates."""
+        parts = self._parts(q, None)
+        return _diagonal([_columns(partial(kind.tangent, own), kind.nq, len(q)) for kind, own, _ in parts])
+
+    def restored(self, q: Array) -> Array:
+        """(k, nq) with quaternions of length one and so on."""
+        return columns([x for joint, own, _ in self._parts(q, None) for x in joint.restored(own)], len(q))
+
+    def _parts(self, q: Array, qd: Array | None) -> Iterator[tuple[JointType, list[Array], list[Array]]]:
+        at, way = 0, 0
+        for joint in self.joints:
+            rates = [] if qd is None else list(qd.T[way : way + joint.nv])
+            yield joint, list(q.T[at : at + joint.nq]), rates
+            at, way = at + joint.nq, way + joint.nv
+
+
+def _columns(function: Callable[[list[float]], Sequence[Array]], width: int, count: int) -> Array:
+    """(k, rows, width): the values of the unit vectors."""
+    values = [function([float(i == j) for i in range(width)]) for j in range(width)]
+    return matrix(values, count).transpose(0, 2, 1)
+
+
+def _diagonal(blocks: Sequence[Array]) -> Array:
+    rows, width = (sum(block.shape[axis] for block in blocks) for axis in (1, 2))
+    whole, at, way = np.zeros((len(blocks[0]), rows, width)), 0, 0
+    for block in blocks:
+        whole[:, at : at + block.shape[1], way : way + block.shape[2]] = block
+        at, way = at + block.shape[1], way + block.shape[2]
+    return whole
