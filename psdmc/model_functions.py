@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.lower.admitted import require
-from psdmc.lower.kernels import refuse_wide
 from psdmc.model.answers import Provider
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature, Sizes
@@ -79,8 +78,6 @@ def _admit(model: DynamicsModel, name: str, with_own_parameters: bool) -> None:
     """InputError where the model cannot have a function."""
     if with_own_parameters:
         require(model, [name])
-    else:
-        refuse_wide(model, (name,))
 
 
 def _refuse_other_lengths(model: DynamicsModel, signature: Signature, given: Mapping[str, Array]) -> None:

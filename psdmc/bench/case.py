@@ -82,13 +82,9 @@ class Case:
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Derivatives of a robot with more rates than MOST_DIFFERENTIATED, and of several coordinates what is of one."""
+        """Derivatives of a robot with more rates than MOST_DIFFERENTIATED."""
         large = self.chain.nv > MOST_DIFFERENTIATED
-        return tuple(
-            name
-            for name in BENCHED
-            if (large and name.endswith(DIFFERENTIATED)) or (self.is_wide and RECIPES[name].of_axes)
-        )
+        return tuple(name for name in BENCHED if large and name.endswith(DIFFERENTIATED))
 
     @property
     def is_wide(self) -> bool:

@@ -8,7 +8,7 @@ from functools import cache
 
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES, default_of
-from psdmc.lower.kernels import refuse_wide, wanted
+from psdmc.lower.kernels import wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix
 from psdmc.model.standard_parameters import lack_of_standard_parameters
@@ -23,7 +23,6 @@ REMEDY = {
 def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
     """InputError where a wanted function (None: the default ones) needs what the model has not."""
     names = wanted(functions, model.mechanism)
-    refuse_wide(model, names)
     lacking = _lacking(model, names)
     for name, reason in lacking.items():
         need = RECIPES[name].needs

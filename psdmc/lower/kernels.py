@@ -24,7 +24,6 @@ from psdmc.program.program import Program
 from psdmc.progress import Step
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.derivable import require_derivable
-from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Mechanism
 from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS
@@ -50,7 +49,6 @@ def lower(
     Raises InputError for an unknown function, and for forward dynamics where the mass matrix is singular for every q.
     """
     require_derivable(model.mechanism)
-    refuse_wide(model, wanted(functions, model.mechanism))
     lowered = _Lowered(model, lowering, costs)
     kernels: dict[str, Kernel] = {}
     recipes = [RECIPES[name] for name in wanted(functions, model.mechanism)]
@@ -67,20 +65,6 @@ def lower(
                 raise _refusal(model, recipe.name, singular) from singular
             kernels[kernel.name] = kernel
     return kernels
-
-
-def refuse_wide(model: DynamicsModel, names: Sequence[str]) -> None:
-    """InputError where a function is of joints of one coordinate, and the robot has others."""
-    wide = next((joint for joint in model.mechanism.joints if not joint.type.about_z), None)
-    unfit = [name for name in names if RECIPES[name].of_axes]
-    if wide is None or not unfit:
-        return
-    others = ",".join(name for name in names if name not in unfit)
-    raise InputError(
-        f"{shown(model.mechanism.name)}: no {unfit[0]}: it is of joints of one coordinate each, and joint"
-        f" {shown(wide.name)} {wide.type.verb}",
-        f"leave it out: --functions {others}" if others else "ask for other functions",
-    )
 
 
 def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None) -> tuple[str, ...]:

@@ -113,5 +113,4 @@ def with_parameter_gradient(
         pinocchio,
         shares=state.shares,
         gradient=GRADIENT_THETA.name,
-        of_axes=state.of_axes,
     )

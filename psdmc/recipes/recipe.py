@@ -124,7 +124,6 @@ class Recipe:
                  number, times theta_b, which `pinocchio` gives
     beside       name of the function whose values this one's are differences of: errors are measured relative to those
     needs        what the model must have; left out: a positive definite mass matrix where the signature has `positive`
-    of_axes      whether it is of robots whose joints have one coordinate each: it differentiates by q, or adds rates to it
     in_limbs     whether its algorithms say what they sum over limbs (Frame.limbs), so that these can run in lanes
     accelerates  whether its accelerations come by the cheaper of two ways (Choices.articulated)
     default      whether it is generated where no functions are named, and
@@ -146,7 +145,6 @@ class Recipe:
     gradient: str | None = None
     beside: str | None = None
     needs: Needs | None = None
-    of_axes: bool = False
     in_limbs: bool = False
     accelerates: bool = False
     default: bool = False

@@ -13,7 +13,6 @@ from psdmc.model.standard_parameters import lack_of_standard_parameters
 from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
-from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Array
 from psdmc.robot.reference_followers import OnCoordinates
 
@@ -42,16 +41,8 @@ def function_errors(
     for recipe in RECIPES.values():
         if recipe.polynomials is not None:
             continue
-        lack = _not_of(model, recipe) or _lacking(model, recipe, robot, solvable)
+        lack = _lacking(model, recipe, robot, solvable)
         yield recipe, np.nan if lack else _error(recipe, arrays, robot, given, theta, least), lack or ""
-
-
-def _not_of(model: DynamicsModel, recipe: Recipe) -> str | None:
-    """Why the robot's joints have no such function; None where they have."""
-    wide = next((joint for joint in model.mechanism.joints if not joint.type.about_z), None)
-    if wide is None or not recipe.of_axes:
-        return None
-    return f"of joints of one coordinate each, and joint {shown(wide.name)} {wide.type.verb}"
 
 
 def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvable: bool) -> str | None:

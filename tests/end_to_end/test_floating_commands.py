@@ -164,11 +164,6 @@ REFUSED = [
     (("derive", "row.toml", "--floating"), 2, "--floating frees the root link of a URDF"),
     (("excite", "solo12.npz", "-o", "campaign"), 2, "a campaign is of joints of one coordinate each"),
     (("calibrate", "solo12.npz", "log.csv", "-o", "x.npz"), 2, "calibration is of joints of one coordinate"),
-    (
-        ("emit-c", "solo12.npz", "-o", "c", "--functions", "rk4_step_derivatives"),
-        2,
-        "no rk4_step_derivatives",
-    ),
 ]
 
 

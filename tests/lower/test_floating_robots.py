@@ -13,7 +13,7 @@ from random_trees import TREES, RandomTree, assert_near
 from whole_robots import ROBOTS, WHOLE, derived, lowered
 
 from psdmc.derivation.derive import derive_model
-from psdmc.errors import DerivationError, InputError
+from psdmc.errors import DerivationError
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics
 from psdmc.lower.kernels import lower
@@ -188,15 +188,6 @@ def test_a_serial_arm_keeps_its_factors() -> None:
     search = Search(model.mechanism, model.representative, model.theta_b, budget=12)
     start = search.best(RECIPES["inverse_dynamics"], SINGLE)
     assert not search.best(RECIPES["forward_dynamics"], SINGLE, start).choices.articulated
-
-
-def test_functions_of_joints_of_one_coordinate_are_refused() -> None:
-    model = derived("anymal_b", True)[1]
-    with pytest.raises(
-        InputError, match=r"no rk4_step_derivatives: .*joint 'root_joint' moves freely"
-    ) as caught:
-        lower(model, "factored", ("gravity", "rk4_step_derivatives"))
-    assert caught.value.hint == "leave it out: --functions forward_dynamics_derivatives,gravity"
 
 
 def test_e_and_p_of_a_free_root_are_refused() -> None:

@@ -26,7 +26,6 @@ from psdmc.compiler import derive  # noqa: E402
 from psdmc.emit.info import package_info  # noqa: E402
 from psdmc.emit.options import EmitOptions  # noqa: E402
 from psdmc.emit.package import PackageView, package_view  # noqa: E402
-from psdmc.functions import RECIPES  # noqa: E402
 from psdmc.lower.kernels import lower, wanted  # noqa: E402
 from psdmc.model.dynamics_model import DynamicsModel  # noqa: E402
 
@@ -46,19 +45,12 @@ def model_of(robot: str) -> DynamicsModel:
     return bundled_model(robot)
 
 
-def _had_by(model: DynamicsModel, functions: tuple[str, ...]) -> tuple[str, ...]:
-    """Those that robots with joints of several coordinates have, too, where this is one."""
-    if all(joint.about_z for joint in model.mechanism.types):
-        return functions
-    return tuple(name for name in functions if not RECIPES[name].of_axes)
-
-
 def packages(
     robots: tuple[str, ...], functions: tuple[str, ...], count: int
 ) -> Iterator[tuple[str, PackageView]]:
     for robot in robots:
         model = model_of(robot)
-        kernels = lower(model, functions=_had_by(model, functions))
+        kernels = lower(model, functions=functions)
         for options in LARGE.get(robot, OPTIONS)[:count]:
             package = package_view(package_info(model), kernels, options)
             yield f"{robot} {options.real} {options.trig}", package
