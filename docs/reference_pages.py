@@ -20,7 +20,7 @@ def command_line() -> str:
     """Every command with its arguments and options, as the command itself describes them."""
     group = typer.main.get_group(app)
     parts = [
-        "# Command line",
+        "# All commands and options",
         "`psdmc COMMAND --help` prints the same. Exit statuses: [files.md](../files.md).",
     ]
     for name, command in group.commands.items():
@@ -50,7 +50,10 @@ def _cell(text: str) -> str:
 
 def python() -> str:
     """The public names with their signatures and docstrings, and the methods of a compiled robot."""
-    parts = ["# Python", "What `import psdmc` offers. Shapes and letters: [notation.md](../notation.md)."]
+    parts = [
+        "# Python names",
+        "What `import psdmc` offers. Shapes and letters: [notation.md](../notation.md).",
+    ]
     for name in psdmc.__all__:
         item = getattr(psdmc, name)
         parts += [f"## psdmc.{name}", _described(item, name)]
@@ -94,7 +97,7 @@ def c_header() -> str:
         "The header of a two-link arm's package, called `two_link`: what every package's header has. Yours has your"
         " robot's name, joints and numbers. Real-time properties, layouts, aliasing: [shipping.md](../shipping.md)."
     )
-    return f"# C\n\n{said}\n\n{_fenced(text, 'c')}\n"
+    return f"# A package's header\n\n{said}\n\n{_fenced(text, 'c')}\n"
 
 
 def _fenced(text: str, language: str) -> str:

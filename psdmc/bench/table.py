@@ -14,16 +14,22 @@ def as_text(result: BenchResult) -> str:
 
 def _case_lines(case: CaseResult) -> list[str]:
     idle = "machine idle" if case.idle else "MACHINE BUSY: times are not reliable"
-    lines = [
-        "",
-        f"{case.name}: n {case.n}, p {case.p}, l {case.l}; {case.note}; {case.rounds} trials, {idle}",
-    ]
+    facts = [f"n {case.n}, p {case.p}, l {case.l}", case.note, f"{case.rounds} trials, {idle}"]
+    lines = ["", f"{case.name}: {'; '.join(fact for fact in facts if fact)}"]
     for function in dict.fromkeys(m.function for m in case.measurements):
         lines.append(f"  {function}")
         same = [m for m in case.measurements if m.function == function]
         lines += [_line(m) for m in sorted(same, key=lambda m: m.ns)]
-    lines += [f"  not measured: {u.rival}: {u.reason}" for u in (*case.unavailable, *case.wrong)]
-    return lines
+    return lines + _not_measured(case)
+
+
+def _not_measured(case: CaseResult) -> list[str]:
+    """A line for each reason, with all rivals that it holds for."""
+    missing = (*case.unavailable, *case.wrong)
+    rivals = {u.reason: [other.rival for other in missing if other.reason == u.reason] for u in missing}
+    return [
+        f"  not measured: {', '.join(dict.fromkeys(names))}: {reason}" for reason, names in rivals.items()
+    ]
 
 
 def _line(m: Measurement) -> str:

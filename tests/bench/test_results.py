@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from made_up_bench import made_up_result
 
-from psdmc.bench.results import BenchResult
+from psdmc.bench.results import BenchResult, Unavailable
 from psdmc.bench.table import as_text
 from psdmc.errors import InputError
 from psdmc.report.bench_markdown import markdown
@@ -106,3 +106,17 @@ def test_a_browser_shows_the_page(result, tmp_path):
 
     assert "At a glance" in dom
     assert dom.count("<svg") == 4
+
+
+def test_rivals_that_miss_the_same_are_one_line_and_an_empty_note_is_none() -> None:
+    result = made_up_result()
+    (case,) = result.cases
+    missing = tuple(
+        Unavailable(name, "Eigen's headers are missing") for name in ("Pinocchio", "CppADCodeGen")
+    )
+    text = as_text(
+        replace(result, cases=(replace(case, note="", unavailable=(*missing, *case.unavailable)),))
+    )
+
+    assert "  not measured: Pinocchio, CppADCodeGen: Eigen's headers are missing\n" in text
+    assert "Denso: n 6, p 1295, l 30; 10 trials, machine idle\n" in text

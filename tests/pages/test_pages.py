@@ -107,7 +107,7 @@ def test_nothing_scrolls_sideways(browser: Any, pages: dict[str, Path], name: st
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
     page.goto(pages[name].as_uri())
     if KEPT:
-        page.screenshot(path=Path(KEPT) / f"{name}_{width}_{scheme}.png", full_page=width == WIDTHS[0])
+        page.screenshot(path=Path(KEPT) / f"{name}_{width}_{scheme}.png", full_page=True)
     found = page.evaluate("document.documentElement.scrollWidth")
     page.close()
 

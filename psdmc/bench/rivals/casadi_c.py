@@ -101,7 +101,7 @@ def _generated(case: Case) -> Path:
 @lru_cache
 def _writer() -> Path:
     """The program that writes C; it is compiled once for all robots, unoptimised: it runs for a tenth of a second."""
-    prefix, casadi = pinocchio_prefix(), _casadi()
+    casadi, prefix = _casadi(), pinocchio_prefix()
     names = ("casadi_writer.cpp", "pinocchio_model.hpp", "serial_joints.hpp")
     command = [cxx(), "-std=c++17", "-O0", "-DNDEBUG", INSTANTIATED, *DEFINES, *includes(prefix)]
     command += ["-isystem", str(casadi / "include"), "casadi_writer.cpp", "-o", "casadi_writer"]

@@ -150,7 +150,7 @@ def pinocchio_prefix() -> Path:
         )
     if not (prefix / "include/eigen3/Eigen/Core").is_file():
         raise ToolchainError(
-            "Eigen's headers are missing; the wheel 'cmeel-eigen' has them", "pip install cmeel-eigen"
+            "Eigen's headers are missing; pip install 'psdmc[bench]' brings them", "pip install cmeel-eigen"
         )
     return prefix
 
