@@ -66,6 +66,7 @@ MENU = {
         "trigonometry",
         "benchmarks",
         "reliability",
+        "first_hour",
         "fuzzing",
         "mutation",
         "CONTRIBUTING",
