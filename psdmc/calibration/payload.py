@@ -21,9 +21,9 @@ from psdmc.calibration.identify.visibility import IDENTIFIED, WEAK, Visibility, 
 from psdmc.calibration.logs.filter import States
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
-from psdmc.calibration.logs.open_log import open_log
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.payload_found import PayloadFound, load_numbers
+from psdmc.calibration.sources import plain_sources
 from psdmc.calibration.verdict.delivered import beside, delivered
 from psdmc.calibration.verdict.verdict import JointFigures, Verdict
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
@@ -51,7 +51,8 @@ def identify_payload(
 
     model             without the load; calibrated, or with all inertias and its joints' friction unknown
     frame             in which the load's numbers are given: the tip's (None) or another of the model's frames
-    options           of the fit; None: filter and friction law of the model's calibration
+    logs              plain ones, or a log description
+    options           of the fit; None: filter and friction law of the model's calibration; a description's are before both
     torque_constants  N m/A by joint name, for logs that hold currents; None: the model's
 
     Raises InputError where a log cannot be used, nothing moves, or the model's theta_b is unknown.
@@ -68,9 +69,13 @@ def identify_payload(
     if not paths:
         raise InputError("no log to identify a load from", "give a log that was recorded with it")
     progress("reading logs")
-    read = [open_log(Path(path), progress) for path in paths]
-    checked_logs = [checked(log, model.mechanism, settings.filter.cutoff, settings.check) for log in read]
-    given = torque_constants or (constants if one_quantity(checked_logs) == "current" else None)
+    read = plain_sources([Path(path) for path in paths], model.joint_names, settings, progress)
+    settings = read.linear
+    checked_logs = [
+        checked(log, model.mechanism, settings.filter.cutoff, settings.check) for log in read.logs
+    ]
+    known_constants = read.constants or constants
+    given = torque_constants or (known_constants if one_quantity(checked_logs) == "current" else None)
     motors = motors_of_logs(model.joint_names, checked_logs, given)
     progress("fitting the load")
     same_law = friction is not None and friction.shape[1] == len(

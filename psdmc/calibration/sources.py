@@ -73,6 +73,13 @@ def campaign_of(paths: Sequence[Path]) -> Path | None:
     return campaigns[0] if campaigns else None
 
 
+def plain_sources(
+    paths: Sequence[Path], joint_names: tuple[str, ...], linear: LinearOptions, progress: Progress
+) -> LogSources:
+    """Opened logs of a description or of plain files, which all count alike."""
+    return log_sources(paths, (), joint_names, linear, FitChoice(), LogNaming(), progress)
+
+
 def log_sources(
     paths: Sequence[Path],
     validation: Sequence[Path],

@@ -19,7 +19,10 @@ def payload(
         Path, typer.Argument(metavar="MODEL", help="model file without the load, calibrated best")
     ],
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="logs that were recorded with the load")
+        list[Path],
+        typer.Argument(
+            metavar="LOG...", help="logs that were recorded with the load, or their log description"
+        ),
     ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="LOAD.toml", help="write the load")
