@@ -23,9 +23,12 @@ def print_calibration(kept: Mapping[str, Any]) -> None:
     logs = kept.get("facts", {}).get("data", [])
     for row in logs[:MOST_LOGS]:
         date = f", {row['date']}" if row.get("date") else ""
-        print(f"log: {one_line(row['log'])}, {row['rows']:,} rows, {row['seconds']:.4g} s{date}")
+        held = ", held out whole" if row.get("use") == "validate" else ""
+        print(f"log: {one_line(row['log'])}, {row['rows']:,} rows, {row['seconds']:.4g} s{date}{held}")
     if len(logs) > MOST_LOGS:
         print(f"and {len(logs) - MOST_LOGS} more logs")
+    if kept.get("prediction", {}).get("coupling"):
+        print("friction: of the motors, some of which drive several joints together")
     print_table(_joints(kept))
     if kept.get("springs"):
         print_table(_springs(kept["springs"]))

@@ -149,8 +149,11 @@ def _logs(record: Calibration) -> str:
     """Names, lengths and dates of the logs."""
     rows = record.facts.get("data", [])
     each = [
-        ", ".join(filter(None, [row["log"], f"{row['rows']:,} rows", f"{row['seconds']:.4g} s", row["date"]]))
+        ", ".join(
+            filter(None, [row["log"], f"{row['rows']:,} rows", f"{row['seconds']:.4g} s", row["date"], held])
+        )
         for row in rows
+        for held in ["held out whole" if row.get("use") == "validate" else ""]
     ]
     return f" Logs: {'; '.join(each)}." if each else ""
 

@@ -142,5 +142,55 @@ def test_a_coupled_wrist_is_recovered(folder: Path, capsys: pytest.CaptureFixtur
     assert 0.6 < np.sqrt(np.mean(np.square(list(off.values())))) < 1.4
     assert {name: round(x, 2) for name, x in off.items() if abs(x) >= 3.0} == {}
     assert [log.get("use", "fit") for log in kept["facts"]["data"]] == ["fit", "validate"]
+    typed("show", folder / "out.npz")
+    shown = capsys.readouterr().out
+    assert "log: check.csv, 7,500 rows, 30 s, held out whole" in shown
+    assert "friction: of the motors, some of which drive several joints together" in shown
+    assert "check.csv, 7,500 rows, 30 s, held out whole" in (folder / "out.html").read_text(encoding="utf-8")
     for both in kept["quality"]["All"].values():
         assert both["held_out"]["r2"] > 0.99
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
+    with pytest.raises(SystemExit) as ended:
+        run([str(word) for word in words])
+    assert ended.value.code == 2
+    return capsys.readouterr().err
+
+
+def test_what_has_no_place_for_motors_says_so(folder: Path, capsys: pytest.CaptureFixture[str]):
+    typed("calibrate", folder / "wrong.npz", folder / "log.toml", "-o", folder / "again.npz")
+
+    text = refused(capsys, "emit-c", folder / "again.npz", "-o", folder / "again", "--friction")
+    assert "its friction is of motors that drive several joints together" in text
+    assert not (folder / "again").exists()
+    typed("export-urdf", folder / "again.npz", "-o", folder / "again.urdf")
+    text = capsys.readouterr().out
+    assert (
+        "not in the files: friction of motors that drive several joints together: joint 'J4', 'J5', 'J6'"
+        in text
+    )
+    damping = re.findall(r'<dynamics damping="([^"]*)"', (folder / "again.urdf").read_text(encoding="utf-8"))
+    assert [float(value) > 0.0 for value in damping] == [True, True, True, False, False, False]
+
+
+def test_a_motor_s_wrong_sign_is_found_by_motor(folder: Path, capsys: pytest.CaptureFixture[str]):
+    """The sixth motor's current turned: its own gain is negative, though both joints of the wrist feel it."""
+    text = (folder / "log.toml").read_text(encoding="utf-8")
+    own = next(line for line in text.splitlines() if 'column = "cur5"' in line)
+    (folder / "turned.toml").write_text(
+        text.replace(own, own.replace("sign = 1", "sign = -1")), encoding="utf-8"
+    )
+
+    with pytest.raises(SystemExit) as ended:
+        run(
+            [
+                "calibrate",
+                *map(str, [folder / "wrong.npz", folder / "turned.toml", "-o", folder / "turned.npz"]),
+            ]
+        )
+
+    assert ended.value.code == 6
+    shown = capsys.readouterr().out
+    assert "friction would give power instead of taking it: joint J6" in shown
+    assert not (folder / "turned.npz").exists()

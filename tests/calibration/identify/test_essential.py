@@ -85,7 +85,9 @@ def test_together_they_are_needed_though_none_is_by_itself() -> None:
     whole = estimate(columns, target, FitOptions(method="ols"), prior=Prior(np.zeros(20), np.full(20, 100.0)))
     assert np.all(whole.std > 0.5 * np.abs(whole.values))
     found = essential(whole, np.zeros(20), COUNT, EssentialOptions())
-    assert 2 <= found.dropped.sum() <= 5  # more than two where standard deviations allow for dependent residuals
+    assert (
+        2 <= found.dropped.sum() <= 5
+    )  # more than two where standard deviations allow for dependent residuals
     assert found.f <= found.limit
 
 
