@@ -122,7 +122,7 @@ def campaigns(_: Path | None) -> Iterator[tuple[str, Calibration | str]]:
     """The demonstration's three variants, parameters unknown beforehand."""
     model = replace(derive(ROBOT, drive_inertia=True), theta_b=None)
     robot = compile_model(model, functions=["regressor"])
-    runs, found = plan_campaign(model.mechanism, robot, model.l, CampaignOptions(table="npz"))
+    plan = plan_campaign(model, robot, CampaignOptions(table="npz"))
     variants = {
         "ideal sensors": SimulateOptions(ideal_sensors=True, workers=2),
         "sensors as in its file": SimulateOptions(workers=2),
@@ -130,7 +130,7 @@ def campaigns(_: Path | None) -> Iterator[tuple[str, Calibration | str]]:
     }
     for name, options in variants.items():
         with tempfile.TemporaryDirectory() as folder:
-            write_campaign(folder, runs, found, "npz")
+            write_campaign(folder, plan.runs, plan.found, "npz")
             simulate_campaign(PLANT, folder, options)
             campaign = read_campaign(folder)
             record = calibrate_campaign(model, campaign, CalibrateOptions(), robot, None, lambda step: None)

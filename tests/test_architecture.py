@@ -66,6 +66,7 @@ OUTSIDE = {
         "numpy",
         "scipy",
         "pinocchio",
+        "coal",
         "cvxpy",
         "cma",
         "rosbags",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from psdmc.calibration.campaign_file import read_campaign
+from psdmc.calibration.campaign_file import plain_logs, read_campaign
 from psdmc.calibration.description.table_fit import FitChoice
 from psdmc.calibration.fitted_logs import LogFit
 from psdmc.calibration.identify.essential import EssentialOptions
@@ -89,6 +89,9 @@ def calibrate(
     regressor = regressor or ChainRegressor(model)
     paths, held = _paths(sources), _paths(validation)
     campaign = campaign_of(paths)
+    plain = None if campaign is None else plain_logs(campaign, model.joint_names)
+    if plain is not None:
+        paths, campaign = list(plain), None
     if campaign is not None:
         _require_plain(campaign, options, held, naming or LogNaming())
         runs = read_campaign(campaign, model.joint_names)

@@ -92,6 +92,18 @@ def _load(value: object, where: str, faults: list[str]) -> Load:
     return Load(table.number("mass", SMALLEST_MASS, LARGEST_MASS), table.triple("com", LARGEST_ARM))
 
 
+def plain_logs(path: str | Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:
+    """The logs of a campaign of exciting motions alone, which one linear fit takes; None where it has other steps or loads.
+
+    InputError where a run names a joint that the model does not have.
+    """
+    runs = listed_runs(path)
+    if any(run.step != "inertial" or run.load is not None for run in runs):
+        return None
+    _require_joints(runs, joint_names, path)
+    return tuple(run.log for run in runs)
+
+
 def read_campaign(path: str | Path, joint_names: Sequence[str] | None = None) -> Runs:
     """All logs of a campaign, step by step.
 

@@ -10,6 +10,7 @@ from psdmc.calibration.actuators import actuator_files, calibrated_actuators
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.campaign import (
     CampaignOptions,
+    Plan,
     being_written,
     plan_campaign,
     require_free,
@@ -17,7 +18,6 @@ from psdmc.calibration.campaign import (
 )
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.motions.excite import Excitation
 from psdmc.calibration.motions.trajectory import write_trajectory
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.sources import LogNaming
@@ -39,7 +39,7 @@ def excite_command(
     options: CampaignOptions | None = None,
     progress: Progress = silent,
     force: bool = False,
-) -> Excitation:
+) -> Plan:
     """Plan a whole campaign for a model file: trajectories, campaign.toml, excitation.json, .csv and .svg in `folder`.
 
     force   replace the plan of an existing campaign; without it, InputError before the search
@@ -49,14 +49,14 @@ def excite_command(
         require_free(folder)
     known = load(model)
     require_axes(known.mechanism, "a campaign")
-    runs, found = plan_campaign(known.chain, regressor_of(known, progress), known.l, options, progress)
-    one_period = found.motion.sampled(known.joint_names, options.sweep.period)
-    picture = excitation_figure(found, known.joint_names)
+    plan = plan_campaign(known, regressor_of(known, progress), options, progress)
+    one_period = plan.found.motion.sampled(known.joint_names, options.sweep.period)
+    picture = excitation_figure(plan.found, known.joint_names, [joint.limits for joint in plan.chain.joints])
     with being_written(folder):
-        campaign = write_campaign(folder, runs, found, options.table, force=force)
+        campaign = write_campaign(folder, plan.runs, plan.found, options.table, force=force)
         write_trajectory(one_period, campaign.parent / "excitation.csv")
         write_whole(campaign.parent / "excitation.svg", picture)
-    return found
+    return plan
 
 
 def simulate_command(

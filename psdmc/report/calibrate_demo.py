@@ -52,7 +52,8 @@ def run_demo(
     unknown = replace(model, theta_b=None)
     robot = compile_model(model, functions=["regressor"])
     step("searching an exciting motion")
-    runs, found = plan_campaign(model.mechanism, robot, model.l, WHOLE)
+    planned = plan_campaign(model, robot, WHOLE)
+    runs, found = planned.runs, planned.found
     step(
         f"condition {found.condition:.2f}, best random one {found.random_conditions[0]:.2f}: {found.gain:.2f} times"
     )

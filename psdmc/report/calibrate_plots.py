@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -11,6 +12,7 @@ from psdmc.calibration.identify.steps import Sample, StepQuality
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite import Excitation
 from psdmc.report.drawing import Axes, Figure, svg
+from psdmc.robot.mechanism import Limits
 
 POINTS = 600
 """Points drawn per curve; more would only make the file larger."""
@@ -23,6 +25,9 @@ PANEL = (5.2, 2.6)
 """inches: narrow, so that labels stay readable on a phone."""
 
 WHAT = "observed and predicted torque of joint"
+
+LIMIT_LINE = "limit"
+"""Name of the lines of joints' limits in a picture."""
 
 FILE = (11, 6)
 """inches, of a picture that is a file."""
@@ -70,32 +75,53 @@ def _shade(axis: Axes, x: Array, held_out: Array) -> None:
         axis.axvspan(x[first], x[min(last, len(x) - 1)], color=HELD_OUT, alpha=SHADE, linewidth=0)
 
 
-def excitation_panels(found: Excitation, joint_names: Sequence[str]) -> tuple[str, ...]:
-    """The exciting motion's positions, speeds and accelerations, and its condition during the search, a picture each."""
+def excitation_panels(
+    found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()
+) -> tuple[str, ...]:
+    """The exciting motion's positions, speeds and accelerations, with the joints' limits where they are given, and its
+    condition beside those of random motions: a picture each."""
     return tuple(
         svg(partial(_alone, draw), PANEL, f"exciting motion: {says}")
-        for says, draw in _excitation(found, joint_names)
+        for says, draw in _excitation(found, joint_names, limits)
     )
 
 
-def excitation_figure(found: Excitation, joint_names: Sequence[str]) -> str:
+def excitation_figure(found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits] = ()) -> str:
     """The same four in one picture."""
 
     def draw(figure: Figure) -> None:
-        for axis, (_, panel) in zip(figure.subplots(2, 2).flat, _excitation(found, joint_names), strict=True):
+        panels = _excitation(found, joint_names, limits)
+        for axis, (_, panel) in zip(figure.subplots(2, 2).flat, panels, strict=True):
             panel(axis)
 
     return svg(draw, FILE, "exciting motion")
 
 
-def _excitation(found: Excitation, joint_names: Sequence[str]) -> list[tuple[str, Callable[[Axes], None]]]:
+def limit_lines(limits: Sequence[Limits]) -> tuple[list[tuple[float, float]], ...]:
+    """(lowest, highest) of each joint's position, speed and acceleration."""
+    positions = [(each.lower, each.upper) for each in limits]
+    speeds = [(-each.speed, each.speed) for each in limits]
+    return positions, speeds, [(-each.acceleration, each.acceleration) for each in limits]
+
+
+def _excitation(
+    found: Excitation, joint_names: Sequence[str], limits: Sequence[Limits]
+) -> list[tuple[str, Callable[[Axes], None]]]:
     """What each picture says and how it is drawn."""
     motion = found.motion.sampled(tuple(joint_names), found.motion.duration / 400)
+    positions, speeds, accelerations = limit_lines(limits)
 
-    def curves(label: str, values: Array) -> Callable[[Axes], None]:
+    def curves(label: str, values: Array, lines: list[tuple[float, float]]) -> Callable[[Axes], None]:
         def draw(axis: Axes) -> None:
-            axis.plot(motion.time, values, linewidth=0.9, label=list(joint_names))
-            axis.set_xlabel("time [s]")
+            for k, name in enumerate(joint_names):
+                axis.plot(motion.time, values[:, k], linewidth=0.9, color=f"C{k}", label=name)
+            for k, pair in enumerate(lines):
+                for value in pair:
+                    if math.isfinite(value):
+                        axis.axhline(
+                            value, linewidth=0.7, linestyle=(0, (4, 3)), color=f"C{k}", gid=LIMIT_LINE
+                        )
+            axis.set_xlabel("time [s]" + ("; dashed: limits" if lines else ""))
             axis.set_ylabel(label)
             if values is motion.q:
                 axis.legend(fontsize=7, ncols=3)
@@ -103,13 +129,14 @@ def _excitation(found: Excitation, joint_names: Sequence[str]) -> list[tuple[str
         return draw
 
     def conditions(axis: Axes) -> None:
-        axis.hist(np.minimum(found.random_conditions, 50 * found.condition), bins=40, color=RESIDUAL)
+        random = found.random_conditions[np.isfinite(found.random_conditions)]
+        axis.hist(np.minimum(random, 50 * found.condition), bins=40, color=RESIDUAL)
         axis.axvline(found.condition, color=PREDICTED, linewidth=1.5)
         axis.set_xlabel("condition number: random motions (grey), the one found (line)")
 
     return [
-        ("positions", curves("position [rad]", motion.q)),
-        ("speeds", curves("speed [rad/s]", motion.qd)),
-        ("accelerations", curves("acceleration [rad/s²]", motion.qdd)),
+        ("positions", curves("position [rad]", motion.q, positions)),
+        ("speeds", curves("speed [rad/s]", motion.qd, speeds)),
+        ("accelerations", curves("acceleration [rad/s²]", motion.qdd, accelerations)),
         ("condition", conditions),
     ]

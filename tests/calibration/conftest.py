@@ -95,7 +95,7 @@ damping = 6.0
 QUICK = CampaignOptions(
     sweep=SweepOptions(speed=0.15, seconds=16.0, range=0.8),
     sines=SineOptions(smallest=4e-5, largest=0.7, ratio=4.0, frequencies=(2.0, 6.0), cycles=1),
-    excite=ExciteOptions(duration=6.0, samples=60, evaluations=600, population=16, random=50, seconds=20.0),
+    excite=ExciteOptions(duration=6.0, samples=60, evaluations=300, random=50, seconds=20.0),
     load=Load(3.0, (0.1, 0.05, 0.0)),
     gravity_runs=1,
     repeats=2,
@@ -132,8 +132,8 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Arm:
 @pytest.fixture(scope="session")
 def campaign(arm: Arm) -> Path:
     """A written campaign without logs."""
-    runs, found = plan_campaign(arm.model.chain, arm.regressor, arm.model.l, QUICK)
-    return write_campaign(arm.folder / "campaign", runs, found, "npz")
+    plan = plan_campaign(arm.model, arm.regressor, QUICK)
+    return write_campaign(arm.folder / "campaign", plan.runs, plan.found, "npz")
 
 
 def calibrated(arm: Arm, campaign: Path, name: str, **variant: bool) -> tuple[Path, Calibration]:

@@ -12,7 +12,6 @@ import pytest
 
 from psdmc.calibration.calibrate import calibrate
 from psdmc.calibration.campaign import (
-    CampaignOptions,
     PlannedRun,
     require_free,
     write_campaign,
@@ -21,6 +20,7 @@ from psdmc.calibration.campaign_file import listed_runs, read_campaign
 from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
 from psdmc.calibration.identify.steps import GravityRun, InertialRun, Load
 from psdmc.calibration.motions.excite import Excitation, ExciteOptions, SineSum
+from psdmc.calibration.motions.given_limits import GivenLimits
 from psdmc.calibration.motions.sweeps import (
     SineOptions,
     SweepOptions,
@@ -251,7 +251,9 @@ def test_a_trajectory_of_no_motion_is_refused(tmp_path: Path, column: str, value
         ({"duration": 1e9}, "duration is 1e+09, expected 0.1 to 120"),
         ({"duration": np.nan}, "duration is nan"),
         ({"seconds": np.inf}, "seconds is inf"),
-        ({"seed": 0}, "seed is 0, expected 1 to"),
+        ({"seed": 2**32}, "seed is 4.29497e+09, expected 0 to"),
+        ({"margin": 1.0}, "margin is 1, expected 0.05 to 0.99"),
+        ({"torque_margin": 0.0}, "torque margin is 0, expected"),
         ({"seed": -1}, "seed is -1"),
         ({"harmonics": ()}, "harmonics is 0"),
         ({"harmonics": (1, 10**6)}, "highest harmonic is 1e+06"),
@@ -265,7 +267,7 @@ def test_an_exciting_motion_has_bounds(options: dict[str, object], message: str)
 @pytest.mark.parametrize("acceleration", [0.0, -1.0, np.nan, np.inf])
 def test_an_acceleration_is_a_positive_number(acceleration: float):
     with pytest.raises(InputError, match="acceleration is"):
-        CampaignOptions(acceleration=acceleration)
+        GivenLimits(acceleration=acceleration)
 
 
 @pytest.mark.parametrize("speed", [1e-9, 0.0])

@@ -14,7 +14,10 @@ LONGEST_SEARCH = 86_400.0
 MOST_HARMONICS, HIGHEST_HARMONIC = 20, 100
 """Per joint: each adds two unknowns per joint to the search."""
 LARGEST_SEED = 2**31
-"""Largest seed. Seeds start at 1, as the search takes 0 for a seed drawn from the clock."""
+SMALLEST_MARGIN, LARGEST_MARGIN = 0.05, 0.99
+"""Share of a limit that is used. What is left lets the motion begin and end at rest, so it is never all."""
+LARGEST_EVALUATIONS = 10_000_000
+FEWEST_SAMPLES, MOST_SAMPLES = 10, 100_000
 
 Objective = Literal["condition", "log_det"]
 
@@ -23,28 +26,26 @@ Objective = Literal["condition", "log_det"]
 class ExciteOptions:
     """What is searched, and for how long.
 
-    duration    s, the period of the motion
-    harmonics   multiples of 1/duration that each joint's sines have
-    samples     times per period at which the regressor is stacked
-    objective   condition: smallest condition number of the column-scaled stack; log_det: largest log determinant
-    columns     base parameters that count; None: all. The paper's (23) counts those that gravity does not show
-    margin      share of every limit that is used
-    seconds     s, wall-clock limit of the search
-    evaluations largest number of candidates: together with the seed it decides the result, where `seconds` does not
-    population  candidates at once
-    seed        of the search and of the random trajectories to compare with
-    random      number of random trajectories to compare with
+    duration       s, the period of the motion
+    harmonics      multiples of 1/duration that each joint's sines have
+    samples        times per period at which the columns are stacked
+    objective      condition: smallest condition number of the scaled columns; log_det: largest log determinant
+    margin         share of the limits of position, speed and acceleration that is used
+    torque_margin  share of the torque limits; friction that the model does not know and the controller need the rest
+    seconds        s, wall-clock limit of the search
+    evaluations    of the criterion with its gradient: they, and not the clock, end the search where `seconds` are enough
+    seed           of the random trajectories, which are compared with and started from
+    random         number of random trajectories
     """
 
     duration: float = 10.0
-    harmonics: tuple[int, ...] = (1, 2, 3)
+    harmonics: tuple[int, ...] = (1, 2, 3, 4, 5)
     samples: int = 100
     objective: Objective = "condition"
-    columns: tuple[int, ...] | None = None
     margin: float = 0.98
-    seconds: float = 50.0
-    evaluations: int = 120_000
-    population: int = 48
+    torque_margin: float = 0.8
+    seconds: float = 600.0
+    evaluations: int = 6000
     seed: int = 1
     random: int = 1000
 
@@ -52,9 +53,14 @@ class ExciteOptions:
         bounds: tuple[tuple[str, float, float, float], ...] = (
             ("duration", self.duration, SHORTEST_DURATION, LONGEST_DURATION),
             ("seconds", self.seconds, 0.0, LONGEST_SEARCH),
-            ("seed", self.seed, 1, LARGEST_SEED),
+            ("seed", self.seed, 0, LARGEST_SEED),
             ("harmonics", len(self.harmonics), 1, MOST_HARMONICS),
             ("highest harmonic", max(self.harmonics, default=0), 1, HIGHEST_HARMONIC),
+            ("margin", self.margin, SMALLEST_MARGIN, LARGEST_MARGIN),
+            ("torque margin", self.torque_margin, SMALLEST_MARGIN, 1.0),
+            ("evaluations", self.evaluations, 1, LARGEST_EVALUATIONS),
+            ("samples", self.samples, FEWEST_SAMPLES, MOST_SAMPLES),
+            ("random", self.random, 1, LARGEST_EVALUATIONS),
         )
         for what, value, low, high in bounds:
             if not low <= value <= high:

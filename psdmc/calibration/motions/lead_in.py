@@ -1,63 +1,74 @@
-"""Motions from rest into and out of a motion that starts or ends at speed."""
+"""A periodic motion run from rest to rest: it begins and ends on its own path, slower and slower towards the ends.
+
+q(s(t)) with the path's own time s: speeds are s' times, accelerations s'^2 times the motion's, plus q' s''. No place is
+visited that the motion does not visit, and for a ramp that is long enough whatever is left of the limits of
+acceleration and torque is more than q' s'' takes: each motion that keeps its limits with a margin has such ramps.
+(A quintic from another place to the motion's start need not exist: the start may lie near a limit of position and be
+approached from beyond it.)
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.motions.trajectory import Trajectory, limit_faults
+from psdmc.calibration.motions.sine_sum import SineSum
+from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
-DURATIONS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""s, tried in this order until the limits are kept."""
+RAMPS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, *(12.0 * 2.0**k for k in range(7)))
+"""s, tried in this order until the limits are kept: up to 13 minutes, for a motion that leaves 1 % of an acceleration
+that is a hundredth of its speed."""
+
+Faults = Callable[[Trajectory], list[str]]
+"""What a motion may not do and does, a sentence each."""
 
 
-def from_rest_to_rest(motion: Trajectory, chain: Mechanism) -> Trajectory:
-    """The motion with a quintic before and after it, position, speed and acceleration continuous.
+def from_rest_to_rest(
+    motion: SineSum, chain: Mechanism, period: float, repeats: int, faults: Faults
+) -> Trajectory:
+    """`repeats` periods of the motion with a ramp before and after them, rows `period` apart.
 
-    InputError where no lead-in of up to 6 s keeps the limits.
+    InputError where no ramp keeps the limits.
     """
-    before = _lead(motion, chain, motion.q[0], motion.qd[0], motion.qdd[0])
-    after = _lead(motion, chain, motion.q[-1], -motion.qd[-1], motion.qdd[-1])
-    q = np.vstack([before.q[:-1], motion.q, after.q[-2::-1]])
-    qd = np.vstack([before.qd[:-1], motion.qd, -after.qd[-2::-1]])
-    qdd = np.vstack([before.qdd[:-1], motion.qdd, after.qdd[-2::-1]])
-    time: Array = np.arange(len(q), dtype=np.float64) * motion.period
-    return Trajectory(motion.joint_names, time, q, qd, qdd, motion.sliding)
-
-
-def _lead(motion: Trajectory, chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Trajectory:
-    """The motion from rest to a state; run backwards it leads from the mirrored state to rest."""
-    low = np.array([joint.limits.lower for joint in chain.joints])
-    high = np.array([joint.limits.upper for joint in chain.joints])
-    for duration in DURATIONS:
-        # half the distance that the final speed would cover: what an even acceleration needs
-        start = np.clip(q - 0.5 * duration * qd, low, high)
-        lead = _quintic(motion, start, q, qd, qdd, duration)
-        if not limit_faults(lead, chain):
-            return lead
+    found: list[str] = []
+    for ramp in RAMPS:
+        whole = ramped(motion, chain.joint_names, period, repeats, ramp)
+        found = faults(whole)
+        if not found:
+            return whole
     raise InputError(
-        f"no lead-in of up to {DURATIONS[-1]:g} s keeps the limits of {', '.join(motion.joint_names)}",
-        "leave more margin in the exciting motion",
+        f"the exciting motion cannot begin at rest within the limits: {'; '.join(found)}",
+        "leave more of the limits: a smaller --margin or --torque-margin",
     )
 
 
-def _quintic(
-    motion: Trajectory, start: Array, q: Array, qd: Array, qdd: Array, duration: float
+def ramped(
+    motion: SineSum, joint_names: tuple[str, ...], period: float, repeats: int, ramp: float
 ) -> Trajectory:
-    """q(s) = start + d3 s^3 + d4 s^4 + d5 s^5, s from 0 to 1: rest at first, the state at last."""
-    count = round(duration / motion.period) + 1
-    s = np.linspace(0.0, 1.0, count)[:, None]
-    move, rate, bend = q - start, duration * qd, duration**2 * qdd
-    d3 = 10 * move - 4 * rate + 0.5 * bend
-    d4 = -15 * move + 7 * rate - bend
-    d5 = 6 * move - 3 * rate + 0.5 * bend
-    return Trajectory(
-        motion.joint_names,
-        s[:, 0] * duration,
-        start + s**3 * (d3 + s * (d4 + s * d5)),
-        s**2 * (3 * d3 + s * (4 * d4 + s * 5 * d5)) / duration,
-        s * (6 * d3 + s * (12 * d4 + s * 20 * d5)) / duration**2,
-        motion.sliding,
+    """The motion with ramps of that many seconds, rounded to rows."""
+    rows = max(round(ramp / period), 1)
+    middle: Array = np.arange(round(repeats * motion.duration / period) + 1, dtype=np.float64) * period
+    length = rows * period
+    x: Array = np.arange(rows, dtype=np.float64) / rows
+    gone, rate, bend = _smooth_step(x)
+    way = gone * length - 0.5 * length
+    end = middle[-1]
+    path = np.concatenate([way, middle, end - way[::-1]])
+    pace = np.concatenate([rate, np.ones(len(middle)), rate[::-1]])[:, None]
+    change = np.concatenate([bend, np.zeros(len(middle)), -bend[::-1]])[:, None] / length
+    q, qd, qdd = motion.at(path)
+    time: Array = np.arange(len(path), dtype=np.float64) * period
+    return Trajectory(joint_names, time, q, qd * pace, qdd * pace**2 + qd * change)
+
+
+def _smooth_step(x: Array) -> tuple[Array, Array, Array]:
+    """Integral, value and slope of 6 x^5 - 15 x^4 + 10 x^3."""
+    return (
+        x**4 * (2.5 + x * (x - 3.0)),
+        x**3 * (10.0 + x * (6.0 * x - 15.0)),
+        30.0 * x**2 * (1.0 - x) ** 2,
     )

@@ -7,16 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psdmc.calibration.campaign import bounded
-from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions.excite import ExciteOptions, excite
+from psdmc.calibration.motions.given_limits import GivenLimits, bounded
 from psdmc.calibration.motions.trajectory import limit_faults
-from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
-from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import Limits
 
-OPTIONS = ExciteOptions(duration=5.0, samples=50, evaluations=2000, population=20, random=200, seconds=60.0)
+OPTIONS = ExciteOptions(duration=5.0, harmonics=(1, 2, 3), samples=50, evaluations=400, random=200)
 
 
 def test_it_beats_random_motions_and_keeps_limits_between_samples(arm):
@@ -52,8 +49,8 @@ def test_the_same_seed_gives_the_same_motion(arm):
 
 
 def test_log_det_is_an_objective_too(arm):
-    by_condition = excite(arm.model.chain, arm.regressor, replace(OPTIONS, evaluations=400))
-    by_volume = excite(arm.model.chain, arm.regressor, replace(OPTIONS, evaluations=400, objective="log_det"))
+    by_condition = excite(arm.model.chain, arm.regressor, OPTIONS)
+    by_volume = excite(arm.model.chain, arm.regressor, replace(OPTIONS, objective="log_det"))
 
     assert volume(arm, by_volume) > volume(arm, by_condition)
 
@@ -79,32 +76,10 @@ def test_an_acceleration_can_be_given_for_robots_whose_file_has_none(arm):
     free = Limits(speed=2.0)
     turning = replace(chain, joints=(replace(chain.joints[0], limits=free), chain.joints[1]))
 
-    found = bounded(turning, 9.0).joints
+    found = bounded(turning, GivenLimits(acceleration=9.0)).joints
 
     assert found[0].limits == Limits(-np.pi, np.pi, 2.0, 9.0)
     assert found[1].limits == chain.joints[1].limits
     with pytest.raises(InputError, match=r"shoulder \(acceleration\)") as raised:
-        bounded(turning, None)
+        bounded(turning, GivenLimits())
     assert "--acceleration" in str(raised.value.hint)
-
-
-@pytest.mark.slow
-def test_the_denso_reaches_twice_the_best_of_a_thousand_random_motions():
-    """In a thirtieth of the candidates that it may look at."""
-    from pathlib import Path
-
-    from psdmc.calibration.identify.gravity import gravity_split
-
-    file = Path(__file__).resolve().parents[3] / "examples" / "robots" / "denso_wall.toml"
-    model = derive_model(load_robot(file, drive_inertia=True).chain)
-    regressor = ChainRegressor(model)
-    columns = tuple(int(k) for k in gravity_split(model.chain, regressor, model.l).rest)
-    whole = ExciteOptions(columns=columns)
-
-    found = excite(model.chain, regressor, replace(whole, evaluations=whole.evaluations // 30, seconds=600.0))
-
-    fine = found.motion.sampled(model.joint_names, 10.0 / 1000)
-    assert found.evaluations < 4000 + whole.population
-    assert len(found.random_conditions) == 1000
-    assert found.gain > 2
-    assert limit_faults(fine, model.chain) == []

@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from psdmc.calibration.motions.excite import SineSum
-from psdmc.calibration.motions.lead_in import from_rest_to_rest
 from psdmc.calibration.motions.sweeps import (
     SineOptions,
     SweepOptions,
@@ -46,25 +44,6 @@ def test_limits_are_kept_and_derivatives_belong_together(arm):
 def test_all_start_and_end_at_rest(arm):
     for motion in motions(arm):
         assert np.abs(motion.qd[[0, -1]]).max() < 1e-6
-
-
-def test_an_exciting_motion_is_reached_from_rest_within_the_limits(arm):
-    chain = arm.model.chain
-    sines = SineSum(
-        4.0, (1, 2), np.zeros(2), np.array([[0.9, 0.3], [-0.5, 0.4]]), np.array([[0.2, 0.1], [0.6, 0.0]])
-    )
-    motion = sines.sampled(chain.joint_names, 1e-3, 2)
-    assert np.abs(motion.qd[0]).min() > 0.4
-
-    whole = from_rest_to_rest(motion, chain)
-
-    h = whole.period
-    assert np.abs(whole.qd[[0, -1]]).max() < 1e-12
-    assert limit_faults(whole, chain) == []
-    slope = (whole.q[2:] - whole.q[:-2]) / (2 * h)
-    bend = (whole.qd[2:] - whole.qd[:-2]) / (2 * h)
-    assert np.abs(slope - whole.qd[1:-1]).max() < 1e-4
-    assert np.abs(bend - whole.qdd[1:-1]).max() < 2e-2
 
 
 def test_a_gravity_sweep_comes_back_the_way_it_went(arm):

@@ -1,0 +1,284 @@
+"""The plan of a calibration campaign: its motions, checked, and what is said about them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from psdmc.calibration.campaign_file import Step
+from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.steps import CalibrationOptions, Load
+from psdmc.calibration.logs.table_files import TABLES
+from psdmc.calibration.motions.allowed import Allowed
+from psdmc.calibration.motions.allowed_motion import SHARES, TRIES, Try, first_allowed, smaller_boxes
+from psdmc.calibration.motions.excite import Excitation, ExciteOptions, excite
+from psdmc.calibration.motions.excite_poses import motor_poses, unfelt
+from psdmc.calibration.motions.fit_columns import all_columns, inertial_columns
+from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.lead_in import from_rest_to_rest
+from psdmc.calibration.motions.looked_at import allowed_of, looked_at
+from psdmc.calibration.motions.sweeps import (
+    SineOptions,
+    SweepOptions,
+    gravity_sweep,
+    sine_series,
+    single_joint_sweep,
+    swept_range,
+)
+from psdmc.calibration.motions.trajectory import Trajectory, sliding_joints
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.progress import Progress
+from psdmc.progress import Step as Share
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Mechanism
+
+ROWS_PER_CUTOFF = 4.0
+"""Rows per period of a filter's cut-off that logs need at least."""
+RANKED_POSES = 40
+"""Poses of a motor sweep that are tried, those in which the load acts most first."""
+SINE_SHARES = ((1.0, 0.9), (0.5, 0.6), (0.25, 0.4))
+"""Of the sines' largest amplitude and of the speed and acceleration limits, tried one after the other."""
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignOptions:
+    """Options of a campaign's plan.
+
+    load          kg and centre of mass (m, tip frame) of the motor step's mass; None: no motor step, for robots that log
+                  torques
+    gravity_runs  sweeps through the workspace, each there and back
+    repeats       periods of the exciting motion
+    one_log       the exciting motion alone, for one linear fit: columns of all base parameters, friction and offsets count
+    limits        of joints, beside the file's
+    shapes        folders of the collision shapes' meshes; None: collisions are not looked at
+    floor         m, height of a floor above the base's origin; None: none
+    table         format of trajectories and logs: csv, npz or parquet
+    """
+
+    sweep: SweepOptions = field(default_factory=SweepOptions)
+    sines: SineOptions = field(default_factory=SineOptions)
+    excite: ExciteOptions = field(default_factory=ExciteOptions)
+    load: Load | None = field(default_factory=lambda: Load(3.5, (0.08, 0.0, 0.06)))
+    gravity_runs: int = 2
+    repeats: int = 6
+    one_log: bool = False
+    limits: GivenLimits = field(default_factory=GivenLimits)
+    shapes: tuple[Path, ...] | None = ()
+    floor: float | None = None
+    table: str = "csv"
+
+    def __post_init__(self) -> None:
+        if f".{self.table}" not in TABLES:
+            raise InputError(f"table is {self.table!r}, expected csv, npz or parquet", "choose one of these")
+        fastest = (
+            LinearOptions().filter.cutoff if self.one_log else CalibrationOptions().friction.filter.cutoff
+        )
+        rate, needed = 1.0 / max(self.sweep.period, self.sines.period), ROWS_PER_CUTOFF * fastest
+        if rate < needed * (1.0 - 1e-9):
+            raise InputError(
+                f"{rate:g} rows a second, the filter of {fastest:g} Hz needs {needed:g}",
+                "give a higher --rate"
+                if self.one_log
+                else "give a higher --rate, or plan one log: --one-log",
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedRun:
+    """One run of the robot: a motion, for joint `joint` where one is given, with a load or without."""
+
+    step: Step
+    name: str
+    motion: Trajectory
+    joint: str = ""
+    load: Load | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """All runs, the exciting motion that was found, and what a user has to know, a sentence each.
+
+    chain    with the limits that the motions keep
+    looked   what was looked at, and what was not
+    remarks  what is unlike what was asked for, or cannot be found
+    """
+
+    runs: tuple[PlannedRun, ...]
+    found: Excitation
+    chain: Mechanism
+    looked: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def plan_campaign(
+    model: DynamicsModel,
+    regressor: Regressor,
+    options: CampaignOptions,
+    progress: Progress = lambda step: None,
+) -> Plan:
+    """All runs of the four steps, or of one log, each checked against limits of joints, torques and clearance, and the
+    search for the exciting motion.
+
+    InputError where a joint has no limits to keep, or no motion is allowed; of motions that need no search, before it.
+    """
+    if model.mechanism.has_followers:
+        raise InputError(
+            f"{shown(model.mechanism.name)}: campaigns are for joints that follow no other",
+            "derive the model with such joints held: --lock JOINT=0",
+        )
+    chain = bounded(model.mechanism, options.limits)
+    progress("shapes")
+    allowed = allowed_of(model, chain, regressor, options.excite.torque_margin, options.shapes, options.floor)
+    planner = _Planner(chain, options, allowed)
+    if not options.one_log:
+        for step, plan in (
+            ("motor sweeps", planner.motors),
+            ("gravity sweeps", planner.gravity),
+            ("sine series", planner.sines),
+        ):
+            progress(step)
+            plan()
+    progress("exciting motion")
+    columns = (
+        all_columns(regressor, model.l, LinearOptions())
+        if options.one_log
+        else inertial_columns(chain, regressor, model.l)
+    )
+    found = excite(chain, columns, options.excite, _spoken(progress), allowed)
+    planner.exciting(found)
+    said = (
+        []
+        if not found.ended_by_clock
+        else ["the clock ended the search: another time it finds another motion"]
+    )
+    return Plan(
+        tuple(planner.runs),
+        found,
+        chain,
+        looked_at(allowed, model, options.shapes, options.floor),
+        (*planner.remarks, *said),
+    )
+
+
+class _Planner:
+    """Runs so far, and remarks on them."""
+
+    def __init__(self, chain: Mechanism, options: CampaignOptions, allowed: Allowed) -> None:
+        self.chain, self.options, self.allowed = chain, options, allowed
+        self.runs: list[PlannedRun] = []
+        self.remarks: list[str] = []
+
+    def motors(self) -> None:
+        """A sweep of each joint that the load acts on, without and with it."""
+        load = self.options.load
+        if load is None:
+            self.remarks.append(
+                "no motor runs: torque constants stay unknown, so the robot has to log torques"
+            )
+            return
+        poses, effect = motor_poses(self.chain, load)
+        left_out = unfelt(self.chain, load, effect)
+        for k, name in enumerate(self.chain.joint_names):
+            if k in left_out:
+                continue
+            order = np.argsort(-effect[:, k], kind="stable")[:RANKED_POSES]
+            ranked = poses[order]
+            sweep = self._first(
+                f"motor sweep of joint {shown(name)}",
+                _sweeps(self.chain, k, ranked, self.options.sweep),
+                load,
+            )
+            self.runs.append(PlannedRun("motor", f"motor_{name}", sweep, name))
+            self.runs.append(PlannedRun("motor", f"motor_{name}_loaded", sweep, name, load))
+        self.remarks += [_unfelt(self.chain, k) for k in left_out]
+
+    def gravity(self) -> None:
+        for seed in range(1, self.options.gravity_runs + 1):
+            tries = _gravity_tries(self.chain, seed, self.options.sweep)
+            motion = self._first(f"gravity sweep {seed}", tries)
+            self.runs.append(PlannedRun("gravity", f"gravity_{seed}", motion))
+
+    def sines(self) -> None:
+        for k, name in enumerate(self.chain.joint_names):
+            tries = _sine_tries(self.chain, k, self.options.sines)
+            series = self._first(f"sine series of joint {shown(name)}", tries)
+            self.runs.append(PlannedRun("friction", f"friction_{name}", series, name))
+
+    def exciting(self, found: Excitation) -> None:
+        options = self.options
+        motion = from_rest_to_rest(
+            found.motion, self.chain, options.sweep.period, options.repeats, self.allowed.faults
+        )
+        motion = replace(motion, sliding=sliding_joints(self.chain))
+        self.runs.append(PlannedRun("inertial", "exciting" if options.one_log else "inertial", motion))
+
+    def _first(self, what: str, tries: Iterator[Try], load: Load | None = None) -> Trajectory:
+        """The first motion that is allowed, with the load and without; a remark where it is smaller than the first."""
+
+        def faults(motion: Trajectory) -> list[str]:
+            return self.allowed.faults(motion) or ([] if load is None else self.allowed.faults(motion, load))
+
+        motion, share = first_allowed(what, tries, faults)
+        if share < 1.0:
+            self.remarks.append(f"{what}: in {share:.0%} of the ranges, larger ones are not allowed")
+        return motion
+
+
+def _sweeps(chain: Mechanism, k: int, poses: np.ndarray, options: SweepOptions) -> Iterator[Try]:
+    """Sweeps of one joint in several poses of the others; then of parts of its range."""
+    for pose in poses:
+        yield 1.0, partial(single_joint_sweep, chain, k, pose, options)
+    for share, number, part in smaller_boxes(chain, k):
+        if share < 1.0:
+            yield share, partial(single_joint_sweep, part, k, poses[number % len(poses)], options)
+
+
+def _gravity_tries(chain: Mechanism, seed: int, options: SweepOptions) -> Iterator[Try]:
+    for share, number, part in smaller_boxes(chain, seed):
+        yield share, partial(gravity_sweep, part, seed + 1000 * number, options)
+
+
+def _sine_tries(chain: Mechanism, k: int, options: SineOptions) -> Iterator[Try]:
+    """Sines about the middle of the ranges; then in other poses; then smaller and slower ones."""
+    middle = np.array([sum(swept_range(joint, 1.0)) / 2 for joint in chain.joints])
+    low, high = np.array([swept_range(joint, SHARES[1]) for joint in chain.joints]).T
+    others = np.random.default_rng(k).uniform(low, high, (2 * TRIES, len(chain)))
+    others[:, k] = middle[k]
+    for share, margin in SINE_SHARES:
+        largest = share * options.largest
+        own = replace(options, largest=max(largest, options.smallest), margin=min(margin, options.margin))
+        for pose in (middle, *others):
+            yield share, partial(sine_series, chain, k, pose, own)
+
+
+def _unfelt(chain: Mechanism, k: int) -> str:
+    """Why no motor run of a joint is planned, and what to do."""
+    name = chain.joint_names[k]
+    return (
+        f"joint {shown(name)}: the load acts on it in no pose (its axis is along gravity, or the load lies on it): no motor"
+        f" runs; give its torque constant when you calibrate (--torque-constants {shown(name)}=NM_PER_A), or take another"
+        " load"
+    )
+
+
+def _spoken(progress: Progress) -> Callable[[float, float, float], None]:
+    """A function that reports the progress of a search, every few seconds."""
+    said = 0.0
+
+    def say(share: float, seconds: float, score: float) -> None:
+        nonlocal said
+        if seconds - said >= SPOKEN_EVERY:
+            said = seconds
+            progress(Share(f"exciting motion: {score:.4g} after {seconds:.0f} s", share))
+
+    return say
+
+
+SPOKEN_EVERY = 5.0
+"""Seconds between two reports on the search."""

@@ -1,0 +1,258 @@
+"""Which poses hit something: the robot itself, or the floor. Shapes are the URDF's, distances coal's, by Pinocchio."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.motions.collision_shapes import with_shapes
+from psdmc.dynamics.frames import frames_of
+from psdmc.dynamics.kinematics import forward_kinematics, frame_placement
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.limits import shown
+from psdmc.robot.lock import held_positions
+from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.pinocchio_text import JOINT_PREFIX
+from psdmc.robot.urdf import read_urdf
+
+APART = 0.01
+"""m that shapes keep from each other: models of robots are not exact, nor do robots follow exactly."""
+LARGEST_STEP = 0.02
+"""rad (m) by which a joint moves, at most, between two poses that are looked at."""
+POSES_TRIED = 300
+"""Random poses, to find the pairs that touch in every one: neighbours whose shapes overlap by design."""
+FLOOR = "the floor"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clearance:
+    """Pairs of shapes that may not come near each other.
+
+    model, shapes  Pinocchio's; pairs are those of `shapes`
+    place          (n,) index of each joint's coordinate in Pinocchio's q;  held (nq,) the others' values
+    always         pairs, "A and B", that touch in every pose and are not looked at
+    """
+
+    model: Any
+    shapes: Any
+    place: tuple[int, ...]
+    held: Array
+    always: tuple[str, ...] = ()
+    _working: tuple[Any, Any] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        shaped = self.shapes.createData()
+        for k, request in enumerate(shaped.collisionRequests):
+            request.security_margin = APART
+            shaped.collisionRequests[k] = request
+        object.__setattr__(self, "_working", (self.model.createData(), shaped))
+
+    def first_touch(self, q: Array, step: float = LARGEST_STEP) -> str | None:
+        """What touches first along a path of poses (N, n), in a sentence; None where nothing does.
+
+        step  rad (m) by which a joint moves, at most, between two poses that are looked at
+        """
+        data, shaped = self._working
+        for pose in spread(q, step):
+            whole = self.held.copy()
+            whole[list(self.place)] = pose
+            if pin.computeCollisions(self.model, data, self.shapes, shaped, whole, True):
+                pairs = zip(self.shapes.collisionPairs, shaped.collisionResults, strict=True)
+                near = next(_names(self.shapes, pair) for pair, result in pairs if result.isCollision())
+                return touch(near, pose)
+        return None
+
+    @property
+    def pairs(self) -> tuple[str, ...]:
+        """The pairs that are looked at, "A and B"."""
+        return tuple(_named(self.shapes, pair) for pair in self.shapes.collisionPairs)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorPoints:
+    """A floor for robots without shapes: origins of joints and the tip stay above it.
+
+    above   points that are looked at: 0 to n - 1 the joints' origins, n the tip
+    height  m above the base's origin, across gravity
+    """
+
+    chain: Mechanism
+    height: float
+    above: tuple[int, ...] = ()
+
+    def first_touch(self, q: Array, step: float = LARGEST_STEP) -> str | None:
+        """The first point that comes to the floor along a path of poses (N, n), in a sentence; None where none does."""
+        poses = np.array(list(spread(q, step)))
+        heights = self._heights(poses)[:, list(self.above)]
+        low = np.argwhere(heights < self.height + APART)
+        if not len(low):
+            return None
+        row, point = low[0]
+        names = [f"the origin of joint {shown(name)}" for name in self.chain.joint_names]
+        return touch(([*names, "the tip"][self.above[point]], FLOOR), poses[row])
+
+    def _heights(self, q: Array) -> Array:
+        """(N, n + 1) m above the base's origin."""
+        states = [q[:, k] for k in range(q.shape[1])]
+        frames = frames_of(self.chain)
+        origins = [origin for _, origin in forward_kinematics(frames, states)]
+        origins.append(frame_placement(frames, self.chain.tip_body, self.chain.tip, states)[1])
+        size = _gravity_size(self.chain)
+        up = -self.chain.gravity / size
+        return np.stack(
+            [sum(float(up[k]) * np.broadcast_to(origin[k], len(q)) for k in range(3)) for origin in origins],
+            axis=1,
+        )
+
+
+def floor_points(chain: Mechanism, height: float) -> FloorPoints:
+    """The floor, for the points that are above it in some pose: a joint that stands on it is below in all."""
+    found = FloorPoints(chain, height)
+    heights = found._heights(_random_poses(chain))
+    return FloorPoints(
+        chain, height, tuple(int(k) for k in np.flatnonzero(heights.max(axis=0) >= height + APART))
+    )
+
+
+def touch(pair: tuple[str, str], pose: Array) -> str:
+    angles = ", ".join(f"{value:.2f}" for value in pose)
+    return f"{' and '.join(pair)} come within {1000 * APART:g} mm of each other at q = ({angles})"
+
+
+def spread(q: Array, step: float) -> Iterator[Array]:
+    """Poses of a path (N, n) between which no joint moves by more than a step, nor rows are left out where it turns."""
+    if not len(q):
+        return
+    moved = np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0)
+    way = np.concatenate([[0.0], np.cumsum(moved)])
+    # a row is kept where the next one would be a step away from the last kept one
+    kept = np.unique(np.concatenate([[0], np.flatnonzero(np.diff(np.floor(way / step))), [len(q) - 1]]))
+    yield q[0]
+    for first, last in itertools.pairwise(kept):
+        count = max(1, int(np.ceil(np.abs(q[last] - q[first]).max() / step)))
+        yield from (q[first] + (q[last] - q[first]) * j / count for j in range(1, count + 1))
+
+
+def clearance_of(model: DynamicsModel, folders: Sequence[Path] = (), floor: float | None = None) -> Clearance:
+    """The clearance of a model that holds a URDF with collision shapes.
+
+    folders  where its meshes lie
+    floor    m, height of a floor above the base's origin, across gravity; None: no floor
+
+    InputError, whose message says why, where there are no shapes to look at.
+    """
+    chain, source = model.mechanism, str(model.provenance.get("source_name", "robot"))
+    if model.provenance.get("source_format") != "urdf":
+        raise InputError(f"{source} has no collision shapes", "derive the model from a URDF")
+    if chain.has_followers:
+        raise InputError(f"{source} has joints that follow others", "lock them: --lock JOINT=0")
+    if not hasattr(pin, "computeCollisions"):
+        raise InputError("Pinocchio was built without coal", "install the wheel pin, which has it")
+    text, count = with_shapes(model.provenance["source_text"], source, folders)
+    if not count:
+        raise InputError(f"{source} has no collision shapes", "add <collision> to its links")
+    try:
+        whole = pin.buildModelFromXML(text)
+        shapes = pin.buildGeomFromUrdfString(whole, text, pin.GeometryType.COLLISION)
+    except (ValueError, RuntimeError) as error:
+        raise InputError(
+            f"{source}: its collision shapes cannot be read: {' '.join(str(error).split())}",
+            "correct the file",
+        ) from None
+    held, place = _coordinates(whole, model, text, source)
+    _add_pairs(whole, shapes)
+    if floor is not None:
+        _add_floor(whole, shapes, chain, held, floor)
+    found = Clearance(whole, shapes, place, held)
+    return _without_constant_pairs(found, chain)
+
+
+def _coordinates(whole: Any, model: DynamicsModel, text: str, source: str) -> tuple[Array, tuple[int, ...]]:
+    held = np.array(pin.neutral(whole), dtype=np.float64)
+    locked = (model.provenance.get("options") or {}).get("lock") or {}
+    original = read_urdf(model.provenance["source_text"], source)
+    for name, value in held_positions(original, locked, source).items():
+        joint = whole.joints[whole.getJointId(JOINT_PREFIX + name)]
+        if joint.nq == 1:
+            held[joint.idx_q] = value
+    ids = [whole.getJointId(JOINT_PREFIX + name) for name in model.joint_names]
+    return held, tuple(whole.joints[k].idx_q for k in ids)
+
+
+def _add_pairs(model: Any, shapes: Any) -> None:
+    """All pairs of shapes on different bodies that no single joint connects."""
+    parents = [shape.parentJoint for shape in shapes.geometryObjects]
+    for a in range(len(parents)):
+        for b in range(a + 1, len(parents)):
+            first, second = sorted((parents[a], parents[b]))
+            if first != second and model.parents[second] != first:
+                shapes.addCollisionPair(pin.CollisionPair(a, b))
+
+
+def _add_floor(model: Any, shapes: Any, chain: Mechanism, held: Array, height: float) -> None:
+    """A half space below a plane across gravity, against all shapes that move."""
+    import coal
+
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, held)
+    base = data.oMf[model.getFrameId(chain.base_name, pin.FrameType.BODY)]
+    up = base.rotation @ (-chain.gravity / _gravity_size(chain))
+    plane = coal.Halfspace(up, float(up @ base.translation) + height)
+    number = shapes.addGeometryObject(pin.GeometryObject(FLOOR, 0, pin.SE3.Identity(), plane))
+    for k, shape in enumerate(shapes.geometryObjects):
+        if k != number and shape.parentJoint != 0:
+            shapes.addCollisionPair(pin.CollisionPair(k, number))
+
+
+def _without_constant_pairs(found: Clearance, chain: Mechanism) -> Clearance:
+    """Without the pairs that touch in every one of many random poses, which no motion can avoid."""
+    data, shaped = found.model.createData(), found.shapes.createData()
+    touching = np.ones(len(found.shapes.collisionPairs), dtype=bool)
+    for pose in _random_poses(chain):
+        if not touching.any():
+            break
+        whole = found.held.copy()
+        whole[list(found.place)] = pose
+        pin.updateGeometryPlacements(found.model, data, found.shapes, shaped, whole)
+        for k in np.flatnonzero(touching):
+            touching[k] = pin.computeCollision(found.shapes, shaped, int(k))
+    pairs = [found.shapes.collisionPairs[int(k)].copy() for k in np.flatnonzero(touching)]
+    names = tuple(_named(found.shapes, pair) for pair in pairs)
+    for pair in pairs:
+        found.shapes.removeCollisionPair(pair)
+    return Clearance(found.model, found.shapes, found.place, found.held, names)
+
+
+def _random_poses(chain: Mechanism) -> Array:
+    low = [max(joint.limits.lower, -np.pi) for joint in chain.joints]
+    high = [min(joint.limits.upper, np.pi) for joint in chain.joints]
+    return np.random.default_rng(0).uniform(low, high, (POSES_TRIED, len(chain)))
+
+
+def _gravity_size(chain: Mechanism) -> float:
+    size = float(np.linalg.norm(chain.gravity))
+    if size == 0.0:
+        raise InputError(f"{shown(chain.name)} has no gravity to say where the floor is", "leave --floor out")
+    return size
+
+
+def _named(shapes: Any, pair: Any) -> str:
+    return " and ".join(_names(shapes, pair))
+
+
+def _names(shapes: Any, pair: Any) -> tuple[str, str]:
+    """Names of the links that two shapes are of; Pinocchio puts a number behind."""
+    first, second = (str(shapes.geometryObjects[k].name) for k in (pair.first, pair.second))
+    return _link(first), _link(second)
+
+
+def _link(name: str) -> str:
+    return FLOOR if name == FLOOR else f"link {shown(name.rpartition('_')[0] or name)}"

@@ -1,0 +1,127 @@
+"""Sums of sines as points of a space without limits: whatever its coordinates, a motion keeps the joints' limits.
+
+Each joint's sines are divided by the share that they take of its tightest limit. The largest value of a curve is
+replaced by a norm that is never smaller, so that motions are smooth in their coordinates and the limits hold all the
+same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.sine_sum import SineSum, sine_basis
+from psdmc.robot.mechanism import Mechanism
+
+NORM = 40
+"""Exponent of the norm that bounds a curve's largest value from above, by 2 to 8 % for sums of a few sines: motions use
+that much less of their limits. Larger exponents make corners of the smooth search space."""
+FULL = 4.0
+"""Coordinate of a random motion's share of its limits: 1 / (1 + exp(-4)) = 98 %."""
+TINY = 1e-300
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """Motions at points of the space, with what their derivatives need.
+
+    states  (3, n, N)  position, speed and acceleration
+    raw     (3, n, N)  before scaling;  norm (n,) their share of the tightest limit, reach (n,) of the position's
+    fill    (n,)       share of the limits that is used;  place (n,) of the centre within the range, -1 to 1
+    """
+
+    states: Array
+    raw: Array
+    norm: Array
+    reach: Array
+    fill: Array
+    place: Array
+
+
+class LimitedSines:
+    """The space. Per joint: weights of sines and cosines, the share of its limits that is used, the centre's place."""
+
+    def __init__(self, chain: Mechanism, options: ExciteOptions) -> None:
+        limits = [joint.limits for joint in chain.joints]
+        bounds = np.array([(x.lower, x.upper, x.speed, x.acceleration) for x in limits])
+        self.options = options
+        self.n, self.h = len(chain), len(options.harmonics)
+        self.size = self.n * (2 * self.h + 2)
+        top = max(options.harmonics)
+        self.samples = max(options.samples, 16 * top)
+        # between samples a trigonometric polynomial of degree m exceeds its largest sample by at most this factor
+        # (Ehlich and Zeller 1964), so that the limits hold at every time, not only on the grid
+        usable = options.margin * float(np.cos(np.pi * top / self.samples))
+        self.middle = 0.5 * (bounds[:, 0] + bounds[:, 1])
+        self.half = 0.5 * (bounds[:, 1] - bounds[:, 0]) * usable
+        self.limits = np.maximum(np.stack([self.half, bounds[:, 2] * usable, bounds[:, 3] * usable]), TINY)
+        even = np.arange(self.samples) * options.duration / self.samples
+        # with equal weights the fastest sine would use up the limits
+        self.weight = np.tile(1.0 / np.array(options.harmonics), 2)[:, None]
+        parts = sine_basis(options.harmonics, options.duration, even)
+        self.basis = np.stack([np.vstack(part) * self.weight for part in parts])
+
+    def drawn(self, count: int, rng: np.random.Generator) -> Array:
+        """(count, size) random points whose motions fill their limits."""
+        found = rng.standard_normal((count, self.size))
+        found.reshape(count, self.n, -1)[..., -2] = FULL
+        return found
+
+    def filled(self, point: Array, share: float) -> Array:
+        """The point with every joint's motion at most this share of its limits."""
+        found = point.copy().reshape(self.n, -1)
+        found[:, -2] = np.minimum(found[:, -2], np.log(share / (1.0 - share)))
+        return found.ravel()
+
+    def placed(self, point: Array) -> Placed:
+        shaped = point.reshape(self.n, -1)
+        raw = np.einsum("nk,pkt->pnt", shaped[:, :-2], self.basis)
+        shares = np.abs(raw) / self.limits[:, :, None]
+        norm, reach = _norm(shares, (0, 2)), _norm(shares[0], (1,))
+        fill, place = 0.5 * (1.0 + np.tanh(0.5 * shaped[:, -2])), np.tanh(shaped[:, -1])
+        states = raw * (fill / norm)[:, None]
+        states[0] += self._centre(fill, place, norm, reach)[:, None]
+        return Placed(states, raw, norm, reach, fill, place)
+
+    def _centre(self, fill: Array, place: Array, norm: Array, reach: Array) -> Array:
+        return np.asarray(self.middle + place * self.half * (1.0 - fill * reach / norm))
+
+    def motion(self, point: Array) -> SineSum:
+        at, shaped = self.placed(point), point.reshape(self.n, -1)
+        weights = shaped[:, :-2] * self.weight[:, 0] * (at.fill / at.norm)[:, None]
+        centre = self._centre(at.fill, at.place, at.norm, at.reach)
+        options = self.options
+        return SineSum(
+            options.duration, options.harmonics, centre, weights[:, : self.h], weights[:, self.h :]
+        )
+
+    def slope(self, at: Placed, by_states: Array) -> Array:
+        """(size,) derivatives by the point of a number whose derivatives by the states (3, n, N) are given."""
+        by_centre = by_states[0].sum(axis=1)
+        by_scale = np.einsum("pnt,pnt->n", by_states, at.raw) - by_centre * at.place * self.half * at.reach
+        by_norm = -by_scale * at.fill / at.norm**2
+        by_reach = -by_centre * at.place * self.half * at.fill / at.norm
+        shares = at.raw / self.limits[:, :, None]
+        by_raw = by_states * (at.fill / at.norm)[:, None]
+        by_raw += by_norm[:, None] * _norm_slope(shares, at.norm) / self.limits[:, :, None]
+        by_raw[0] += by_reach[:, None] * _norm_slope(shares[0], at.reach) / self.limits[0][:, None]
+        found = np.empty((self.n, 2 * self.h + 2))
+        found[:, :-2] = np.einsum("pnt,pkt->nk", by_raw, self.basis)
+        found[:, -2] = by_scale * at.fill * (1.0 - at.fill) / at.norm
+        found[:, -1] = by_centre * self.half * (1.0 - at.fill * at.reach / at.norm) * (1.0 - at.place**2)
+        return found.ravel()
+
+
+def _norm(shares: Array, axes: tuple[int, ...]) -> Array:
+    """(n,) norms of the entries' sizes along the axes, scaled first so that no power overflows."""
+    largest = np.maximum(shares.max(axis=axes), TINY)
+    spread = np.expand_dims(largest, axes) if axes == (1,) else largest[:, None]
+    return np.asarray(largest * ((shares / spread) ** NORM).sum(axis=axes) ** (1.0 / NORM))
+
+
+def _norm_slope(shares: Array, norm: Array) -> Array:
+    """Derivatives of the norm by the entries."""
+    return np.asarray(np.sign(shares) * (np.abs(shares) / norm[:, None]) ** (NORM - 1))

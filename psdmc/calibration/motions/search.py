@@ -1,0 +1,166 @@
+"""The search for an exciting motion: quasi-Newton descents from the best of many random motions.
+
+The condition number has corners where its smallest eigenvalue is double. A descent therefore goes from a mean over all
+directions to the worst one in steps.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.motions.criterion import negative_log_det, scaled, smooth_condition
+from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.fit_columns import FitColumns
+from psdmc.calibration.motions.limited_sines import LimitedSines
+from psdmc.calibration.motions.torque_limits import TorqueLimits
+
+POWERS = (1.0, 3.0, 10.0, 30.0)
+"""Of the means of eigenvalues that stand for the extreme ones, descent after descent."""
+PER_START = 800
+"""Evaluations for which a descent from one start is over, as a rule."""
+TORQUE_COST = 1e4
+"""Of the mean square excess of torque; 1 % of excess in each sample costs as much as a condition number e times larger."""
+REMEMBERED = 20
+"""Steps that L-BFGS keeps."""
+
+SearchProgress = Callable[[float, float, float], None]
+"""Called with the share of the search that is done, seconds spent and the best score so far."""
+
+
+class OutOfTime(Exception):
+    """The clock or the count ended a descent."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Best points of each descent, best first; evaluations, and (k, 2) of these and the best condition so far."""
+
+    points: tuple[Array, ...]
+    evaluations: int
+    history: Array
+    ended_by_clock: bool
+
+
+class Criterion:
+    """What is minimised at a point of the space: the condition number or the log determinant, and excess of torque."""
+
+    def __init__(
+        self, space: LimitedSines, columns: FitColumns, options: ExciteOptions, torques: TorqueLimits | None
+    ) -> None:
+        self.space, self.columns, self.options, self.torques = space, columns, options, torques
+
+    def score(self, point: Array) -> float:
+        """The condition number, or minus the log determinant."""
+        found = scaled(self.columns.at(*(part.T for part in self.space.placed(point).states)))
+        return found.log_det if self.options.objective == "log_det" else found.condition
+
+    def smooth(self, point: Array, power: float) -> tuple[float, Array, float]:
+        """The smooth criterion with excess of torque, its derivatives, and the score."""
+        at = self.space.placed(point)
+        q, qd, qdd = (np.ascontiguousarray(part.T) for part in at.states)
+        regressor = self.columns.model.regressor(q, qd, qdd)
+        columns = self.columns.of(regressor, qd)
+        seen = scaled(columns)
+        by_log_det = self.options.objective == "log_det"
+        value, by_gram = negative_log_det(seen) if by_log_det else smooth_condition(seen, power)
+        weights = (2.0 * columns.reshape(-1, columns.shape[-1]) @ by_gram).reshape(columns.shape)
+        on_regressor, on_speed = None, None
+        if self.torques is not None:
+            excess, by_regressor, on_speed = self.torques.excess(regressor, qd, self.options.torque_margin)
+            value, on_regressor = value + TORQUE_COST * excess, TORQUE_COST * by_regressor
+        by_states = self.columns.slopes(at.states, weights, on_regressor)
+        if on_speed is not None:
+            by_states[1] += TORQUE_COST * on_speed.T
+        return value, self.space.slope(at, by_states), seen.log_det if by_log_det else seen.condition
+
+
+def search(
+    criterion: Criterion,
+    starts: Array,
+    is_free: Callable[[Array], bool] | None = None,
+    progress: SearchProgress | None = None,
+) -> Found:
+    """Descents from the first of the starts (k, size), best first; as many as the options' evaluations allow.
+
+    is_free   whether the motion at a point meets nothing; descents keep to such points
+    """
+    options = criterion.options
+    begin, budget = time.monotonic(), options.evaluations
+    counted = _Counted(criterion, budget, begin, is_free, progress)
+    best: list[tuple[float, Array]] = []
+    descents = max(1, round(budget / PER_START))
+    for number, start in enumerate(starts[:descents]):
+        point = start
+        counted.until = budget * (number + 1) // descents
+        for power in POWERS[:1] if options.objective == "log_det" else POWERS:
+            counted.begin(power, point)
+            with contextlib.suppress(OutOfTime):
+                minimize(counted, point, jac=True, method="L-BFGS-B", options=_lbfgs(counted))
+            point = counted.point
+            if counted.is_over:
+                break
+        best.append((criterion.score(point), point))
+        if counted.is_late:
+            break
+    order = sorted(range(len(best)), key=lambda k: best[k][0])
+    history = np.array(counted.history).reshape(-1, 2)
+    return Found(tuple(best[k][1] for k in order), counted.count, history, counted.is_late)
+
+
+def _lbfgs(counted: _Counted) -> dict[str, int]:
+    left = counted.until - counted.count
+    return {"maxiter": PER_START, "maxfun": max(left, 1), "maxcor": REMEMBERED}
+
+
+class _Counted:
+    """The criterion of a descent, with its best point, the count and the clock."""
+
+    def __init__(
+        self,
+        criterion: Criterion,
+        budget: int,
+        begin: float,
+        is_free: Callable[[Array], bool] | None,
+        progress: SearchProgress | None,
+    ) -> None:
+        self.criterion, self.is_free, self.progress = criterion, is_free, progress
+        self.budget, self.until, self.count, self.started = budget, budget, 0, begin
+        self.power, self.point, self.lowest = 1.0, np.zeros(0), np.inf
+        self.best_score = np.inf
+        self.history: list[tuple[float, float]] = []
+
+    def begin(self, power: float, point: Array) -> None:
+        self.power, self.point, self.lowest = power, point, np.inf
+        quarter = (self.until - self.count) // 2
+        self.limit = self.count + max(quarter, 1)
+
+    @property
+    def is_late(self) -> bool:
+        return time.monotonic() - self.started > self.criterion.options.seconds
+
+    @property
+    def is_over(self) -> bool:
+        return self.count >= self.until or self.is_late
+
+    def __call__(self, point: Array) -> tuple[float, Array]:
+        if self.count >= self.limit or self.is_late:
+            raise OutOfTime
+        self.count += 1
+        value, slope, score = self.criterion.smooth(point, self.power)
+        if self.is_free is not None and np.isfinite(self.lowest) and not self.is_free(point):
+            return self.lowest + 1e3, np.zeros_like(slope)
+        if value < self.lowest:
+            self.lowest, self.point = value, point.copy()
+        if score < self.best_score:
+            self.best_score = score
+            self.history.append((float(self.count), score))
+        if self.progress is not None:
+            self.progress(self.count / self.budget, time.monotonic() - self.started, self.best_score)
+        return value, slope
