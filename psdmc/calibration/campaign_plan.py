@@ -40,6 +40,8 @@ from psdmc.robot.mechanism import Mechanism
 
 ROWS_PER_CUTOFF = 4.0
 """Rows per period of a filter's cut-off that logs need at least."""
+HIGHEST_FLOOR = 1000.0
+"""m above or below a robot's base."""
 RANKED_POSES = 40
 """Poses of a motor sweep that are tried, those in which the load acts most first."""
 SINE_SHARES = ((1.0, 0.9), (0.5, 0.6), (0.25, 0.4))
@@ -76,11 +78,16 @@ class CampaignOptions:
     def __post_init__(self) -> None:
         if f".{self.table}" not in TABLES:
             raise InputError(f"table is {self.table!r}, expected csv, npz or parquet", "choose one of these")
+        if self.floor is not None and not abs(self.floor) <= HIGHEST_FLOOR:
+            raise InputError(
+                f"floor is at {self.floor:g} m, expected at most {HIGHEST_FLOOR:g} above or below the base",
+                "give it in m",
+            )
         fastest = (
             LinearOptions().filter.cutoff if self.one_log else CalibrationOptions().friction.filter.cutoff
         )
         rate, needed = 1.0 / max(self.sweep.period, self.sines.period), ROWS_PER_CUTOFF * fastest
-        if rate < needed * (1.0 - 1e-9):
+        if not rate >= needed * (1.0 - 1e-9):
             raise InputError(
                 f"{rate:g} rows a second, the filter of {fastest:g} Hz needs {needed:g}",
                 "give a higher --rate"
@@ -226,7 +233,7 @@ class _Planner:
 
         motion, share = first_allowed(what, tries, faults)
         if share < 1.0:
-            self.remarks.append(f"{what}: in {share:.0%} of the ranges, larger ones are not allowed")
+            self.remarks.append(f"{what}: at {share:.0%} of its size, larger ones are not allowed")
         return motion
 
 
@@ -248,8 +255,8 @@ def _sine_tries(chain: Mechanism, k: int, options: SineOptions) -> Iterator[Try]
     """Sines about the middle of the ranges; then in other poses; then smaller and slower ones."""
     middle = np.array([sum(swept_range(joint, 1.0)) / 2 for joint in chain.joints])
     low, high = np.array([swept_range(joint, SHARES[1]) for joint in chain.joints]).T
-    others = np.random.default_rng(k).uniform(low, high, (2 * TRIES, len(chain)))
-    others[:, k] = middle[k]
+    others = np.random.default_rng(k).uniform(low, high, (3 * TRIES, len(chain)))
+    others[:TRIES, k] = middle[k]
     for share, margin in SINE_SHARES:
         largest = share * options.largest
         own = replace(options, largest=max(largest, options.smallest), margin=min(margin, options.margin))

@@ -9,6 +9,7 @@ import pytest
 
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
+from psdmc.calibration.motions.trajectory import read_trajectory
 from psdmc.cli import main
 from psdmc.derivation.derive import derive_model
 from psdmc.model.store import save
@@ -49,6 +50,26 @@ def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
         (("--harmonics", "1000000"), "--harmonics"),
         (("--seed", "-1"), "--seed"),
         (("--acceleration", "nan"), "acceleration"),
+        (("--acceleration", "1,2"), "--acceleration: 2 numbers without a joint"),
+        (("--acceleration", "elbow=fast"), "--acceleration: 'fast' is no number"),
+        (("--margin", "1.0"), "--margin"),
+        (("--margin", "nan"), "margin"),
+        (("--torque-margin", "0"), "--torque-margin"),
+        (("--rate", "0"), "--rate"),
+        (("--rate", "nan"), "--rate"),
+        (("--rate", "50"), "50 rows a second, the filter of 40 Hz needs 160"),
+        (("--load", "3.5"), "--load is '3.5'"),
+        (("--load", "0,0,0,0"), "--load: 0 kg, expected 0.001 to 10000"),
+        (("--load", "1,0,nan,0"), "--load: its centre of mass"),
+        (("--load", "1,0,x,0"), "--load: 'x' is no number"),
+        (("--range", "elbow=1"), "--range: '1' is no range"),
+        (("--range", "elbow=-1:1,elbow=0:1"), "--range: joint 'elbow' twice"),
+        (("--range", "wrist=-1:1"), "limits for joint(s) 'wrist'"),
+        (("--range", "elbow=nan:1"), "range nan to 1 is none"),
+        (("--speed", "elbow=-1"), "speed is -1, expected more than 0"),
+        (("--effort", "elbow=inf"), "effort is inf, expected more than 0"),
+        (("--floor", "nan"), "floor"),
+        (("--meshes", "nowhere"), "no collision shapes"),
     ],
 )
 def test_excite_has_bounds(
@@ -63,6 +84,50 @@ def test_excite_does_not_overwrite(capsys: pytest.CaptureFixture[str], model: Pa
 
     assert "holds a campaign already: campaign.toml" in refused(capsys, "excite", model, "-o", tmp_path)
     assert (tmp_path / "campaign.toml").read_text(encoding="utf-8") == "mine"
+
+
+def test_the_plan_is_printed(capsys: pytest.CaptureFixture[str], model: Path, tmp_path: Path):
+    words = [
+        "excite",
+        model,
+        "-o",
+        tmp_path / "plan",
+        "--one-log",
+        "--rate",
+        50,
+        "--duration",
+        3,
+        "--repeats",
+        2,
+    ]
+    words += [
+        "--acceleration",
+        6,
+        "--effort",
+        "shoulder=90,elbow=40",
+        "--range",
+        "elbow=-1:1.2",
+        "--margin",
+        0.9,
+    ]
+
+    with pytest.raises(SystemExit) as left:
+        main([*map(str, words), "--floor", "-2", "--harmonics", "2", "--seconds", "1"])
+
+    assert left.value.code == 0
+    said = capsys.readouterr()
+    assert said.out.startswith("1 run, 0.1 min of motion; trajectories 0.")
+    assert "exciting motion: condition number" in said.out
+    assert "the best of 1000 random motions" in said.out
+    assert "torques: by theta_b without friction, at most 80% of the limits" in said.out
+    assert "not looked at: self-collision" in said.out
+    assert "floor at -2 m: origins of joints and the tip, not their bodies, stay 10 mm above" in said.out
+    assert f"psdmc calibrate {model} {tmp_path / 'plan'} -o two_link_calibrated.npz" in said.err
+    motion = read_trajectory(tmp_path / "plan" / "trajectories" / "exciting.csv")
+    assert motion.period == pytest.approx(0.02)
+    assert -0.99 < motion.q[:, 1].min() < motion.q[:, 1].max() < 1.19
+    picture = (tmp_path / "plan" / "excitation.svg").read_text(encoding="utf-8")
+    assert picture.count('<g id="limit">') == 2 * 2 * 3
 
 
 def test_simulate_of_a_model_says_what_a_plant_is(

@@ -78,7 +78,7 @@ def test_all_runs_of_a_campaign_are_free(tmp_path: Path):
     assert any(line.startswith("self-collision: ") for line in plan.looked)
     assert any(line.startswith("floor at 0.2 m: shapes stay 10 mm above") for line in plan.looked)
     assert any("as asked for (--no-collisions)" in line for line in unlooked.looked)
-    assert any("of the ranges, larger ones are not allowed" in remark for remark in plan.remarks)
+    assert any("of its size, larger ones are not allowed" in remark for remark in plan.remarks)
 
 
 def test_what_cannot_be_looked_at_is_said(tmp_path: Path):
