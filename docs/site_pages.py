@@ -32,6 +32,7 @@ MENU = {
         "examples/README",
     ),
     "How to": (
+        "how-to/plan-campaign",
         "how-to/payload",
         "how-to/frames",
         "how-to/cmake",

@@ -40,7 +40,7 @@ OPTIONAL = (
     ("crocoddyl", "examples", "the example of trajectory optimisation"),
     ("cvxpy", "calibrate", "psdmc calibrate: physical consistency"),
     ("clarabel", "calibrate", "psdmc calibrate: its solver"),
-    ("cma", "calibrate", "psdmc excite, and friction in psdmc calibrate"),
+    ("cma", "calibrate", "friction in psdmc calibrate"),
     ("rosbags", "calibrate", "logs in ROS bags"),
     ("lz4", "calibrate", "compressed ROS bags"),
     ("backports.zstd", "calibrate", "compressed ROS bags, before Python 3.14"),

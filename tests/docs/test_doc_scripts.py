@@ -14,7 +14,7 @@ import psdmc
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
-@pytest.mark.parametrize("script", ["verdicts.py", "long_log.py"])
+@pytest.mark.parametrize("script", ["verdicts.py", "long_log.py", "excitation.py"])
 def test_a_script_of_the_documents_starts(script: str):
     done = subprocess.run(
         [sys.executable, str(DOCS / script), "--help"], capture_output=True, text=True, check=False
