@@ -22,6 +22,9 @@ from psdmc.errors import InputError
 from psdmc.robot.joints import FREE
 from psdmc.robot.load import load_robot_text
 
+FLAGS = (*native_flags(), "-O0")
+"""Which values come from where is asked here, not how fast."""
+
 BODY = (
     '<inertial><origin xyz="0.1 -0.05 0.2"/><mass value="1.5"/>'
     '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="-0.002" iyz="0.0015"/></inertial>'
@@ -71,7 +74,7 @@ def test_derivatives_of_large_robots_are_left_out_and_said(
 
 def test_every_layout_is_right(bird: Case) -> None:
     """Strides of q and of rates differ in the loops."""
-    contestants = psdmc_c.factored(bird, native_flags())
+    contestants = psdmc_c.factored(bird, FLAGS)
     right, errors, wrong = checked(bird, contestants, seed=2)
 
     assert (len(right), wrong) == (3 * len(bird.functions), ())
@@ -80,16 +83,14 @@ def test_every_layout_is_right(bird: Case) -> None:
 
 def test_latency_reads_every_position(bird: Case, states: States) -> None:
     """More positions than outputs: the loop must not read behind them."""
-    one = next(
-        c for c in psdmc_c.factored(bird, native_flags()) if c.function == "gravity" and c.layout == "state"
-    )
+    one = next(c for c in psdmc_c.factored(bird, FLAGS) if c.function == "gravity" and c.layout == "state")
     runner = Runner(one, states)
     assert np.isfinite(runner.latency()).all()
     assert runner.contestant.outputs < bird.chain.nq
 
 
 def test_mujocos_torques_agree_in_its_own_convention(bird: Case) -> None:
-    answer, left_out = mujoco_c.contestants(bird, native_flags())
+    answer, left_out = mujoco_c.contestants(bird, FLAGS)
     assert isinstance(answer, Contestant)
     assert isinstance(left_out, Unavailable)
     right, errors, wrong = checked(bird, [answer], seed=3)
@@ -155,9 +156,8 @@ def test_standard_robots_have_the_trees() -> None:
 
 @pytest.mark.skipif(which("valgrind") is None, reason="valgrind is not installed")
 def test_instructions_are_counted_over_longer_positions(bird: Case) -> None:
-    one = next(
-        c for c in psdmc_c.factored(bird, ("-O1", "-fPIC")) if c.function == "gravity" and c.layout == "state"
-    )
+    alone = psdmc_c.contestants(bird, "factored", ("gravity",), ("-O1", "-fPIC"))
+    one = next(c for c in alone if c.layout == "state")
     counted = instructions([one], bird.chain)
     assert 20.0 < counted[str(one.library), "gravity"] < 5000.0
 

@@ -27,7 +27,7 @@ def with_a_wrong_sign(kernel: Kernel) -> Kernel:
 
 
 def test_every_function_of_psdmc_passes(two_link):
-    contestants = psdmc_c.factored(two_link, native_flags())
+    contestants = psdmc_c.factored(two_link, (*native_flags(), "-O0"))
 
     right, errors, wrong = checked(two_link, contestants, seed=1)
 
@@ -50,7 +50,7 @@ def test_a_wrong_sign_in_the_program_is_found_before_timing(two_link, monkeypatc
 
 
 def test_regressors_are_compared_by_the_torques_they_give(two_link):
-    contestants = psdmc_c.factored(two_link, native_flags())
+    contestants = psdmc_c.factored(two_link, (*native_flags(), "-O0"))
     regressor = next(c for c in contestants if c.function == "regressor")
     states = States.random(two_link.chain, 64, seed=3)
 
