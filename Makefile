@@ -52,7 +52,7 @@ campaign: $(READY) ## 10,000 random chains and 1,000 trees against Pinocchio and
 test-processes: $(READY) ## kill every command 50 times at random moments, and whatever else takes long
 	PSDMC_KILLS=50 $(RUN)/python -m pytest -q -rs tests/end_to_end/test_killed.py tests/end_to_end/test_full_disk.py
 
-test-demo: $(READY) ## the virtual Denso's whole campaigns and all seeds of coloured noise; make test runs a short form
+test-demo: $(READY) ## the virtual Denso's whole campaigns and all seeds of coloured noise; make test tries an arm of two joints
 	PSDMC_DEMO=whole $(RUN)/python -m pytest -n $(JOBS) -q tests/calibration/test_demo.py tests/calibration/identify/test_coverage.py
 
 test-accuracy: $(READY) ## accuracy of every robot's, function's and sine's C as psdmc.compile builds it; make test takes some
