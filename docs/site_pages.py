@@ -40,6 +40,8 @@ MENU = {
         "how-to/batch",
         "how-to/whole-body",
         "how-to/calibration-log",
+        "how-to/springs-and-friction",
+        "how-to/priors",
         "how-to/extending",
     ),
     "Reference": (

@@ -44,7 +44,7 @@ class LinearOptions:
     stretch     rows of a log that are filtered at once
     coupling    C of q_joint = C q_motor where motors drive several joints: friction acts on the motors; empty: none
     held_bytes  of columns that are held in memory; more of them go to a temporary file
-    tables      of a log description, as TOML gives them: springs, friction (docs/log_description.md)
+    tables      of a log description, as TOML gives them: springs, friction (docs/how-to/springs-and-friction.md, priors.md)
     tables_from  the file that they are of, for messages
     columns     made of these for a robot: springs and further friction, each value of which is one more unknown
     """
