@@ -116,7 +116,9 @@ def _seeds(own: Path) -> dict[str, list[bytes]]:
         "bag": [(own / "bag" / "metadata.yaml").read_bytes()],
         "trajectory": [_trajectory(own)],
         "campaign": [text("campaign.toml").encode()],
-        "description": [text(f"described{kind}.toml").encode() for kind in ("", "_tables", "_bag")],
+        "description": [
+            text(f"described{kind}.toml").encode() for kind in ("", "_tables", "_bag", "_columns")
+        ],
         "described-csv": [(own / "described" / "run.csv").read_bytes().replace(b"a1,a2", b"q1,q2")],
         "simulated": [json.dumps({"motor.csv": "0" * 64, "gravity.csv": "1" * 64}).encode(), b"{}"],
         "plant": [

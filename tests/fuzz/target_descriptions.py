@@ -12,6 +12,8 @@ from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.description.description import is_description, read_description
 from psdmc.calibration.description.draft import drafted
 from psdmc.calibration.description.read_described import described_logs
+from psdmc.calibration.identify.knowledge import knowledge_of
+from psdmc.calibration.identify.linear_fit import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.table_files import write_columns
 
@@ -42,7 +44,10 @@ def description(data: bytes, folder: Path, deep: bool) -> None:
     file = folder / "described" / "log.toml"
     file.write_bytes(data)
     model = two_link_model()
-    described_logs(read_description(file, model.joint_names), model.joint_names)
+    found = read_description(file, model.joint_names)
+    linear = found.options(LinearOptions()).for_robot(model.mechanism)
+    knowledge_of(model, linear.tables, linear.tables_from)
+    described_logs(found, model.joint_names)
     if deep and is_description(file):
         calibrate(model, file, CalibrateOptions(), regressor=ChainRegressor(model))
 
