@@ -20,6 +20,8 @@ def calibrate(
     options: CalibrateOptions | None = None,
     torque_constants: Mapping[str, float] | None = None,
     validation: str | Path | Sequence[str | Path] = (),
+    loaded: str | Path | Sequence[str | Path] = (),
+    load: str | Path | Sequence[float] | None = None,
 ) -> Calibration:
     """The calibrated model, the identified values, and the verdict on them, from a campaign's folder, a log
     description (log.toml) or logs.
@@ -31,8 +33,22 @@ def calibrate(
     torque_constants   N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
     validation         plain logs that are held out as a whole; the others are then fitted whole
 
+    loaded             further logs of currents, recorded with a known load on the robot: they show the torque constants
+    load               that load: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load's file
+
     Raises InputError where a file is missing or a log cannot be read.
     """
     from psdmc.calibration.calibrate import calibrate as run
+    from psdmc.calibration.given_load import given_load
 
-    return run(model_of(model), logs, options, torque_constants=torque_constants, validation=validation)
+    with_load = [loaded] if isinstance(loaded, str | Path) else list(loaded)
+    known = None if load is None else given_load(load)
+    return run(
+        model_of(model),
+        logs,
+        options,
+        torque_constants=torque_constants,
+        validation=validation,
+        loaded=with_load,
+        load=known,
+    )

@@ -12,6 +12,7 @@ from psdmc.calibration.fitted_logs import LogFit
 from psdmc.calibration.identify.essential import EssentialOptions
 from psdmc.calibration.identify.four_steps import FourSteps, Runs, calibrate_four_steps, checked_runs
 from psdmc.calibration.identify.knowledge import knowledge_of
+from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
 from psdmc.calibration.identify.motor_constants import motors_of_logs
 from psdmc.calibration.identify.physical import (
@@ -24,6 +25,7 @@ from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.motors_of_loads import LoadedLogs, motors_with_load, with_loaded_logs
 from psdmc.calibration.sources import LogNaming, campaign_of, log_sources
 from psdmc.calibration.verdict.judged_record import judged_record
 from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
@@ -71,6 +73,8 @@ def calibrate(
     torque_constants: Mapping[str, float] | None = None,
     validation: str | Path | Sequence[str | Path] = (),
     naming: LogNaming | None = None,
+    loaded: Sequence[str | Path] = (),
+    load: KnownLoad | None = None,
     progress: Progress = lambda step: None,
 ) -> Calibration:
     """Calibrate a model from a campaign (its folder or campaign.toml), a log description (log.toml) or plain logs.
@@ -79,6 +83,7 @@ def calibrate(
     torque_constants  N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
     validation        plain logs that are held out as a whole
     naming            topic and joint names of plain logs
+    loaded, load      further logs of currents, recorded with that known load: they show the torque constants
 
     Raises InputError where a file is missing or a log cannot be used.
     """
@@ -87,22 +92,32 @@ def calibrate(
     if options.physical:
         require_cvxpy()
     regressor = regressor or ChainRegressor(model)
-    paths, held = _paths(sources), _paths(validation)
+    paths, held, with_load = _paths(sources), _paths(validation), _paths(loaded)
+    if bool(with_load) != (load is not None):
+        raise InputError(
+            "logs with a load and the load's numbers belong together",
+            "give --loaded LOG and --load MASS,X,Y,Z",
+        )
     campaign = campaign_of(paths)
     plain = None if campaign is None else plain_logs(campaign, model.joint_names)
     if plain is not None:
         paths, campaign = list(plain), None
     if campaign is not None:
-        _require_plain(campaign, options, held, naming or LogNaming())
+        _require_plain(campaign, options, held, naming or LogNaming(), with_load)
         runs = read_campaign(campaign, model.joint_names)
         return calibrate_campaign(model, runs, options, regressor, torque_constants, progress)
     progress("reading logs")
     found = log_sources(
         paths, held, model.joint_names, options.linear, options.choice, naming or LogNaming(), progress
     )
+    full = None
+    if load is not None:
+        names = naming or LogNaming()
+        own = log_sources(with_load, [], model.joint_names, options.linear, options.choice, names, progress)
+        full = LoadedLogs(own.logs, load)
     options = replace(options, linear=found.linear)
     constants = {**found.constants, **(torque_constants or {})}
-    return calibrate_logs(model, found.logs, options, regressor, constants or None, progress)
+    return calibrate_logs(model, found.logs, options, regressor, constants or None, progress, full)
 
 
 def _paths(sources: str | Path | Sequence[str | Path]) -> list[Path]:
@@ -110,11 +125,16 @@ def _paths(sources: str | Path | Sequence[str | Path]) -> list[Path]:
 
 
 def _require_plain(
-    campaign: Path, options: CalibrateOptions, validation: list[Path], naming: LogNaming
+    campaign: Path,
+    options: CalibrateOptions,
+    validation: list[Path],
+    naming: LogNaming,
+    loaded: list[Path],
 ) -> None:
     """InputError where what is for plain logs is given with a campaign."""
     given = [flag for flag, value in options.choice.by_flag().items() if value is not None]
     given += ["--validate"] if validation else []
+    given += ["--loaded"] if loaded else []
     given += naming.flags
     given += [f"[{name}]" for name in options.linear.tables]
     given += ["--prior-confidence"] if options.prior_confidence is not None else []
@@ -179,10 +199,18 @@ def calibrate_logs(
     regressor: Regressor,
     torque_constants: Mapping[str, float] | None,
     progress: Progress,
+    loaded: LoadedLogs | None = None,
 ) -> Calibration:
-    """The result of one linear fit: theta_b, friction and offsets as one vector."""
-    motors = motors_of_logs(model.joint_names, logs, torque_constants)
-    linear = options.linear.for_robot(model.mechanism)
+    """The result of one linear fit: theta_b, friction and offsets as one vector.
+
+    loaded  logs with a known load, from which torque constants are found before
+    """
+    linear, by_load = options.linear.for_robot(model.mechanism), None
+    if loaded is None:
+        motors = motors_of_logs(model.joint_names, logs, torque_constants)
+    else:
+        progress("torque constants")
+        motors, by_load = motors_with_load(model, regressor, logs, loaded, linear, torque_constants, progress)
     known = knowledge_of(
         model, linear.tables, linear.tables_from, options.prior_confidence, options.essential
     )
@@ -192,5 +220,7 @@ def calibrate_logs(
     )
     fit = LogFit(model, logs, linear, options.physical, options.consistency, known, progress)
     result = fit.record(found)
+    if loaded is not None and by_load is not None:
+        result = with_loaded_logs(result, loaded, by_load, linear)
     progress("verdict")
     return with_verdict_on_logs(result, model, regressor, logs, motors, linear.filter, options.verdict)

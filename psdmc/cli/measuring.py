@@ -233,6 +233,18 @@ def calibrate(
         list[str] | None,
         typer.Option(metavar="JOINT=KT,...", help="N m/A, for plain logs that hold currents"),
     ] = None,
+    loaded: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="LOG", help="log of currents with a known load on the tip: shows torque constants"
+        ),
+    ] = None,
+    load: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MASS,X,Y,Z", help="that load: kg, m in the tip's frame; or a load's file (.toml)"
+        ),
+    ] = None,
     cutoff: Annotated[
         float | None, typer.Option(metavar="HZ", help="of the filter of plain logs; 8, or less for slow logs")
     ] = None,
@@ -285,11 +297,12 @@ def calibrate(
         from psdmc.calibration.sources import LogNaming
         from psdmc.calibration.verdict.record import verdict_of
         from psdmc.calibration.verdict.said_once import unsaid_warnings
-        from psdmc.cli.show_checks import print_accuracy, print_verdict
+        from psdmc.cli.show_checks import print_accuracy, print_torque_constants, print_verdict
         from psdmc.report.calibrate_commands import calibrate_command
 
-    check_output(output, *given, *(validate or []))
-    check_report(report, output, *given, *(validate or []))
+    read = [*given, *(validate or []), *(loaded or [])]
+    check_output(output, *read)
+    check_report(report, output, *read)
     with steps() as progress:
         record = calibrate_command(
             model,
@@ -308,10 +321,13 @@ def calibrate(
             keep=keep,
             validation=validate or [],
             naming=LogNaming(topic or "", parsed_joint_map(joint_map)),
+            loaded=loaded or (),
+            load_on=load,
         )
     verdict = verdict_of(record)
     print_verdict(verdict)
     print_accuracy(record)
+    print_torque_constants(record)
     if verdict.usable or keep:
         print(f"{output}: calibrated model")
     else:

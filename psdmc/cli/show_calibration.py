@@ -20,11 +20,13 @@ def print_calibration(kept: Mapping[str, Any]) -> None:
     for line in _verdict(kept.get("verdict")):
         print(line)
     print(f"method: {one_line(str(kept.get('method', 'unknown')))}")
-    logs = kept.get("facts", {}).get("data", [])
-    for row in logs[:MOST_LOGS]:
+    facts = kept.get("facts", {})
+    logs = [("log", row) for row in facts.get("data", [])]
+    logs += [("log with a known load", row) for row in facts.get("with_load", [])]
+    for what, row in logs[:MOST_LOGS]:
         date = f", {row['date']}" if row.get("date") else ""
         held = ", held out whole" if row.get("use") == "validate" else ""
-        print(f"log: {one_line(row['log'])}, {row['rows']:,} rows, {row['seconds']:.4g} s{date}{held}")
+        print(f"{what}: {one_line(row['log'])}, {row['rows']:,} rows, {row['seconds']:.4g} s{date}{held}")
     if len(logs) > MOST_LOGS:
         print(f"and {len(logs) - MOST_LOGS} more logs")
     if kept.get("prediction", {}).get("coupling"):

@@ -58,3 +58,13 @@ def print_accuracy(record: Calibration) -> None:
         both = [step.joints.get(joint) for step in record.steps]
         rows.append((joint, *("" if b is None else f"{b.held_out.r2:.4f}" for b in both)))
     print_table(Table(("joint", *(f"{step.step} R^2" for step in record.steps)), rows))
+
+
+def print_torque_constants(record: Calibration) -> None:
+    """Torque constants that were found, with standard deviations; nothing where none was."""
+    found = [row for row in record.motors if row.seen]
+    rows = [
+        (row.joint, f"{row.value:.6g}", f"{row.std:.2g}", f"{row.std / abs(row.value):.2%}") for row in found
+    ]
+    if rows:
+        print_table(Table(("joint", "torque constant [N m/A]", "standard deviation", "of it"), rows))

@@ -16,6 +16,7 @@ from psdmc.calibration.campaign import (
     require_free,
     write_campaign,
 )
+from psdmc.calibration.given_load import given_load
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.trajectory import write_trajectory
@@ -81,12 +82,15 @@ def calibrate_command(
     keep: bool = False,
     validation: Sequence[str | Path] = (),
     naming: LogNaming | None = None,
+    loaded: Sequence[str | Path] = (),
+    load_on: str | None = None,
 ) -> Calibration:
     """Calibrate a model file from a campaign or from logs.
 
     output     the calibrated model file, which emit-c takes
     report     an HTML page, with the numbers as JSON beside it
     actuators  a folder for C: friction and motors
+    loaded     further logs, recorded with the known load `load_on`: 'MASS,X,Y,Z' or a load's file
     keep       whether model and C are written even where the verdict is `not usable`
     validation  plain logs that are held out as a whole
     naming     topic and joint names of plain logs
@@ -100,6 +104,8 @@ def calibrate_command(
         torque_constants=torque_constants,
         validation=validation,
         naming=naming,
+        loaded=loaded,
+        load=None if load_on is None else given_load(load_on),
         progress=progress,
     )
     if report is not None:

@@ -18,7 +18,7 @@ from psdmc.calibration.identify.coupling import Matrix, coupling_of
 from psdmc.calibration.identify.extra import extra_scale, limits_of, motion_of
 from psdmc.calibration.identify.kept_rows import KeptRows
 from psdmc.calibration.identify.least_squares import Estimate, FitOptions, Prior, estimate_rows
-from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.motor_model import Motors, RowsByMotors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
@@ -211,14 +211,16 @@ def _fitted(
     problem, resting = linear_problem(chain, model, l, logs, options, motors, progress, carried)
     progress("linear fit: solving")
     kept = np.repeat(~problem.held_out[:, None], len(chain), axis=1)
-    prior = _prior(chain, model, problem, options, theta_b)
-    solved = estimate_rows(problem.rows, problem.torque, options.fit, None, kept, prior)
+    prior = linear_prior(chain, model, problem, options, theta_b)
+    uncertain = motors.relative_covariance
+    rows = problem.rows if uncertain is None else RowsByMotors(problem.rows, problem.torque)
+    solved = estimate_rows(rows, problem.torque, options.fit, uncertain, kept, prior)
     notes = tuple(note for log in logs for note in log.notes)
     warnings = (*notes, *resting, *noise_warnings("linear fit", chain.joint_names, solved))
     return LinearResult(solved, problem, prior, motors, warnings)
 
 
-def _prior(
+def linear_prior(
     chain: Mechanism, model: Regressor, problem: LinearProblem, options: LinearOptions, theta_b: Array | None
 ) -> Prior:
     """The file's theta_b, no friction and no springs; friction may be as large as its joint's torque at an ordinary

@@ -63,11 +63,16 @@ def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOp
             )
             continue
         constant[k], std[k] = 1.0 / slope, error / slope**2
-        if slope < 0:
-            warnings.append(
-                f"joint {joint.name}: torque constant is negative: the current's sign is against the joint's"
-            )
-    return MotorResult(constant, std, tuple(warnings))
+    return MotorResult(constant, std, (*warnings, *negative_warnings(chain.joint_names, constant)))
+
+
+def negative_warnings(joint_names: Sequence[str], constants: Array) -> tuple[str, ...]:
+    """A warning for each torque constant (N m/A, NaN: none) that is negative."""
+    return tuple(
+        f"joint {name}: torque constant is negative: the current's sign is against the joint's"
+        for name, value in zip(joint_names, constants, strict=True)
+        if value < 0
+    )
 
 
 def judge_motors(

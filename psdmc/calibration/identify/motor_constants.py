@@ -65,7 +65,7 @@ def motors_of_logs(
     if not constants:
         raise InputError(
             f"{logs[0].name}: holds currents, and no torque constants are known",
-            "give --torque-constants, or run a campaign with a motor step",
+            "give --torque-constants, a second log with a known load (--loaded, --load), or run a campaign",
         )
     missing = [name for name in joint_names if name not in constants]
     if missing:

@@ -1,11 +1,13 @@
-"""Motor torque from logged effort, and its uncertainty."""
+"""Motor torque from logged effort, and what its uncertainty does to a fit of it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from psdmc.calibration.identify.linear_rows import Block, Rows
 from psdmc.calibration.logs.log import Array
 
 
@@ -28,3 +30,26 @@ class Motors:
     def torque(self, effort: Array) -> Array:
         """(..., n) motor torque of logged effort."""
         return np.asarray(effort * self.torque_constant)
+
+    @property
+    def relative_covariance(self) -> Array | None:
+        """(n, n) of the constants' relative errors; None where all are exact."""
+        return np.diag(self.relative_std**2) if self.relative_std.any() else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowsByMotors:
+    """A problem's rows with the change of the torque per relative error of each torque constant.
+
+    torque  (N, n) N m, the problem's
+    """
+
+    rows: Rows
+    torque: Array
+
+    def __iter__(self) -> Iterator[Block]:
+        first, n = 0, self.torque.shape[1]
+        for block in self.rows:
+            own = slice(first, first + len(block))
+            first = own.stop
+            yield Block(block.columns, block.noise, self.torque[own, :, None] * np.eye(n))

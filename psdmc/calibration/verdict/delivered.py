@@ -136,6 +136,17 @@ def delivered_quality(
     return (_log_quality(found, source, check or CheckOptions()),)
 
 
+def log_parts(
+    model: DynamicsModel, log: AnyLog, check: CheckOptions
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Of one log's independent samples, by a model that plain logs calibrated: time (N,), measured torque and the model's
+    (N, n), and which are held out (N,)."""
+    found = delivered(model)
+    step = found.prediction.steps["all"]
+    time, measured, predicted = _log_parts(found, log, step, check)
+    return time, measured, predicted, held_out_of(log, len(time), step.split)
+
+
 def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) -> StepQuality:
     chain, step = found.model.mechanism, found.prediction.steps["all"]
     parts = [_log_parts(found, log, step, check) for log in logs]

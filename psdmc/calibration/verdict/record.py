@@ -291,8 +291,12 @@ def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration
 
 def with_data(record: Calibration, logs: Sequence[AnyLog]) -> Calibration:
     """The record with the names, lengths and dates of its logs."""
-    data = [_data(log) for log in logs]
-    return replace(record, facts={**record.facts, "data": data})
+    return replace(record, facts={**record.facts, "data": data_of(logs)})
+
+
+def data_of(logs: Sequence[AnyLog]) -> list[dict[str, Any]]:
+    """Names, lengths and dates of logs as plain values."""
+    return [_data(log) for log in logs]
 
 
 def _data(log: AnyLog) -> dict[str, Any]:
@@ -353,11 +357,12 @@ def _parameter_rows(
 
 
 def _motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) -> tuple[NumberRow, ...]:
-    """Rows of the torque constants; none where torques were logged. A given constant is marked as not seen."""
+    """Rows of the torque constants; none where torques were logged. A given constant, which is exact, is marked as not
+    seen."""
     constants, relative = motors.torque_constant, motors.relative_std
     if step is None and np.all(constants == 1.0):
         return ()
-    seen = np.zeros(model.n, dtype=bool) if step is None else step.identified
+    seen = relative > 0.0 if step is None else step.identified
     return tuple(
         NumberRow(name, "torque_constant", float(value), float(abs(value) * share), "Nm/A", bool(known))
         for name, value, share, known in zip(model.joint_names, constants, relative, seen, strict=True)

@@ -1,0 +1,117 @@
+"""A known load on a robot: its torques along a log, and which joints its weight does not reach."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psdmc.calibration.logs.check_options import CheckOptions
+from psdmc.calibration.logs.filter import smoothed_rows, stretches
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.low_pass import FilterOptions
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.dynamics.frames import frames_of
+from psdmc.dynamics.kinematics import forward_kinematics
+from psdmc.model import recursive
+from psdmc.model.payload import body_parameters, carrying_frame, load_parameters
+from psdmc.robot.inertia import inertia_matrix
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
+
+ALONG = 0.02
+"""Sine of the angle between an axis and gravity below which the axis counts as along it, or for a sliding one across it:
+one degree."""
+SMALL_ARM = 0.005
+"""m, from an axis to a load's centre of mass: below it the load counts as hanging on the axis. A hand cannot mount it
+truer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownLoad:
+    """A body of known mass on a frame of a robot.
+
+    mass, com, inertia  kg, (3,) m in the frame, (6,) kg m^2 about the centre of mass (xx, xy, yy, xz, yz, zz); zeros: a
+                        point
+    frame               its name; None: the tip
+    """
+
+    mass: float
+    com: Array
+    inertia: Array
+    frame: str | None = None
+
+    @property
+    def is_point(self) -> bool:
+        return not np.any(self.inertia)
+
+    def parameters(self, chain: Mechanism) -> Array:
+        """(11 n,) standard parameters of the chain if it had no body but the load; InputError where no body is like it."""
+        place = carrying_frame(chain, self.frame)
+        alone = np.zeros(PARAMETERS_PER_LINK * len(chain))
+        alone[body_parameters(place.joint)] = load_parameters(
+            chain, self.mass, self.com, inertia_matrix(self.inertia), self.frame
+        )
+        return alone
+
+    def torques(
+        self, chain: Mechanism, logs: Sequence[AnyLog], options: FilterOptions, check: CheckOptions, rows: int
+    ) -> Array:
+        """(N, n) N m that the load takes at the independent samples of checked logs, filtered as what was measured."""
+        alone = self.parameters(chain)
+        found = []
+        for log in logs:
+            for stretch in stretches(log, options, check, rows):
+                states = stretch.states
+
+                def needed(own: slice, states=states) -> Array:  # type: ignore[no-untyped-def]
+                    return recursive.torques(chain, alone, [states.q[own], states.qd[own], states.qdd[own]])
+
+                found.append(smoothed_rows(states, stretch.at, needed))
+        return np.concatenate(found)
+
+
+def unreached(chain: Mechanism, q: Array, load: KnownLoad) -> dict[str, str]:
+    """Why a load's weight is not felt by a joint in any of the poses q (N, n), by joint name; other joints are left out."""
+    down = chain.gravity / (np.linalg.norm(chain.gravity) or 1.0)
+    weight = load.mass * float(np.linalg.norm(chain.gravity))
+    still = np.zeros_like(q)
+    felt = np.abs(recursive.torques(chain, load.parameters(chain), [q, still, still])).max(axis=0)
+    axes = _axes(chain, q)
+    reasons = {}
+    for k, joint in enumerate(chain.joints):
+        slides = bool(joint.type.length_order)
+        if felt[k] >= (ALONG if slides else SMALL_ARM) * weight > 0.0:
+            continue
+        across = np.linalg.norm(np.cross(axes[k], down), axis=-1).max()
+        if not weight:
+            reasons[joint.name] = NO_GRAVITY
+        elif slides:
+            reasons[joint.name] = LEVEL
+        else:
+            reasons[joint.name] = UPRIGHT if across < ALONG else ON_AXIS
+    return reasons
+
+
+def _axes(chain: Mechanism, q: Array) -> Array:
+    """(n, N, 3) the joints' axes in the base frame."""
+    frames = frames_of(chain)
+    states = [q[:, k] for k in range(len(chain))]
+    placed = forward_kinematics(frames, states)
+    shape = (len(q),)
+    return np.array(
+        [[np.broadcast_to(rotation[r][2], shape) for r in range(3)] for rotation, _ in placed]
+    ).transpose(0, 2, 1)
+
+
+NO_GRAVITY = "there is no gravity"
+LEVEL = "it slides level"
+UPRIGHT = "its axis is along gravity"
+ON_AXIS = "the load hangs on its axis"
+REMEDIES = {
+    NO_GRAVITY: "accelerate it with the load far out",
+    LEVEL: "accelerate it with the load on, or tilt the base",
+    UPRIGHT: "accelerate it with the load far out, or tilt the base",
+    ON_AXIS: "mount the load off that axis",
+}
+"""What to do where the weight is not felt."""

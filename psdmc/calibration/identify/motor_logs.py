@@ -1,0 +1,221 @@
+"""Torque constants from ordinary exciting logs, without and with a known load.
+
+What current i_k of joint k measures is
+
+    K_k i_k = Y_k theta_b + F_k phi + s w_k        s = 1 with the load, 0 without
+
+where w, the torque of the known load, sets the scale: without it K, theta_b and friction phi would have any common
+factor. All joints are one problem, because theta_b ties them: a joint that hardly feels the load's weight is found through
+the inertias that it shares with others. Noise is the current's, so that the residual, in torque, is
+
+    r_k = K_k i_k - (Y_k theta_b + F_k phi + s w_k) (1 - kappa_k)
+
+linear in kappa, the relative error of K_k, about the last torque: Gauss-Newton steps of a fit of currents, which noise does
+not bias. Gautier and Briot (Global identification of joint drive gains and dynamic parameters of robots, 2014) use total
+least squares for the same. Friction and offset have columns of their own with the load: bearings press harder then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.identify.known_load import REMEDIES, KnownLoad, unreached
+from psdmc.calibration.identify.least_squares import Estimate, Prior, estimate_rows
+from psdmc.calibration.identify.linear_fit import LinearOptions, LinearProblem, linear_prior, linear_problem
+from psdmc.calibration.identify.linear_rows import Block, residual_of
+from psdmc.calibration.identify.motor import MotorResult, negative_warnings
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.prior import torque_sizes
+from psdmc.calibration.identify.residuals import noise_warnings
+from psdmc.calibration.logs.filter import stretches
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.logs.wording import listed
+from psdmc.errors import InputError
+from psdmc.progress import Progress
+from psdmc.robot.mechanism import Mechanism
+
+ROUNDS = 40
+"""Gauss-Newton steps at most; three or four are usual."""
+SETTLED = 1e-7
+"""Relative change of every torque constant that ends them."""
+LARGEST_STEP = 1.0
+"""Of a step after the first, in the constant's logarithm."""
+WORST = 0.05
+"""Relative standard deviation from which a torque constant is not found: the motor sweeps' limit, too."""
+MOST_POSES = 400
+"""Of a log, in which the load's weight is looked at."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadedRows:
+    """The problem's rows with friction apart for logs with the load, and a column for each torque constant.
+
+    problem    of all logs; theta_b, friction and what else counts as such
+    with_load  (N,)    samples that were taken with it
+    torque     (N, n)  N m, of the last step
+    """
+
+    problem: LinearProblem
+    with_load: NDArray[np.bool_]
+    torque: Array
+
+    def prior(self, plain: Prior) -> Prior:
+        """Of theta_b, friction without and with the load, and relative errors of torque constants, of which nothing is
+        known; `plain` is that of the problem's own unknowns."""
+        l, n = self.problem.l, self.torque.shape[1]
+        values, scale = plain.values, plain.scale
+        return Prior(
+            np.concatenate([values, values[l:], np.zeros(n)]), np.concatenate([scale, scale[l:], np.ones(n)])
+        )
+
+    def __iter__(self) -> Iterator[Block]:
+        first, n = 0, self.torque.shape[1]
+        for block in self.problem.rows:
+            own = slice(first, first + len(block))
+            first = own.stop
+            gains = -self.torque[own, :, None] * np.eye(n)
+            noise = None if block.noise is None else self._apart(block.noise, own, np.zeros_like(gains))
+            yield Block(self._apart(block.columns, own, gains), noise)
+
+    def _apart(self, columns: Array, own: slice, gains: Array) -> Array:
+        l, loaded = self.problem.l, self.with_load[own, None, None]
+        rigid, rubbed = columns[:, :, :l], columns[:, :, l:]
+        return np.concatenate([rigid, rubbed * ~loaded, rubbed * loaded, gains], axis=2)
+
+
+def motors_by_load(
+    chain: Mechanism,
+    model: Regressor,
+    l: int,
+    empty: Sequence[AnyLog],
+    loaded: Sequence[AnyLog],
+    load: KnownLoad,
+    options: LinearOptions,
+    theta_b: Array | None,
+    progress: Progress,
+) -> MotorResult:
+    """Torque constants from checked logs of currents; NaN where the logs do not show one, with a warning that says why.
+
+    theta_b  (l,) the file's values, kept in directions that the logs do not show; None: zero
+
+    Raises InputError where no joint shows the load, or all constants are negative.
+    """
+    logs = [*empty, *loaded]
+    options = replace(
+        options, columns=options.columns.without_load()
+    )  # what the load adds to friction has columns
+    problem, _ = linear_problem(chain, model, l, logs, options, Motors.torques(len(chain)), progress)
+    added = load.torques(chain, loaded, options.filter, options.check, options.stretch)
+    count = len(problem.torque) - len(added)
+    known = np.concatenate([np.zeros((count, len(chain))), added])
+    progress("torque constants: solving")
+    constants, solved = _settled(
+        chain, model, problem, known, np.arange(len(known)) >= count, options, theta_b
+    )
+    std = solved.std[-len(chain) :]
+    found = std < WORST
+    _require_some(listed([log.name for log in loaded], 3), constants, found)
+    warnings = [note for log in loaded for note in log.notes]
+    warnings += noise_warnings("motors", chain.joint_names, solved)
+    if not found.all():
+        warnings += _missing(chain, found, added, loaded, load, options)
+    warnings += negative_warnings(chain.joint_names, np.where(found, constants, np.nan))
+    return MotorResult(
+        np.where(found, constants, np.nan), np.where(found, np.abs(constants) * std, np.nan), tuple(warnings)
+    )
+
+
+def _settled(
+    chain: Mechanism,
+    model: Regressor,
+    problem: LinearProblem,
+    known: Array,
+    with_load: NDArray[np.bool_],
+    options: LinearOptions,
+    theta_b: Array | None,
+) -> tuple[Array, Estimate]:
+    """(n,) N m/A, and the last step, whose last n standard deviations are relative ones of the constants.
+
+    known  (N, n) N m, the load's torque
+    """
+    n, current = len(chain), problem.torque
+    kept = np.repeat(~problem.held_out[:, None], n, axis=1)
+    constants = _guessed(known[with_load], current)
+    rows = LoadedRows(problem, with_load, current * constants)
+    for step in range(ROUNDS):
+        prior = rows.prior(
+            linear_prior(chain, model, replace(problem, torque=current * constants), options, theta_b)
+        )
+        measured = current * constants - known
+        solved = estimate_rows(rows, measured, options.fit, None, kept, prior)
+        kappa = solved.values[-n:]
+        if np.abs(kappa).max() < SETTLED:
+            break
+        # before the first step the torque is the current's own, whose sign may be wrong
+        change = np.exp(np.clip(kappa, -LARGEST_STEP, LARGEST_STEP)) if step else 1.0 + kappa
+        constants = constants * change
+        without_gains = np.concatenate([solved.values[:-n], np.zeros(n)])
+        rows = LoadedRows(problem, with_load, measured + known - residual_of(rows, measured, without_gains))
+    return constants, solved
+
+
+def _guessed(known: Array, current: Array) -> Array:
+    """(n,) N m/A, positive: the size of the load's torque over that of the current, within a factor of a hundred or so."""
+    sizes, currents = torque_sizes(known), torque_sizes(current)
+    return np.asarray(sizes / np.where(currents > 0.0, currents, 1.0))
+
+
+def _require_some(logs: str, constants: Array, found: NDArray[np.bool_]) -> None:
+    """InputError where the load is not seen at all, or with the wrong sign everywhere."""
+    if not found.any():
+        raise InputError(
+            f"{logs}: the load does not show in the currents of any joint",
+            "check that it was mounted, and its numbers; use a heavier one, farther out, or move faster",
+        )
+    if (constants[found] < 0.0).all():
+        raise InputError(
+            f"{logs}: the load lowers the currents where it should raise them, at every joint",
+            "are the logs with and without the load exchanged? else turn the currents' signs in both",
+        )
+
+
+def _missing(
+    chain: Mechanism,
+    found: NDArray[np.bool_],
+    added: Array,
+    loaded: Sequence[AnyLog],
+    load: KnownLoad,
+    options: LinearOptions,
+) -> list[str]:
+    """A sentence for each joint without a constant: why, and what to mount or how to move."""
+    poses = np.concatenate([_poses(log, options) for log in loaded])
+    reasons = unreached(chain, poses, load)
+    sentences = []
+    for k, joint in enumerate(chain.joints):
+        if found[k]:
+            continue
+        unit = "N" if joint.type.length_order else "N m"
+        felt = f"the load adds at most {np.abs(added[:, k]).max():.3g} {unit}"
+        reason = reasons.get(joint.name)
+        remedy = (
+            REMEDIES[reason] if reason else "mount more, farther from the axis, or move faster and longer"
+        )
+        why = f"{reason}, and {felt}" if reason else felt
+        sentences.append(f"joint {joint.name}: torque constant not found: {why}; {remedy}")
+    return sentences
+
+
+def _poses(log: AnyLog, options: LinearOptions) -> Array:
+    """Some of the poses that a log holds, evenly spread."""
+    parts = [
+        stretch.states.q[stretch.at]
+        for stretch in stretches(log, options.filter, options.check, options.stretch)
+    ]
+    whole = np.concatenate(parts)
+    return np.asarray(whole[:: max(1, len(whole) // MOST_POSES)])

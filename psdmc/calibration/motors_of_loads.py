@@ -1,0 +1,141 @@
+"""Torque constants of a calibration from plain logs: given, or from further logs that were recorded with a known load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from psdmc.calibration.identify.known_load import KnownLoad
+from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.motor import MotorResult
+from psdmc.calibration.identify.motor_constants import one_quantity, require_constants
+from psdmc.calibration.identify.motor_logs import motors_by_load
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.steps import StepQuality, judged
+from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.verdict.delivered import log_parts, reread
+from psdmc.calibration.verdict.record import Calibration, data_of, with_model
+from psdmc.errors import InputError
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.progress import Progress
+
+NOTICED = 0.05
+"""Share of a joint's torque from which the known load's part of it is judged: the verdict's share for gains."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadedLogs:
+    """Logs of currents that were recorded with a known load on the robot."""
+
+    logs: Sequence[AnyLog]
+    load: KnownLoad
+
+
+def motors_with_load(
+    model: DynamicsModel,
+    regressor: Regressor,
+    logs: Sequence[AnyLog],
+    loaded: LoadedLogs,
+    options: LinearOptions,
+    given: Mapping[str, float] | None,
+    progress: Progress,
+) -> tuple[Motors, MotorResult]:
+    """The motors that the logs without and with the load show; given constants where they show none.
+
+    given  N m/A by joint name
+
+    Raises InputError where the logs hold no currents, or a joint has neither.
+    """
+    chain = model.mechanism
+    if chain.has_followers:
+        raise InputError(
+            "torque constants are of joints that follow no other", "lock those that do, or log torques"
+        )
+    if options.coupling:
+        raise InputError(
+            "a known load shows the torque constants of motors that drive one joint each",
+            "give the constants in the description, [[joint]] or --torque-constants",
+        )
+    require_constants(given or {}, chain.joint_names)
+    quantity = one_quantity([*logs, *loaded.logs])
+    if quantity != "current":
+        raise InputError(
+            f"{loaded.logs[0].name}: holds {quantity}: torques need no torque constants",
+            "leave --loaded and --load out; `psdmc payload` identifies an unknown load",
+        )
+    empty, full = (
+        [checked(log, chain, options.filter.cutoff, options.check) for log in own]
+        for own in (logs, loaded.logs)
+    )
+    found = motors_by_load(
+        chain, regressor, model.l, empty, full, loaded.load, options, model.theta_b, progress
+    )
+    return _together(chain.joint_names, found, given or {}), found
+
+
+def _together(names: Sequence[str], found: MotorResult, given: Mapping[str, float]) -> Motors:
+    known = np.array([given.get(name, np.nan) for name in names], dtype=np.float64)
+    constants = np.where(found.identified, found.torque_constant, known)
+    missing = [k for k, value in enumerate(constants) if np.isnan(value)]
+    if missing:
+        seen = ",".join(f"{names[k]}={constants[k]:.6g}" for k in range(len(names)) if found.identified[k])
+        reasons = [text for text in found.warnings if "not found" in text]
+        raise InputError(
+            f"{'; '.join(reasons)} (found: {seen})",
+            "or give --torque-constants for " + ", ".join(names[k] for k in missing),
+        )
+    relative = np.where(found.identified, np.abs(found.std / constants), 0.0)
+    return Motors(constants, relative)
+
+
+def with_loaded_logs(
+    record: Calibration, loaded: LoadedLogs, found: MotorResult, options: LinearOptions
+) -> Calibration:
+    """The record with what its model's file, read back, says of the known load's torque: table 3's motor column."""
+    load = loaded.load
+    facts = {
+        "with_load": data_of(loaded.logs),
+        "load": {
+            "mass_kg": float(load.mass),
+            "com_m": [float(value) for value in load.com],
+            "inertia_kg_m2": [float(value) for value in load.inertia],
+            "frame": load.frame or record.model.mechanism.tip_name,
+        },
+    }
+    notes = (
+        ()
+        if not load.is_point
+        else ("the load is taken as a point: its inertia about its centre is not given",)
+    )
+    step = loaded_quality(record.model, loaded, options)
+    return with_model(
+        replace(
+            record,
+            steps=(step, *record.steps) if step.joints else record.steps,
+            facts={**record.facts, **facts},
+            warnings=(*found.warnings, *record.warnings),
+            notes=(*record.notes, *notes),
+        )
+    )
+
+
+def loaded_quality(model: DynamicsModel, loaded: LoadedLogs, options: LinearOptions) -> StepQuality:
+    """The known load's torque against what a calibrated model's file says that the load adds: measured torque less the
+    model's. Of joints where the load makes a noticeable part of the torque."""
+    model = reread(model)
+    chain = model.mechanism
+    full = [checked(log, chain, options.filter.cutoff, options.check) for log in loaded.logs]
+    parts = [log_parts(model, log, options.check) for log in full]
+    time, measured, without, out = (np.concatenate([part[k] for part in parts]) for k in range(4))
+    added = loaded.load.torques(chain, full, options.filter, options.check, options.stretch)
+    size = partial(np.std, axis=0)
+    judgeable = out.any()  # beside whole logs for validation nothing of this one is held out
+    noticed = np.flatnonzero(judgeable & (size(added) >= NOTICED * size(measured)))
+    names = [chain.joint_names[k] for k in noticed]
+    left = (measured - without)[:, noticed]
+    return judged("Motor", names, time, left, added[:, noticed], np.asarray(out, dtype=bool))
