@@ -16,7 +16,6 @@ from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics
-from psdmc.lower.kernels import lower
 from psdmc.lower.search import SINGLE, Search
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
