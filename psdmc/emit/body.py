@@ -5,114 +5,17 @@ Sines and cosines are taken in groups, as early as their angles are known, so th
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
 
 from psdmc.emit.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
+from psdmc.emit.lines import BETWEEN, Angle, Body, GroupStore, Line, Load, Section, Step, Store, spread
 from psdmc.emit.products import Entry, Multiplication, multiplication
 from psdmc.emit.store_groups import GROUP, StoreGroups
+from psdmc.program.angles import angle_groups, cone
 from psdmc.program.products import Product
 from psdmc.program.program import Op, Program, Slot
 
 _ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SQRT})
-
-
-def spread(text: str, uniform: bool) -> str:
-    """The text as a `V`."""
-    return f"SPLAT({text})" if uniform else text
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """An input that a section reads before its steps; a uniform one is the same for all states."""
-
-    name: str
-    vector: str
-    index: int
-    uniform: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """A statement `const <V or real> name = text;`"""
-
-    name: str
-    text: str
-    uniform: bool
-
-    @property
-    def line(self) -> str:
-        return f"const {'real' if self.uniform else 'V'} {self.name} = {self.text}"
-
-
-@dataclass(frozen=True, slots=True)
-class Store:
-    """A statement `vector[index] = text`, where a uniform text must be spread over the lanes first; `macro` stores it."""
-
-    vector: str
-    index: int
-    text: str
-    uniform: bool
-    macro: str = "STORE"
-
-    @property
-    def line(self) -> str:
-        return f"{self.macro}({self.vector}, {self.index}, {spread(self.text, self.uniform)})"
-
-
-@dataclass(frozen=True, slots=True)
-class GroupStore:
-    """A statement `vector[index ...] = texts`: a group of outputs that are also stored one by one, for the form that
-    writes rows."""
-
-    vector: str
-    index: int
-    texts: tuple[str, ...]
-
-    @property
-    def line(self) -> str:
-        return f"STORE_GROUP({self.vector}, {self.index}, {', '.join(self.texts)})"
-
-
-Line = Step | Store | GroupStore | Entry | Multiplication
-
-
-@dataclass(frozen=True, slots=True)
-class Angle:
-    """One angle of a group, and the names of its sine and cosine (None: not needed)."""
-
-    text: str
-    sine: str | None
-    cosine: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """A part of a body: loads, steps, then the sines and cosines of the angles that these steps compute.
-
-    Inputs that no angle needs are loaded in the last section, after all sines, so that they need not be kept while libm
-    is called. Stores come with the last steps, after all loads: an output may overwrite an input.
-    """
-
-    loads: tuple[Load, ...]
-    steps: tuple[Line, ...]
-    angles: tuple[Angle, ...]
-    number: int
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A PROGRAM ready to print.
-
-    unused    vectors of the signature that the PROGRAM never reads
-    products  done behind everything else
-    has_roots whether square roots are taken
-    """
-
-    sections: tuple[Section, ...]
-    unused: tuple[str, ...]
-    products: tuple[Multiplication, ...] = ()
-    has_roots: bool = False
 
 
 def make_body(
@@ -136,16 +39,42 @@ def make_body(
     uniform       vectors that are the same in all lanes
     """
     multiplied = tuple(multiplication(program, product, sizes) for product in products)
-    sizes = {name: size for name, size in sizes.items() if name not in {each.output for each in multiplied}}
+    stored = without_products(sizes, multiplied)
+    sections = sections_of(program, stored, suffix, stores_early, in_groups, multiplied, uniform)
+    return Body(sections, unread(program, inputs), multiplied, has_roots(program))
+
+
+def without_products(sizes: Mapping[str, int], products: Sequence[Multiplication]) -> dict[str, int]:
+    """Vectors that a PROGRAM stores, with their lengths, where it also has the products' outputs."""
+    outputs = {product.output for product in products}
+    return {name: size for name, size in sizes.items() if name not in outputs}
+
+
+def unread(program: Program, inputs: Sequence[str]) -> tuple[str, ...]:
+    read = {slot.vector for slot in program.inputs()}
+    return tuple(name for name in inputs if name not in read)
+
+
+def has_roots(program: Program) -> bool:
+    return any(instr.op is Op.SQRT for instr in program)
+
+
+def sections_of(
+    program: Program,
+    sizes: Mapping[str, int],
+    suffix: str,
+    stores_early: bool,
+    in_groups: Collection[str],
+    products: Sequence[Multiplication],
+    uniform: Collection[str],
+    with_zeros: bool = True,
+) -> tuple[Section, ...]:
+    """The sections of a PROGRAM; `with_zeros`: entries of the vectors in `sizes` that it does not store become zero."""
     groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
     beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
-    writer = _Writer(
-        program, suffix, stores_early, groups, frozenset(beside.difference(in_groups)), multiplied, uniform
-    )
-    sections = writer.sections(sizes)
-    read = {slot.vector for slot in program.inputs()}
-    unused = tuple(name for name in inputs if name not in read)
-    return Body(sections, unused, multiplied, any(instr.op is Op.SQRT for instr in program))
+    apart = frozenset(beside.difference(in_groups))
+    writer = _Writer(program, suffix, stores_early, groups, apart, products, uniform)
+    return writer.sections(sizes if with_zeros else {})
 
 
 class _Writer:
@@ -173,11 +102,11 @@ class _Writer:
         self.done = [False] * len(program)
         self.taken = {(op, args) for op, args, _, _ in program.body if op in (Op.SIN, Op.COS)}
 
-    def sections(self, sizes: dict[str, int]) -> tuple[Section, ...]:
+    def sections(self, sizes: Mapping[str, int]) -> tuple[Section, ...]:
         sections: list[Section] = []
-        for number, group in enumerate(_angle_groups(self.program)):
-            cone = _cone(self.program, group)
-            loads, steps = self._loads(cone), self._steps(cone, False)
+        for number, group in enumerate(angle_groups(self.program)):
+            wanted = cone(self.program, group)
+            loads, steps = self._loads(wanted), self._steps(wanted, False)
             sections.append(Section(loads, steps, tuple(self._angle(a) for a in group), number))
         everything = range(len(self.program))
         loads, steps = self._loads(everything), self._steps(everything, self.stores_early)
@@ -190,7 +119,7 @@ class _Writer:
         return tuple(
             Load(_load_name(slot), slot.vector, slot.index, slot.vector in self.uniform)
             for slot in self.program.inputs()
-            if slot in slots
+            if slot in slots and slot.vector not in BETWEEN
         )
 
     def _steps(self, wanted: range | list[int], with_stores: bool) -> tuple[Line, ...]:
@@ -230,7 +159,7 @@ class _Writer:
         macro = "STORE_BLOCK" if slot.vector in self.beside else "STORE"
         return Store(slot.vector, slot.index, text, uniform, macro)
 
-    def _zeros(self, sizes: dict[str, int]) -> list[Line]:
+    def _zeros(self, sizes: Mapping[str, int]) -> list[Line]:
         taken = {slot for slot, _ in self.program.outputs}
         zero = literal(0.0, self.suffix).text
         return [
@@ -277,29 +206,8 @@ class _Writer:
 
 
 def _load_name(slot: Slot) -> str:
+    """The name that an input is loaded into; what lies between parts is read where it is used: loaded before, it would be
+    stored and fetched once more, as registers are few."""
+    if slot.vector in BETWEEN:
+        return str(slot)
     return f"{slot.vector}_{slot.index}"
-
-
-def _angle_groups(program: Program) -> list[list[int]]:
-    """Angles by the number of nested sines they depend on: each group depends on earlier groups only."""
-    level: list[int] = []
-    groups: dict[int, dict[int, None]] = {}
-    for instr in program:
-        below = max([level[a] for a in instr.args]) if instr.args else 0
-        is_trig = instr.op is Op.SIN or instr.op is Op.COS
-        if is_trig:
-            groups.setdefault(below, {})[instr.args[0]] = None
-        level.append(below + 1 if is_trig else below)
-    return [list(groups[key]) for key in sorted(groups)]
-
-
-def _cone(program: Program, roots: list[int]) -> list[int]:
-    """All values that the roots depend on, the roots included, in the PROGRAM's order."""
-    needed = [False] * len(program)
-    for root in roots:
-        needed[root] = True
-    for i in reversed(range(max(roots) + 1)):
-        if needed[i]:
-            for a in program.body[i].args:
-                needed[a] = True
-    return [i for i, wanted in enumerate(needed) if wanted]

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from psdmc.emit.body import Body, make_body
+from psdmc.emit.body import make_body
 from psdmc.emit.limbs import LimbsView, limbs_view
+from psdmc.emit.lines import Body
 from psdmc.emit.options import EmitOptions
+from psdmc.emit.parts import body_in_parts, is_long
 from psdmc.emit.products import Multiplication
 from psdmc.emit.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
 from psdmc.emit.store_groups import GROUP
@@ -70,6 +72,15 @@ class KernelView:
     def called(self) -> str:
         """Name of the kernel that its stages call, '' where it has a body."""
         return f"{self.function.calls}{'_theta' if self.theta else ''}" if self.function.calls else ""
+
+    @property
+    def single_parts(self) -> str:
+        """File of the functions that a long body consists of."""
+        return self.single_file.replace(".inc", "_parts.inc")
+
+    @property
+    def lanes_parts(self) -> str:
+        return self.lanes_file.replace(".inc", "_parts.inc")
 
     @property
     def by_state(self) -> bool:
@@ -285,10 +296,10 @@ def _bodies(
 ) -> tuple[Body, Body]:
     """For one state and for lanes."""
     one, lanes = kernel.before or kernel.single, kernel.before or kernel.batch
-    single = _body(kernel, one, outputs, options)
+    single = _body(kernel, one, outputs, options, has_lanes)
     if not has_lanes or lanes is one:
         return single, single
-    return single, _body(kernel, lanes, outputs, options)
+    return single, _body(kernel, lanes, outputs, options, has_lanes)
 
 
 TAKEN = {
@@ -309,6 +320,7 @@ TAKEN = {
         "lanes",
         "angles",
     ),
+    *("DIRECT", "KEEP_DIRECT", "STORE_ZEROS", "PART", "NOT_INLINE", "kept", "kept_reals", "zero"),
     *("theta_b", "count", "block", "blocks", "lane", "first", "rows", "failed", "bad"),
 }
 """Names that mean something else in the emitted C where a quantity's name would stand."""
@@ -339,14 +351,18 @@ def _lengths(shape: tuple[int, ...]) -> str:
     return str(shape[0]) if len(shape) == 1 else f"{' x '.join(map(str, shape))}, row-major"
 
 
-def _body(kernel: Kernel, program: Program, outputs: tuple[OutputView, ...], options: EmitOptions) -> Body:
+def _body(
+    kernel: Kernel, program: Program, outputs: tuple[OutputView, ...], options: EmitOptions, has_lanes: bool
+) -> Body:
     """The body. Large outputs are stored as they are computed, as keeping them all until the end would spill them."""
     sizes = {output.name: output.size for output in outputs}
     suffix = "" if options.real == "float64" else "f"
     has_matrix = any(len(output.shape) > 1 for output in outputs)
     direct = tuple(output.name for output in outputs if output.direct)
     products = kernel.function.products if kernel.before else ()
-    return make_body(program, kernel.inputs, sizes, suffix, has_matrix, direct, products)
+    in_lines = bool(products) and has_lanes  # lanes' products take values from the lines before them
+    make = body_in_parts if is_long(program, sizes) and not in_lines else make_body
+    return make(program, kernel.inputs, sizes, suffix, has_matrix, direct, products)
 
 
 def _zero(output: Quantity, program: Program, sizes: Sizes) -> tuple[int, ...]:

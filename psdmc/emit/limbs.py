@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
-from psdmc.emit.body import Body, make_body
+from psdmc.emit.body import make_body
 from psdmc.emit.c_expr import literal
+from psdmc.emit.lines import Body
 from psdmc.emit.options import EmitOptions
 from psdmc.program.cost import Cost, cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage

@@ -266,6 +266,11 @@ class PackageView:
         return tuple(sorted({p.shape for function in self.functions for p in function.products}))
 
     @property
+    def has_parts(self) -> bool:
+        """Whether some body is several functions."""
+        return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels)
+
+    @property
     def has_roots(self) -> bool:
         """Whether some kernel takes square roots."""
         bodies = (body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body))

@@ -76,6 +76,10 @@ def library_files(package: PackageView) -> dict[str, str]:
             bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
             for file, body in bodies.items():
                 files[f"src/{file}"] = render("body.inc.jinja", body=body)
+            parts = {kernel.single_parts: kernel.single_body, kernel.lanes_parts: kernel.lanes_body}
+            for file, body in parts.items():
+                if body.parts:
+                    files[f"src/{file}"] = render("parts.inc.jinja", body=body)
             if kernel.limbs:
                 files[f"src/{kernel.limbs.file}"] = render("limbs.inc.jinja", limbs=kernel.limbs)
     if package.info.payload:

@@ -17,15 +17,24 @@ KERNELS = arm_kernels()
 AS_LONG_AS_AN_INPUT = [
     name for name, kernel in KERNELS.items() if SIZES.size(kernel.function.outputs[0]) == N
 ]
-BUILDS = {"vectors": ["-march=native"], "plain": ["-Dtest_arm_NO_VECTORS"]}
+BUILDS = {"vectors": ["-march=native"], "plain": ["-Dtest_arm_NO_VECTORS"], "parts": ["-march=native"]}
+"""`parts`: bodies are cut into functions of some thirty operations."""
 OPTIMISED = ("float64", "vectors")
 """The build that shows what a compiler makes of it; the others show in which order the C reads and writes."""
 
 
-@pytest.fixture(scope="module", params=[("float64", "vectors"), ("float64", "plain"), ("float32", "vectors")])
+CASES = [("float64", "vectors"), ("float64", "plain"), ("float32", "vectors"), ("float64", "parts")]
+
+
+@pytest.fixture(scope="module", params=CASES)
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     real, build = request.param
-    package = arm_package(options=EmitOptions(real=real))
+    with pytest.MonkeyPatch.context() as patch:
+        if build == "parts":
+            patch.setattr("psdmc.emit.parts.LONG", 30)
+            patch.setattr("psdmc.emit.parts.PART", 30)
+        package = arm_package(options=EmitOptions(real=real))
+    assert package.has_parts == (build == "parts")
     flags = ["-O1" if request.param == OPTIMISED else "-O0", *BUILDS[build]]
     return Direct(package, shared_library(package, tmp_path_factory.mktemp("aliasing"), flags))
 

@@ -1,0 +1,47 @@
+"""Angles of a PROGRAM: which sines and cosines can be taken together, and what must be known before."""
+
+from __future__ import annotations
+
+from psdmc.program.program import Op, Program
+
+
+def angle_groups(program: Program) -> list[list[int]]:
+    """Angles by the number of nested sines they depend on: each group depends on earlier groups only."""
+    level: list[int] = []
+    groups: dict[int, dict[int, None]] = {}
+    for instr in program:
+        below = max([level[a] for a in instr.args]) if instr.args else 0
+        is_trig = instr.op is Op.SIN or instr.op is Op.COS
+        if is_trig:
+            groups.setdefault(below, {})[instr.args[0]] = None
+        level.append(below + 1 if is_trig else below)
+    return [list(groups[key]) for key in sorted(groups)]
+
+
+def cone(program: Program, roots: list[int]) -> list[int]:
+    """All values that the roots depend on, the roots included, in the PROGRAM's order."""
+    needed = [False] * len(program)
+    for root in roots:
+        needed[root] = True
+    for i in reversed(range(max(roots) + 1)):
+        if needed[i]:
+            for a in program.body[i].args:
+                needed[a] = True
+    return [i for i, wanted in enumerate(needed) if wanted]
+
+
+def angles_first(program: Program) -> list[list[int]]:
+    """All values, each after its arguments and once, a list per group of angles and one for the rest: what a group's angles
+    are computed from, then their sines and cosines."""
+    taken: dict[int, list[int]] = {}
+    for i, instr in enumerate(program):
+        if instr.op is Op.SIN or instr.op is Op.COS:
+            taken.setdefault(instr.args[0], []).append(i)
+    done = [False] * len(program)
+    found = []
+    for group in angle_groups(program):
+        wanted = [*cone(program, group), *(i for angle in group for i in taken[angle])]
+        found.append([i for i in wanted if not done[i]])
+        for i in wanted:
+            done[i] = True
+    return [*found, [i for i in range(len(program)) if not done[i]]]

@@ -1,0 +1,209 @@
+"""Cut a long PROGRAM into parts that are compiled one by one: compilers take more than linear time for long straight lines.
+
+A part is a PROGRAM of its own. What later parts read of it, it stores into vectors that lie between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+
+from psdmc.program.angles import angles_first
+from psdmc.program.check import check
+from psdmc.program.program import Instr, Op, Program, Slot
+
+LEEWAY = 0.25
+"""Share of a part's length by which its end may move to where few values are read beyond it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Parts in their order, and the vectors that lie between them with their lengths."""
+
+    programs: tuple[Program, ...]
+    kept: Mapping[str, int]
+
+
+def in_parts(
+    program: Program, kept_in: Sequence[str], groups: Sequence[Collection[Slot]], late: bool, longest: int
+) -> Parts:
+    """The PROGRAM in parts of about `longest` operations and stores.
+
+    kept_in  of each value the vector that takes it where a later part reads it
+    groups   outputs that one part must store; an output that is in none is a group of its own
+    late     the last part stores all outputs; otherwise each part stores what it completes
+    Keeps: output values, bit for bit; all inputs are read before or in the first part that stores an output, and in it
+    before they are stored.
+    """
+    return _Cut(program, kept_in, groups, late, longest).parts()
+
+
+class _Cut:
+    def __init__(
+        self,
+        program: Program,
+        kept_in: Sequence[str],
+        groups: Sequence[Collection[Slot]],
+        late: bool,
+        longest: int,
+    ) -> None:
+        self.program, self.kept_in = program, kept_in
+        sections = angles_first(program)
+        self.order = [i for section in sections for i in section if program.body[i].op is not Op.CONST]
+        self.position = {i: k for k, i in enumerate(self.order)}
+        self.stored_at = self._stored_at(groups, late)
+        self.ends = self._ends(longest)
+        self.part = {i: self._part_at(k) for i, k in self.position.items()}
+        self.outputs = self._outputs()
+        self.read_in = self._read_in()
+        self.first_store = min((p for p, outputs in enumerate(self.outputs) if outputs), default=0)
+
+    def _stored_at(self, groups: Sequence[Collection[Slot]], late: bool) -> dict[Slot, int]:
+        """Of each output the position in the order behind which it is stored."""
+        last = len(self.order) - 1
+        if late:
+            return {slot: last for slot, _ in self.program.outputs}
+        known = {slot: self.position.get(i, -1) for slot, i in self.program.outputs}
+        for group in groups:
+            together = [slot for slot in group if slot in known]
+            known |= dict.fromkeys(together, max((known[slot] for slot in together), default=-1))
+        return {slot: last if at < 0 else at for slot, at in known.items()}
+
+    def _ends(self, longest: int) -> list[int]:
+        """Positions before which a part ends, but for the last one."""
+        weight = self._weights()
+        total = sum(weight)
+        count = max(1, ceil(total / longest))
+        reach = LEEWAY * total / count
+        crossing = self._crossing_at()
+        sums = [0.0]
+        for each in weight:
+            sums.append(sums[-1] + each)
+        ends: list[int] = []
+        for k in range(1, count):
+            near = [
+                b
+                for b in range(1, len(self.order))
+                if abs(sums[b] - k * total / count) <= reach and not self._is_within_angles(b)
+            ]
+            near = [b for b in near if not ends or b > ends[-1]]
+            if near:
+                ends.append(min(near, key=lambda b: (crossing[b], b)))
+        return ends
+
+    def _weights(self) -> list[int]:
+        weight = [0 if self.program.body[i].op is Op.LOAD else 1 for i in self.order]
+        for position in self.stored_at.values():
+            weight[position] += 1
+        return weight
+
+    def _is_within_angles(self, boundary: int) -> bool:
+        """Whether the sines of one group of angles lie on both sides."""
+        before, behind = (self.program.body[self.order[b]].op for b in (boundary - 1, boundary))
+        return {before, behind} <= {Op.SIN, Op.COS}
+
+    def _crossing_at(self) -> list[int]:
+        """Of each position how many values from before it are read from it on."""
+        last = dict(self.position)
+        for i in self.order:
+            for a in self.program.body[i].args:
+                if a in last:
+                    last[a] = max(last[a], self.position[i])
+        for slot, i in self.program.outputs:
+            if i in last:
+                last[i] = max(last[i], self.stored_at[slot])
+        change = [0] * (len(self.order) + 2)
+        for i, end in last.items():
+            change[self.position[i] + 1] += 1
+            change[end + 1] -= 1
+        crossing, now = [], 0
+        for each in change:
+            now += each
+            crossing.append(now)
+        return crossing
+
+    def _part_at(self, position: int) -> int:
+        return sum(end <= position for end in self.ends)
+
+    def _outputs(self) -> list[list[tuple[Slot, int]]]:
+        outputs: list[list[tuple[Slot, int]]] = [[] for _ in range(len(self.ends) + 1)]
+        for slot, i in self.program.outputs:
+            outputs[self._part_at(self.stored_at[slot])].append((slot, i))
+        return outputs
+
+    def _read_in(self) -> dict[int, set[int]]:
+        """Of each value the parts that read it."""
+        read: dict[int, set[int]] = {i: set() for i in self.order}
+        for i in self.order:
+            for a in self.program.body[i].args:
+                if a in read:
+                    read[a].add(self.part[i])
+        for p, outputs in enumerate(self.outputs):
+            for _, i in outputs:
+                if i in read:
+                    read[i].add(p)
+        return read
+
+    def _is_free(self, value: int, part: int) -> bool:
+        """Whether a part makes this value itself, though others do: constants, and inputs before anything is stored."""
+        op = self.program.body[value].op
+        return op is Op.CONST or (op is Op.LOAD and part <= self.first_store)
+
+    def _home(self, value: int) -> int:
+        """The part that stores a value for later ones."""
+        is_load = self.program.body[value].op is Op.LOAD
+        return self.first_store if is_load else self.part[value]
+
+    def parts(self) -> Parts:
+        slots, lengths = self._slots()
+        programs = tuple(self._program(p, slots) for p in range(len(self.outputs)))
+        return Parts(programs, lengths)
+
+    def _slots(self) -> tuple[dict[int, Slot], dict[str, int]]:
+        """Where values lie that later parts read; a place is free again behind the last part that reads it."""
+        slots: dict[int, Slot] = {}
+        lengths: dict[str, int] = {}
+        free: dict[str, list[int]] = {}
+        until: list[tuple[int, Slot]] = []
+        for p in range(len(self.outputs)):
+            for last, slot in until:
+                if last == p - 1:
+                    free.setdefault(slot.vector, []).append(slot.index)
+            for i in self._leaving(p):
+                vector = self.kept_in[i]
+                places = free.get(vector, [])
+                if not places:
+                    places = [lengths.setdefault(vector, 0)]
+                    lengths[vector] += 1
+                slots[i] = Slot(vector, places.pop())
+                until.append((max(self.read_in[i]), slots[i]))
+        return slots, lengths
+
+    def _leaving(self, part: int) -> Iterator[int]:
+        """Values that a part stores for later ones."""
+        for i in self.order:
+            if self._home(i) == part and any(p > part and not self._is_free(i, p) for p in self.read_in[i]):
+                yield i
+
+    def _program(self, part: int, slots: Mapping[int, Slot]) -> Program:
+        body: list[Instr] = []
+        here: dict[int, int] = {}
+
+        def local(i: int) -> int:
+            if i not in here:
+                here[i] = len(body)
+                is_own = self._is_free(i, part)
+                body.append(self.program.body[i] if is_own else Instr(Op.LOAD, slot=slots[i]))
+            return here[i]
+
+        for i in self.order:
+            instr = self.program.body[i]
+            if instr.op is Op.LOAD or self.part[i] != part:
+                continue
+            moved = {a: local(a) for a in instr.args}
+            here[i] = len(body)
+            body.append(instr.renumbered(moved))
+        outputs = [(slot, local(i)) for slot, i in self.outputs[part]]
+        outputs += [(slots[i], local(i)) for i in self._leaving(part)]
+        return check(Program(tuple(body), tuple(outputs)), after="cutting into parts")
