@@ -112,7 +112,7 @@ def _values(columns: Columns, guess: Guess) -> dict[int, Array]:
     """The first rows of the guessed columns, by place; empty where they are no numbers."""
     places = sorted({k for joint in guess.joints.values() for k in joint.values()} | _of(guess.time))
     try:
-        first = next(iter(columns.rows(places)), np.zeros((0, len(places))))
+        first = next(iter(columns.rows(places, False)), np.zeros((0, len(places))))
     except InputError:
         return {}
     first = first[np.all(np.abs(first) < LARGEST_NUMBER, axis=1)]  # not a number compares as false

@@ -50,7 +50,20 @@ COMMANDED = (
     "error",
 )
 """Words of what was asked for, not measured."""
-TIMES = ("time_s", "time", "t", "timestamp", "stamp", "sec", "seconds", "ms", "millis")
+TIMES = (
+    "time_s",
+    "time",
+    "t",
+    "timestamp",
+    "stamp",
+    "sec",
+    "seconds",
+    "ms",
+    "millis",
+    "date",
+    "datetime",
+    "when",
+)
 
 
 @dataclass(frozen=True, slots=True)

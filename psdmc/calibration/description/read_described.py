@@ -132,9 +132,9 @@ def _read(
     parts = {table: [k for k, found in enumerate(columns) if found.table == table] for table in tables}
     clock = None if time.rate else place_of(time.column, next(iter(tables)), tables, "time")
     if len(tables) == 1:
-        pieces = _pieces(next(iter(tables.values())), columns, clock)
+        pieces = _pieces(next(iter(tables.values())), columns, clock, time.dates)
     else:
-        pieces = _side_by_side(tables, parts, columns, clock)
+        pieces = _side_by_side(tables, parts, columns, clock, time.dates)
     store, times = RowStore(len(columns), held), []
     count = 0
     for piece in pieces:
@@ -150,10 +150,12 @@ def _read(
     return whole, store
 
 
-def _pieces(table: Columns, columns: Sequence[Found], clock: tuple[str, int] | None) -> Iterator[Array]:
+def _pieces(
+    table: Columns, columns: Sequence[Found], clock: tuple[str, int] | None, dates: bool
+) -> Iterator[Array]:
     """Rows of time (where there is none: of the first column) and the columns."""
     places = [found.place for found in columns]
-    return table.rows([places[0] if clock is None else clock[1], *places])
+    return table.rows([places[0] if clock is None else clock[1], *places], dates)
 
 
 def _side_by_side(
@@ -161,6 +163,7 @@ def _side_by_side(
     parts: Mapping[str, list[int]],
     columns: Sequence[Found],
     clock: tuple[str, int] | None,
+    dates: bool,
 ) -> Iterator[Array]:
     """The same of several tables, row by row; InputError where they differ in length."""
     whole: dict[int, Array] = {}
@@ -170,7 +173,9 @@ def _side_by_side(
         is_clock = clock is not None and clock[0] == name
         if not own and not is_clock:
             continue
-        read = np.concatenate(list(table.rows([*([clock[1]] if clock and is_clock else []), *own])))
+        read = np.concatenate(
+            list(table.rows([*([clock[1]] if clock and is_clock else []), *own], dates and is_clock))
+        )
         lengths[table.name] = len(read)
         if is_clock:
             whole[-1], read = read[:, 0], read[:, 1:]

@@ -11,16 +11,24 @@ from psdmc.calibration.logs.toml_tables import TomlTable
 
 SLOWEST, FASTEST = 0.01, 1e6
 """Hz."""
+DATE = "date"
+"""Unit of columns that hold dates."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimeEntry:
-    """column: name or number from 1; unit: s per number in it; rate: Hz, of rows without a column of time; 0: there is
-    one."""
+    """The time of rows.
+
+    column  name or number from 1
+    unit    s per number in it
+    rate    Hz, of rows without a column of time; 0: there is one
+    dates   whether the column holds dates, such as 2026-05-01T12:00:00.125, whose s count from 1970
+    """
 
     column: str | int = "time_s"
     unit: float = 1.0
     rate: float = 0.0
+    dates: bool = False
 
 
 def _read(value: object, reading: Reading) -> TimeEntry:
@@ -29,10 +37,9 @@ def _read(value: object, reading: Reading) -> TimeEntry:
         if table.has("column") or table.has("unit"):
             reading.faults.append("time: rate: beside a column or unit, expected one or the other")
         return TimeEntry(rate=table.number("rate", SLOWEST, FASTEST))
-    return TimeEntry(
-        column_of(table, "column") if table.has("column") else "time_s",
-        TIME_UNITS[table.word("unit", tuple(TIME_UNITS), "s")].size,
-    )
+    unit = table.word("unit", (*TIME_UNITS, DATE), "s")
+    column = column_of(table, "column") if table.has("column") else "time_s"
+    return TimeEntry(column, 1.0 if unit == DATE else TIME_UNITS[unit].size, dates=unit == DATE)
 
 
 TIME: Table[TimeEntry] = Table("time", _read, TimeEntry())

@@ -33,13 +33,14 @@ class Columns:
     name   for messages
     names  of its columns; empty where a text table has no header
     width  number of columns
-    rows   (k, len(places)) of columns by place (from 0), in pieces; may be called once
+    rows   (k, len(places)) of columns by place (from 0), in pieces; may be called once. Where its second argument is true,
+           the first column holds dates, which become s since 1970
     """
 
     name: str
     names: tuple[str, ...]
     width: int
-    rows: Callable[[Sequence[int]], Iterator[Array]]
+    rows: Callable[[Sequence[int], bool], Iterator[Array]]
 
 
 @contextmanager
@@ -70,7 +71,8 @@ def _of_bag(path: Path, topic: str, held: int) -> Columns:
     parts = ("position", "velocity", "effort") if log.has_velocity else ("position", "effort")
     names = ("time_s", *(f"{part}.{joint}" for part in parts for joint in log.joint_names))
 
-    def rows(places: Sequence[int]) -> Iterator[Array]:
+    def rows(places: Sequence[int], dates: bool) -> Iterator[Array]:
+        _refuse_dates(dates, str(path))
         for start in range(0, len(log), PIECE_ROWS):
             own = log.rows(start, min(start + PIECE_ROWS, len(log)))
             velocity = () if own.velocity is None else (own.velocity,)
@@ -98,7 +100,8 @@ def _of_npz(file: BinaryIO, name: str) -> Columns:
             found |= {f"{key}[{k + 1}]": values[:, k] for k in range(values.shape[1])}
     columns = list(found.values())
 
-    def rows(places: Sequence[int]) -> Iterator[Array]:
+    def rows(places: Sequence[int], dates: bool) -> Iterator[Array]:
+        _refuse_dates(dates, name)
         chosen = [columns[k] for k in places]
         lengths = {len(column) for column in chosen}
         if len(lengths) > 1:
@@ -122,8 +125,11 @@ def _of_parquet(file: BinaryIO, name: str) -> Columns:
         fields = list(stored.schema_arrow)
         require_size(0, len(fields), 0, name)
 
-    def rows(places: Sequence[int]) -> Iterator[Array]:
-        odd = [fields[k] for k in places if not _is_numeric(types, fields[k].type)]
+    def rows(places: Sequence[int], dates: bool) -> Iterator[Array]:
+        if dates and not types.is_timestamp(fields[places[0]].type):
+            _refuse_dates(dates, name)
+        numeric = places[1:] if dates else places
+        odd = [fields[k] for k in numeric if not _is_numeric(types, fields[k].type)]
         if odd:
             raise InputError(
                 f"{name}: column {quoted(odd[0].name)} holds {odd[0].type}, expected numbers",
@@ -134,12 +140,27 @@ def _of_parquet(file: BinaryIO, name: str) -> Columns:
             for batch in stored.iter_batches(batch_size=PIECE_ROWS, columns=wanted, use_threads=False):
                 yield np.column_stack(
                     [
-                        np.asarray(batch.column(one).to_numpy(zero_copy_only=False), dtype=np.float64)
-                        for one in wanted
+                        _seconds(batch.column(one)) if dates and k == 0 else _numbers(batch.column(one))
+                        for k, one in enumerate(wanted)
                     ]
                 )
 
     return Columns(name, tuple(field.name for field in fields), len(fields), rows)
+
+
+def _numbers(column: Any) -> Array:
+    return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def _seconds(column: Any) -> Array:
+    """s since 1970 of time stamps."""
+    stamps = np.asarray(column.to_numpy(zero_copy_only=False)).astype("datetime64[ns]")
+    return np.asarray((stamps - np.datetime64(0, "ns")) / np.timedelta64(1, "s"), dtype=np.float64)
+
+
+def _refuse_dates(dates: bool, name: str) -> None:
+    if dates:
+        raise InputError(f"{name}: its time holds no dates", "write s, ms, us or ns as the unit of [time]")
 
 
 def _is_numeric(types: Any, kind: Any) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import BinaryIO
 
 import numpy as np
@@ -29,6 +30,7 @@ LARGEST_LINE = 1024**2
 """Bytes: a thousand columns with names of a thousand letters."""
 PIECE_BYTES = 16 * 1024**2
 """Of text that is parsed at once."""
+DATE_HINT = "where that is the time: unit = 'date' in [time] of a log description"
 HINT = (
     "[csv] of a log description says where the table starts, what separates it, and whether it has a header"
 )
@@ -55,6 +57,7 @@ class TextTable:
         self._line = 0
         self._first = ""
         self._separator = form.separator or ","
+        self._dated: int | None = None
         comment = self._skipped(form.skip)
         if not self._first.strip():
             raise InputError(f"{name}: holds no table", HINT)
@@ -97,8 +100,12 @@ class TextTable:
         with decoding(f"{self.name}: line {self._line}", "a line of a table", HINT):
             return [cell.strip() for cell in next(csv.reader([line], delimiter=self._separator), [])]
 
-    def rows(self, places: Sequence[int]) -> Iterator[Array]:
-        """(k, len(places)) of these columns, in pieces; InputError names the line and column that is no number."""
+    def rows(self, places: Sequence[int], dates: bool = False) -> Iterator[Array]:
+        """(k, len(places)) of these columns, in pieces; InputError names the line and column that is no number.
+
+        dates   whether the first of them holds dates, which become s since 1970
+        """
+        self._dated = places[0] if dates else None
         line, left = (self._line, self._first.encode() + b"\n") if self._first else (self._line + 1, b"")
         while chunk := self._file.read(PIECE_BYTES):
             end = chunk.rfind(b"\n") + 1
@@ -123,6 +130,8 @@ class TextTable:
                     comments=None,
                     quotechar='"',
                     usecols=tuple(places),
+                    converters=None if self._dated is None else {self._dated: seconds_of},
+                    encoding="utf-8",
                     ndmin=2,
                 )
         except InputError:
@@ -143,12 +152,34 @@ class TextTable:
         return np.array(found, dtype=np.float64).reshape(-1, len(places))
 
     def _number(self, cell: str, line: int, place: int) -> float:
+        column = quoted(self.names[place]) if self.names else str(place + 1)
+        if place == self._dated:
+            try:
+                return seconds_of(cell)
+            except (ValueError, OverflowError):
+                raise InputError(
+                    f"{self.name}: line {line}, column {column}: {quoted(cell)} is no date", HINT
+                ) from None
         word = cell.replace(",", ".") if self._separator != "," and cell.count(",") == 1 else cell
         if ("." in cell and "," in cell) or not is_number(word):
             what = f"{quoted(cell)} is no number" if cell else "the cell is empty"
-            column = quoted(self.names[place]) if self.names else str(place + 1)
-            raise InputError(f"{self.name}: line {line}, column {column}: {what}", HINT)
+            hint = DATE_HINT if _is_date(cell) else HINT
+            raise InputError(f"{self.name}: line {line}, column {column}: {what}", hint)
         return float(word)
+
+
+def _is_date(text: str) -> bool:
+    try:
+        seconds_of(text)
+    except (ValueError, OverflowError):
+        return False
+    return True
+
+
+def seconds_of(text: str) -> float:
+    """s since 1970 of a date in ISO 8601's form, UTC where it names no zone; ValueError where it is none."""
+    date = datetime.fromisoformat(text.strip().strip('"'))
+    return (date if date.tzinfo is not None else date.replace(tzinfo=UTC)).timestamp()
 
 
 def separator_of(line: str) -> str:

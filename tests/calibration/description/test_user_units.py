@@ -196,3 +196,47 @@ def test_positions_and_torques_in_files_of_their_own(plain: Path, tmp_path: Path
         InputError, match=r"log\.toml: tables of one log differ in rows: .*q\.txt has 2000, .*tau"
     ):
         logs_of(tmp_path / "log.toml", log.joint_names)
+
+
+def test_times_that_are_dates(plain: Path, tmp_path: Path):
+    """2026-05-01T12:00:00 UTC is 1,777,636,800 s after 1970; one row in another zone."""
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    log = read_log(plain)
+    start = np.datetime64("2026-05-01T12:00:00", "us")
+    stamps = start + np.round(1e6 * log.time).astype("timedelta64[us]")
+    names = log.joint_names
+    columns = {f"position_rad.{name}": log.position[:, k] for k, name in enumerate(names)}
+    columns |= {f"motor_torque_nm.{name}": log.effort[:, k] for k, name in enumerate(names)}
+    parquet.write_table(pyarrow.table({"when": stamps, **columns}), tmp_path / "log.parquet")
+    cells = [str(stamp).replace("T", " ") for stamp in stamps]
+    cells[7] = f"{stamps[7] + np.timedelta64(2, 'h')!s}+02:00"
+    lines = [
+        ",".join([cell, *(f"{x:.17g}" for x in row)])
+        for cell, *row in zip(cells, *columns.values(), strict=True)
+    ]
+    (tmp_path / "log.csv").write_text(
+        ",".join(["when", *columns]) + "\n" + "\n".join(lines), encoding="utf-8"
+    )
+
+    for file in ("log.csv", "log.parquet"):
+        text = f'[[log]]\nfile = "{file}"\n[time]\ncolumn = "when"\nunit = "date"\n'
+        (tmp_path / "log.toml").write_text(text, encoding="utf-8")
+        (found,) = logs_of(tmp_path / "log.toml", names)
+        assert np.abs(found.time - 1_777_636_800.0 - log.time).max() < 1e-6
+        assert found.date == "2026-05-01"
+        assert np.array_equal(found.rows(0, len(found)).effort, log.effort)
+
+    lines[3] = lines[3].replace("2026", "20x6")
+    (tmp_path / "log.csv").write_text(
+        ",".join(["when", *columns]) + "\n" + "\n".join(lines), encoding="utf-8"
+    )
+    (tmp_path / "log.toml").write_text(text.replace("log.parquet", "log.csv"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"log\.csv: line 5, column 'when': '20x6-05-01 .*' is no date"):
+        logs_of(tmp_path / "log.toml", names)
+    (tmp_path / "log.toml").write_text(
+        text.replace("log.parquet", "log.csv").replace('"date"', '"s"'), encoding="utf-8"
+    )
+    with pytest.raises(InputError, match=r"'2026-05-01 12:00:00\.000000' is no number") as raised:
+        logs_of(tmp_path / "log.toml", names)
+    assert "unit = 'date'" in (raised.value.hint or "")
