@@ -3,6 +3,7 @@ every function that there is. None asks for memory."""
 
 from __future__ import annotations
 
+import platform
 import re
 import shutil
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 from bundled import bundled_model
 from direct import write_sources
+from limbed import package_of
 
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
@@ -31,6 +33,12 @@ PACKAGES = {
     "kr6": ("inverse_dynamics", "forward_dynamics", "forward_dynamics_derivatives"),
 }
 """Robot and functions; of the larger one those that are written otherwise for many joints."""
+
+LIMBED = "four legs of a floating body"
+"""A robot whose limbs run in lanes. Accelerations exist at any quaternion: the mass matrix does not depend on it."""
+
+FLAGS = {LIMBED: ["-march=x86-64-v3"]}
+"""Vectors of four lanes: one register for the four legs."""
 
 MOVES = ("neutral", "integrate", "difference")
 """Of a chain these are a few stores and additions; all others take sines."""
@@ -58,27 +66,44 @@ def program_text(package: PackageView) -> str:
     return "\n".join([*lines, "    }", "    return 0;", "}", ""])
 
 
-@pytest.fixture(scope="module", params=PACKAGES)
-def package(request: pytest.FixtureRequest) -> PackageView:
-    model = bundled_model(request.param)
-    kernels = lower(model, functions=PACKAGES[request.param], theta_variants=False)
+@pytest.fixture(scope="module", params=[*PACKAGES, LIMBED])
+def shown(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def package(shown: str) -> PackageView:
+    if shown == LIMBED:
+        limbed = package_of(LIMBED, EmitOptions())
+        in_lanes = {kernel.name for kernel in limbed.kernels if kernel.limbs and kernel.limbs.least <= 4}
+        assert in_lanes >= {"inverse_dynamics", "forward_dynamics"}
+        return limbed
+    model = bundled_model(shown)
+    kernels = lower(model, functions=PACKAGES[shown], theta_variants=False)
     return package_view(package_info(model), kernels, EmitOptions())
 
 
 @pytest.fixture(scope="module")
-def folder(package: PackageView, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(shown: str, package: PackageView, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for needed in ("gcc", "valgrind"):
         if shutil.which(needed) is None:
             pytest.skip(f"{needed} is not installed")
+    if shown in FLAGS and not has_four_lanes():
+        pytest.skip("no processor for vectors of four lanes")
     made = tmp_path_factory.mktemp("constant")
     write_sources(package, made)
     (made / "main.c").write_text(program_text(package))
-    words = ["gcc", "-std=c99", "-O1", f"-I{made}/include", "-c"]
+    words = ["gcc", "-std=c99", "-O1", *FLAGS.get(shown, []), f"-I{made}/include", "-c"]
     for source in ("main.c", *package.sources):
         subprocess.run([*words, str(made / source), "-o", str(made / f"{Path(source).stem}.o")], check=True)
     objects = map(str, sorted(made.glob("*.o")))
     subprocess.run(["gcc", *objects, "-lm", "-o", str(made / "main")], check=True)
     return made
+
+
+def has_four_lanes() -> bool:
+    cpu = Path("/proc/cpuinfo")
+    return platform.machine() == "x86_64" and cpu.exists() and "avx2" in cpu.read_text().split()
 
 
 def test_the_number_of_instructions_does_not_depend_on_the_state(package: PackageView, folder: Path) -> None:
