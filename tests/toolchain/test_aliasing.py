@@ -26,7 +26,7 @@ OPTIMISED = ("float64", "vectors")
 CASES = [("float64", "vectors"), ("float64", "plain"), ("float32", "vectors"), ("float64", "parts")]
 
 
-@pytest.fixture(scope="module", params=CASES)
+@pytest.fixture(scope="module", params=CASES, ids=" ".join)
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     real, build = request.param
     with pytest.MonkeyPatch.context() as patch:
