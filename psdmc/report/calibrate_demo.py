@@ -23,6 +23,7 @@ from psdmc.compiler import compile as compile_model
 from psdmc.compiler import derive
 from psdmc.model.store import save
 from psdmc.report.calibrate_report import write_report
+from psdmc.report.truth_tables import truth_view
 
 EXAMPLES = Path("examples")
 ROBOT = EXAMPLES / "robots" / "denso_wall.toml"
@@ -73,10 +74,10 @@ def run_demo(
             progress=step,
         )
         save(record.model, folder / f"denso_{name}.npz")
-        page, _ = write_report(record, folder / f"calibration_{name}.html", found)
-        results[name] = compare(
-            record, model, load_virtual_robot(PLANT, ideal_sensors=ideal, harness=harness)
-        )
+        plant = load_virtual_robot(PLANT, ideal_sensors=ideal, harness=harness)
+        truth = truth_view(record, model, plant)
+        page, _ = write_report(record, folder / f"calibration_{name}.html", found, truth)
+        results[name] = compare(record, model, plant)
         for line in (*_accuracy(record), *results[name].lines()):
             say(line)
         step(f"{name}: report in {page}")

@@ -71,8 +71,11 @@ def _thin(count: int) -> Array:
 
 def _shade(axis: Axes, x: Array, held_out: Array) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], held_out.astype(int), [0]])))
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        axis.axvspan(x[first], x[min(last, len(x) - 1)], color=HELD_OUT, alpha=SHADE, linewidth=0)
+    for k, (first, last) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+        label = "_held out" if k else "held out"  # one line in the legend
+        axis.axvspan(
+            x[first], x[min(last, len(x) - 1)], color=HELD_OUT, alpha=SHADE, linewidth=0, label=label
+        )
 
 
 def excitation_panels(

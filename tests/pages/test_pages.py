@@ -14,13 +14,17 @@ from typing import Any
 import numpy as np
 import pytest
 from made_up_bench import made_up_result
+from made_up_denso import denso, made_up_record, plant
 
+from psdmc.calibration.identify.prediction import Prediction
 from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.identify.steps import JointQuality, Sample, StepQuality
+from psdmc.calibration.identify.steps import JointQuality, Sample, StepOptions, StepQuality
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
 from psdmc.calibration.verdict.verdict import JointFigures, Verdict
 from psdmc.report.bench_page import write_page
 from psdmc.report.calibrate_report import write_report
+from psdmc.report.truth_tables import truth_view
 
 pytest.importorskip("playwright")
 ROOT = Path(__file__).parents[2]
@@ -35,6 +39,7 @@ SITE = (
     if KEPT
     else ()
 )
+OWN = ("bench", "calibration", "virtual")
 JOINTS = tuple(f"a_rather_long_joint_name_{k}" for k in range(6))
 
 
@@ -49,11 +54,13 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         assert site_pages.render(folder / "source", folder / "site") == 0
     write_page(made_up_result(), folder / "bench.html")
     write_report(calibration(), folder / "calibration.html")
-    own = {name: folder / f"{name}.html" for name in ("bench", "calibration")}
+    virtual = made_up_record()
+    write_report(virtual, folder / "virtual.html", truth=truth_view(virtual, denso(), plant(harness=True)))
+    own = {name: folder / f"{name}.html" for name in OWN}
     return own | {f"site_{name.replace('/', '_')}": folder / f"site/{name}.html" for name in SITE}
 
 
-NAMES = ("bench", "calibration", *(f"site_{name.replace('/', '_')}" for name in SITE))
+NAMES = (*OWN, *(f"site_{name.replace('/', '_')}" for name in SITE))
 
 
 def calibration() -> Calibration:
@@ -65,6 +72,13 @@ def calibration() -> Calibration:
     )
     quality = JointQuality(Quality(0.1, 0.999), Quality(0.2, 0.9876))
     figures = tuple(JointFigures(j, 0.98, 0.3, 1.02, 0.05, True, 3.0, 0.2, 1.5, 0.4) for j in JOINTS)
+    log = {
+        "log": "a_log_of_a_long_name_2026-11-22_exciting_motion.csv",
+        "rows": 90000,
+        "seconds": 90.0,
+        "date": "",
+    }
+    data = {"data": [log] * 3, "versions": {"psdmc": "1.0", "numpy": "2.1"}}
     doubt = "the model lacks an effect at a joint: the residual is no sensor noise"
     verdict = Verdict((), (doubt,), (), figures, 40.0)
     equation = "Izz1 + 0.0025 m2 + Iyy2 + 0.183125 m3 + Iyy3 + 0.183525 m4 + 0.183525 m5 + 0.183525 m6"
@@ -74,7 +88,8 @@ def calibration() -> Calibration:
         joint_names=JOINTS,
         model=None,  # type: ignore[arg-type]
         parameters=tuple(
-            ParameterRow(f"theta_{k}", "inertial", 7.4, 0.01, "kg m^2", equation, True) for k in range(36)
+            ParameterRow(f"theta_{k}", "inertial", 7.4, 0.01, "kg m^2", equation, True, file=6.9)
+            for k in range(36)
         ),
         motors=tuple(NumberRow(j, "torque_constant", 36.1, 0.02, "Nm/A") for j in JOINTS),
         friction=tuple(NumberRow(j, "stribeck_velocity", 0.02, 0.5, "rad/s", seen=False) for j in JOINTS),
@@ -82,7 +97,8 @@ def calibration() -> Calibration:
             StepQuality(step, dict.fromkeys(JOINTS, quality), samples) for step in ("Gravity", "Inertial")
         ),
         warnings=("a joint hardly moves",),
-        facts={"rank": 31, "singular_values": [3.0, 0.5]},
+        facts={"rank": 31, "singular_values": [3.0, 0.5]} | data,
+        prediction=Prediction("linear", {"all": StepOptions(FilterOptions(cutoff=8.0))}),
         notes=("physical consistency moved the parameters by 3 standard deviations",),
         verdict=verdict,
     )

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from psdmc.calibration.identify.prediction import Prediction
 from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.identify.steps import JointQuality, Sample, StepQuality
+from psdmc.calibration.identify.steps import JointQuality, Sample, StepOptions, StepQuality
+from psdmc.calibration.logs.filter import SplitOptions
+from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
 from psdmc.calibration.verdict.verdict import JointFigures, Verdict
 from psdmc.report.calibrate_report import report_html, write_report
 
+END = SplitOptions(held_out=0.3, blocks=0)
 X = np.linspace(0.0, 1.0, 50)
 SAMPLE = Sample("a", "time [s]", X, np.sin(X), np.sin(X) + 0.01, X > 0.8)
 
@@ -64,6 +70,51 @@ def test_it_shows_every_number(record: Calibration):
         "3, 0.5",
     ):
         assert text in page
+
+
+def test_each_parameter_has_the_file_s_value_beside_the_found_one(record: Calibration):
+    known, unknown = record.parameters
+    page = report_html(replace(record, parameters=(replace(known, file=6.25), unknown)))
+
+    row = re.search(r"<tr><td>theta_1</td>.*?</tr>", page)
+    assert row is not None
+    cells = [html.unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row[0])]
+    assert cells[:7] == ["theta_1", "6.25", "7.4174", "0.01", "0.13%", "kg", "m1 + mx1/a1 <i>"]
+    assert "<tr><td>theta_2</td><td>–</td><td>0.25</td>" in page
+
+
+def test_accuracy_is_labelled_held_out(record: Calibration):
+    page = report_html(record)
+
+    assert "All: RMSE held out (fitted)" in page
+    assert "0.2 (0.1)" in page
+    assert "All: R² held out (fitted)" in page
+    assert "0.9876 (0.9990)" in page
+
+
+def test_logs_cut_offs_versions_and_what_shading_means_are_on_the_page(record: Calibration):
+    row = {"log": "one<b>.csv", "rows": 45000, "seconds": 45.0, "date": "2026-11-22"}
+    facts = {
+        "data": [row],
+        "with_load": [row | {"log": "two.csv"}],
+        "versions": {"psdmc": "9.8", "numpy": "7.6"},
+    }
+    steps = {
+        "gravity": StepOptions(FilterOptions(cutoff=4.0)),
+        "all": StepOptions(FilterOptions(cutoff=8.5), END),
+    }
+
+    page = report_html(replace(record, facts=facts, prediction=Prediction("linear", steps)))
+
+    for cells in (
+        "<td>one&lt;b&gt;.csv</td><td>45,000</td><td>45</td><td>2026-11-22</td><td>fitted and held out</td>",
+        "<td>two.csv</td><td>45,000</td><td>45</td><td>2026-11-22</td><td>with the known load</td>",
+        "<td>gravity</td><td>4</td><td>8, both ways</td><td>15%, spread over 40 blocks</td>",
+        "<td>whole log</td><td>8.5</td><td>8, both ways</td><td>30%, the end</td>",
+        "Computed by psdmc 9.8, numpy 7.6.",
+        "Shaded: held out, not used by the fit.",
+    ):
+        assert cells in page
 
 
 def test_it_loads_nothing_from_outside(record: Calibration):

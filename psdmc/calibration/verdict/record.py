@@ -27,6 +27,7 @@ from psdmc.calibration.identify.visibility import (
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.verdict import Verdict
+from psdmc.calibration.verdict.versions_used import versions_used
 from psdmc.errors import InternalError
 from psdmc.model.dynamics_model import DynamicsModel
 
@@ -37,6 +38,7 @@ class ParameterRow:
 
     std           infinite where the data do not fix it by itself; value then as near to the prior as they allow
     identifiable  whether `visibility` is "identified": fixed by itself, to less than half of its value
+    file          value by the file that was calibrated; None where it has none
     """
 
     name: str
@@ -47,6 +49,7 @@ class ParameterRow:
     equation: str
     identifiable: bool
     visibility: str = IDENTIFIED
+    file: float | None = None
 
     @property
     def relative(self) -> float:
@@ -79,6 +82,7 @@ class Calibration:
     facts       plain values: ranks, condition numbers, singular values, delay, options
     verdict     whether it can be used; None before it was judged
     springs     values of springs, whose names stand in place of a joint's
+    covariance  (l, l) of the base parameters, with the prior's in directions that the data do not show; None: not kept
     """
 
     robot: str
@@ -95,6 +99,7 @@ class Calibration:
     notes: tuple[str, ...] = ()
     verdict: Verdict | None = None
     springs: tuple[NumberRow, ...] = ()
+    covariance: Array | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Plain values; numbers that are not finite become null."""
@@ -111,6 +116,7 @@ class Calibration:
                     {
                         "name": row.name,
                         "group": row.group,
+                        "file": row.file,
                         "value": row.value,
                         "std": _finite(row.std),
                         "relative": _finite(row.relative),
@@ -209,6 +215,7 @@ def four_step_record(
             facts=facts,
             prediction=Prediction("lugre", steps, runs=runs),
             notes=weak_notes("inertial", names, seen),
+            covariance=inertial.covariance + inertial.prior_covariance,
         ),
         theta_b,
     )
@@ -291,7 +298,7 @@ def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration
 
 def with_data(record: Calibration, logs: Sequence[AnyLog]) -> Calibration:
     """The record with the names, lengths and dates of its logs."""
-    return replace(record, facts={**record.facts, "data": data_of(logs)})
+    return replace(record, facts={**record.facts, "data": data_of(logs), "versions": versions_used()})
 
 
 def data_of(logs: Sequence[AnyLog]) -> list[dict[str, Any]]:
@@ -351,6 +358,7 @@ def _parameter_rows(
             equation=parameter.equation,
             identifiable=seen.words[k] == IDENTIFIED,
             visibility=seen.words[k],
+            file=None if model.theta_b is None else float(model.theta_b[k]),
         )
         for k, parameter in enumerate(model.base_parameters)
     )

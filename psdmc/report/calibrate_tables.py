@@ -1,0 +1,197 @@
+"""The tables of a calibration's page, as finished markup with every cell escaped."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from psdmc.calibration.identify.quality import Quality
+from psdmc.calibration.verdict.record import Calibration, NumberRow
+from psdmc.calibration.verdict.verdict import Verdict
+
+NOTHING = "–"
+"""A cell without a number."""
+USES = {"validate": "held out whole"}
+"""How a log is used that is not fitted."""
+ELSEWHERE = ("data", "with_load", "load", "versions")
+"""Facts that have a place of their own on the page."""
+
+
+def verdict_table(verdict: Verdict) -> str:
+    """The figures by which each joint was judged. A gain in brackets does not count, as the file's torque is too small
+    there."""
+    head = [
+        "Joint",
+        "R² held out",
+        "RMSE held out [N m]",
+        "Gain against the file",
+        "Power of friction [W]",
+        "Residual / noise",
+    ]
+    rows = []
+    for joint in verdict.joints:
+        gain = with_std(joint.gain, joint.gain_std)
+        rows.append(
+            [
+                joint.joint,
+                r_squared(joint.r2),
+                number(joint.rmse),
+                gain if joint.visible or gain == NOTHING else f"({gain})",
+                with_std(joint.friction_power, joint.friction_power_std),
+                number(joint.noise_ratio),
+            ]
+        )
+    return table(head, rows)
+
+
+def accuracy_table(record: Calibration) -> str:
+    """Table 3: RMSE and R^2 per joint and step, of held-out data and in brackets of fitted data."""
+    head = [
+        "Joint",
+        *(
+            f"{step.step}: {what}"
+            for step in record.steps
+            for what in ("RMSE held out (fitted)", "R² held out (fitted)")
+        ),
+    ]
+    rows = []
+    for joint in record.joint_names:
+        row = [joint]
+        for step in record.steps:
+            both = step.joints.get(joint)
+            row += [NOTHING, NOTHING] if both is None else _both(both.held_out, both.fit)
+        rows.append(row)
+    return table(head, rows)
+
+
+def _both(held_out: Quality, fit: Quality) -> list[str]:
+    return [
+        f"{held_out.rmse:.3g} ({fit.rmse:.3g})",
+        f"{r_squared(held_out.r2)} ({r_squared(fit.r2)})",
+    ]
+
+
+def parameter_table(record: Calibration) -> str:
+    """Table 4: base parameter, the file's value, the one found, its standard deviation, unit, equation."""
+    head = ["Parameter", "In the file", "Found", "±", "Relative", "Unit", "Equation", "In the data", "Group"]
+    rows = []
+    for row in record.parameters:
+        file = NOTHING if row.file is None else f"{row.file:.6g}"
+        numbers = [file, f"{row.value:.6g}", NOTHING, NOTHING]
+        if math.isfinite(row.std):
+            numbers[2:] = [f"{row.std:.2g}", f"{row.relative:.2%}" if row.value else NOTHING]
+        rows.append([row.name, *numbers, row.unit, row.equation, row.visibility, row.group])
+    return table(head, rows, text_columns=(6, 7))
+
+
+def joint_table(record: Calibration) -> str:
+    """Table 2: torque constants and friction, joint by joint."""
+    names = list(dict.fromkeys(row.name for row in (*record.motors, *record.friction)))
+    units = {row.name: row.unit for row in (*record.motors, *record.friction)}
+    by_key = {(row.joint, row.name): row for row in (*record.motors, *record.friction)}
+    head = ["Joint", *(f"{name.replace('_', ' ')} [{units[name]}]" for name in names)]
+    rows = [
+        [joint, *(joint_number(by_key.get((joint, name))) for name in names)] for joint in record.joint_names
+    ]
+    return table(head, rows)
+
+
+def spring_table(record: Calibration) -> str:
+    """Values of springs; empty where the fit has none."""
+    if not record.springs:
+        return ""
+    rows = [[row.joint, row.name, joint_number(row), row.unit] for row in record.springs]
+    return table(["Spring", "Quantity", "Value", "Unit"], rows)
+
+
+def joint_number(row: NumberRow | None) -> str:
+    """A joint's number with its standard deviation; in brackets what the data do not show by itself."""
+    if row is None:
+        return NOTHING
+    if not row.seen:
+        word = "given" if row.name == "torque_constant" else row.visibility or "not seen"
+        return f"({row.value:.4g}: {word})" if math.isfinite(row.value) else "not identifiable"
+    return f"{row.value:.4g} ± {row.std:.1g}"
+
+
+def log_table(record: Calibration) -> str:
+    """Names, lengths and dates of the logs; empty text where they are unknown."""
+    uses = (("data", "fitted and held out"), ("with_load", "with the known load"))
+    rows = [
+        [
+            row["log"],
+            f"{row['rows']:,}",
+            f"{row['seconds']:.4g}",
+            row["date"] or NOTHING,
+            USES.get(row.get("use"), use),
+        ]
+        for name, use in uses
+        for row in record.facts.get(name, [])
+    ]
+    return table(["Log", "Rows", "Duration [s]", "Date", "Used"], rows) if rows else ""
+
+
+def step_table(record: Calibration) -> str:
+    """Cut-off and split of each step; empty text where they are unknown."""
+    if record.prediction is None:
+        return ""
+    rows = []
+    for name, step in record.prediction.steps.items():
+        split = step.split
+        share = f"{split.held_out:.0%}"
+        where = f"{share}, the end" if split.blocks == 0 else f"{share}, spread over {split.blocks} blocks"
+        title = "whole log" if name == "all" else name
+        rows.append([title, f"{step.filter.cutoff:g}", f"{step.filter.order}, both ways", where])
+    return table(["Step", "Cut-off [Hz]", "Butterworth order", "Held out"], rows)
+
+
+def fact_table(record: Calibration) -> str:
+    """Ranks, condition numbers and the like."""
+    rows = [
+        [name.replace("_", " "), _plain(value)]
+        for name, value in record.facts.items()
+        if name not in ELSEWHERE
+    ]
+    return table(["Quantity", "Value"], rows, text_columns=(1,))
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return ", ".join(_plain(entry) for entry in value)
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {_plain(entry)}" for key, entry in value.items())
+    return str(value)
+
+
+def with_std(value: float, std: float) -> str:
+    """A number and its standard deviation."""
+    return f"{value:.3g} ± {std:.1g}" if math.isfinite(value) else NOTHING
+
+
+def number(value: float) -> str:
+    """Three digits; a dash for what is not finite."""
+    return f"{value:.3g}" if math.isfinite(value) else NOTHING
+
+
+def r_squared(value: float) -> str:
+    """Four decimals; a dash where there is none."""
+    return NOTHING if math.isnan(value) else f"{value:.4f}"
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: tuple[int, ...] = ()) -> str:
+    """An HTML table, every cell escaped; text columns break their lines."""
+    names = "".join(_cell("th", cell, k in text_columns, ' scope="col"') for k, cell in enumerate(head))
+    lines = ['<table class="plain">', f"<thead><tr>{names}</tr></thead>", "<tbody>"]
+    for row in rows:
+        cells = "".join(_cell("td", cell, k in text_columns) for k, cell in enumerate(row))
+        lines.append(f"<tr>{cells}</tr>")
+    return "\n".join([*lines, "</tbody>", "</table>"])
+
+
+def _cell(tag: str, text: str, is_text: bool, attributes: str = "") -> str:
+    kind = ' class="text"' if is_text else ""
+    return f"<{tag}{attributes}{kind}>{html.escape(text)}</{tag}>"

@@ -1,0 +1,161 @@
+"""What the page of a virtual robot adds: that it is virtual, the truth beside what was found, and Denso-2022's tables beside
+its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psdmc.calibration.plant.virtual_robot import VirtualRobot
+from psdmc.calibration.verdict.record import Calibration
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.report import published_denso as published
+from psdmc.report.calibrate_tables import NOTHING, joint_number, number, r_squared, table
+
+WHY = (
+    "The paper's figures are of a real robot, whose gears, cable harness and sensors do what no model of rigid bodies with "
+    "LuGre friction does; the virtual robot has the model's own effects{harness} and its sensors' noise, and values that "
+    "were made like the paper's only where these can be read and some robot can have them."
+)
+"""Why the two columns differ."""
+
+
+@dataclass(frozen=True, slots=True)
+class TruthView:
+    """The sections that only a virtual robot's page has; tables are finished markup.
+
+    banner      that the robot is virtual, and its sensors
+    parameters  every base parameter with its truth
+    joints, accuracy, published  Denso-2022's tables 2, 3 and 4 beside this calibration's
+    why         the reason of the differences
+    """
+
+    banner: str
+    parameters: str
+    joints: str
+    accuracy: str
+    published: str
+    why: str
+
+
+def truth_view(record: Calibration, true_model: DynamicsModel, robot: VirtualRobot) -> TruthView:
+    """The sections for a calibration of the virtual Denso; `true_model` holds its theta_b in the record's order."""
+    sensors, harness = robot.sensors, robot.harness
+    noisy = sensors.current_noise or sensors.position_step
+    with_sensors = (
+        f"positions in steps of {sensors.position_step:g} rad, currents with {sensors.current_noise:g} A of noise, "
+        f"{1e3 * sensors.effort_delay:g} ms late"
+        if noisy
+        else "ideal"
+    )
+    held = f" A cable harness pulls at {', '.join(harness.joints)}." if harness is not None else ""
+    return TruthView(
+        banner=f"This robot is virtual. Its logs are simulated ({robot.name}: Pinocchio's rigid bodies, LuGre friction by a "
+        f"stiff integrator), so that its true parameters are known. Sensors: {with_sensors}.{held}",
+        parameters=_parameters(record, true_model.known_theta_b()),
+        joints=_joints(record, robot),
+        accuracy=_accuracy(record),
+        published=_published(record, true_model),
+        why=WHY.format(harness=", a cable harness" if harness is not None else ""),
+    )
+
+
+def _parameters(record: Calibration, truth: np.ndarray) -> str:
+    head = ["Parameter", "Truth", "Found", "±", "Error / ±", "Unit", "Equation"]
+    rows = [
+        [
+            row.name,
+            f"{true:.6g}",
+            f"{row.value:.6g}",
+            *_error(row.value, row.std, float(true)),
+            row.unit,
+            row.equation,
+        ]
+        for row, true in zip(record.parameters, truth, strict=True)
+    ]
+    return table(head, rows, text_columns=(6,))
+
+
+def _error(value: float, std: float, true: float) -> list[str]:
+    """Standard deviation, and the error in units of it."""
+    if not (math.isfinite(std) and std > 0.0):
+        return [NOTHING, NOTHING]
+    return [f"{std:.2g}", f"{(value - true) / std:+.1f}"]
+
+
+def _joints(record: Calibration, robot: VirtualRobot) -> str:
+    """Table 2: three lines a joint."""
+    rows = [*record.motors, *record.friction]
+    found = {(row.joint, row.name): row for row in rows}
+    units = {row.name: row.unit for row in rows}
+    names = [name for name in published.PARAMETERS if name in units]
+    head = ["Joint", "", *(f"{name.replace('_', ' ')} [{units[name]}]" for name in names)]
+    lines = []
+    for k, joint in enumerate(robot.joints):
+        lines.append([joint.name, "found", *(joint_number(found.get((joint.name, name))) for name in names)])
+        lines.append(["", "truth", *(f"{getattr(joint, name):.4g}" for name in names)])
+        lines.append(["", "paper", *(f"{published.PARAMETERS[name][k]:.4g}" for name in names)])
+    return table(head, lines)
+
+
+def _accuracy(record: Calibration) -> str:
+    """Table 3: RMSE and R^2 of held-out data, two lines a joint."""
+    steps = [step for step in record.steps if step.step in published.ACCURACY]
+    head = ["Joint", "", *(f"{step.step}: {what} held out" for step in steps for what in ("RMSE", "R²"))]
+    lines = []
+    for k, joint in enumerate(record.joint_names):
+        own, theirs = [joint, "this page"], ["", "paper"]
+        for step in steps:
+            both = step.joints.get(joint)
+            own += (
+                [NOTHING] * 2 if both is None else [number(both.held_out.rmse), r_squared(both.held_out.r2)]
+            )
+            rmse, r2 = published.ACCURACY[step.step][k]
+            theirs += [number(rmse), f"{r2:.2f}" if math.isfinite(r2) else NOTHING]
+        lines += [own, theirs]
+    return table(head, lines)
+
+
+def _published(record: Calibration, true_model: DynamicsModel) -> str:
+    """Table 4: the paper's parameters as combinations of theta_b."""
+    values = np.array([row.value for row in record.parameters])
+    truth = true_model.known_theta_b()
+    head = [
+        "Paper's name",
+        "Paper",
+        "Truth here",
+        "Found",
+        "±",
+        "Unit",
+        "Equation",
+        "Truth made like the paper's",
+    ]
+    rows = []
+    for line in published.BASE_PARAMETERS:
+        by_ours = line.by_base_parameters(true_model)
+        rows.append(
+            [
+                line.name,
+                f"{line.value:.3g}",
+                f"{by_ours @ truth:.4g}",
+                f"{by_ours @ values:.4g}",
+                _std_of(record, by_ours),
+                line.unit,
+                line.equation,
+                "yes" if line.fitted else "no",
+            ]
+        )
+    return table(head, rows, text_columns=(6,))
+
+
+def _std_of(record: Calibration, by_ours: Sequence[float] | np.ndarray) -> str:
+    """Standard deviation of a combination of base parameters; none where one of them has none."""
+    used = np.flatnonzero(np.asarray(by_ours))
+    stds = np.array([record.parameters[k].std for k in used])
+    if record.covariance is None or not np.isfinite(stds).all():
+        return NOTHING
+    part = np.asarray(by_ours)[used]
+    return f"{math.sqrt(max(float(part @ record.covariance[np.ix_(used, used)] @ part), 0.0)):.2g}"
