@@ -10,6 +10,9 @@ import pytest
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
+from psdmc.calibration.identify.least_squares import Estimate, FitOptions
+from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
+from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.steps import FrictionRun, GravityRun, InertialRun
 from psdmc.calibration.logs.log import Log
 from psdmc.errors import InputError
@@ -70,6 +73,24 @@ def test_currents_with_constants_give_what_torques_give(arm, log: Log):
 
     one, other = (record.model.theta_b for record in found)
     assert one == pytest.approx(other, rel=1e-6)  # the convex solver stops at about 1e-9
+
+
+def test_uncertain_constants_make_base_parameters_and_friction_uncertain(arm, log: Log):
+    """By as much as the fit's values change with each constant."""
+    step, share = 0.01, 0.05
+    plain = LinearOptions(fit=FitOptions(method="ols"))  # linear in the torque
+
+    def fitted(constants: np.ndarray, relative: float = 0.0) -> Estimate:
+        motors = Motors(constants, np.full(2, relative))
+        return calibrate_linear(arm.model.chain, arm.regressor, arm.model.l, [log], plain, motors).estimate
+
+    exact, vague = fitted(np.ones(2)), fitted(np.ones(2), share)
+
+    changes = [(fitted(1.0 + step * own).values - exact.values) / step for own in np.eye(2)]
+    expected = np.sqrt(exact.std**2 + sum((share * change) ** 2 for change in changes))
+    assert vague.values == pytest.approx(exact.values, rel=1e-9)
+    assert vague.std == pytest.approx(expected, rel=0.05)
+    assert np.median(vague.std / exact.std) > 10
 
 
 def runs_of(log: Log) -> Runs:
