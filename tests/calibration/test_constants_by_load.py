@@ -3,6 +3,7 @@ with a body appended, friction by its formula, divided by the constants, and noi
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -234,3 +235,7 @@ def test_the_command_prints_the_constants_and_writes_the_model(
     assert "note: the load is taken as a point" in said
     assert psdmc.load(tmp_path / "out.npz").theta_b is not None
     assert "loaded.csv" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    numbers = json.loads((tmp_path / "page.json").read_text(encoding="utf-8"))
+    assert [row["file"] for row in numbers["base_parameters"]] == kr6.known_theta_b().tolist()
+    assert numbers["facts"]["versions"]["psdmc"] == psdmc.__version__
+    assert numbers["facts"]["with_load"][0]["rows"] == 3000
