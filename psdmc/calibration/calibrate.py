@@ -99,7 +99,7 @@ def calibrate(
             "give --loaded LOG and --load MASS,X,Y,Z",
         )
     campaign = campaign_of(paths)
-    plain = None if campaign is None else plain_logs(campaign, model.joint_names)
+    plain = None if campaign is None else _exciting_logs(campaign, model.joint_names)
     if plain is not None:
         paths, campaign = list(plain), None
     if campaign is not None:
@@ -118,6 +118,14 @@ def calibrate(
     options = replace(options, linear=found.linear)
     constants = {**found.constants, **(torque_constants or {})}
     return calibrate_logs(model, found.logs, options, regressor, constants or None, progress, full)
+
+
+def _exciting_logs(campaign: Path, joint_names: Sequence[str]) -> tuple[Path, ...] | None:
+    """The logs of a campaign of exciting motions alone; None also where it cannot be read, which is said later."""
+    try:
+        return plain_logs(campaign, joint_names)
+    except InputError:
+        return None
 
 
 def _paths(sources: str | Path | Sequence[str | Path]) -> list[Path]:

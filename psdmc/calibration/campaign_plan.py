@@ -111,14 +111,16 @@ class PlannedRun:
 class Plan:
     """All runs, the exciting motion that was found, and what a user has to know, a sentence each.
 
-    chain    with the limits that the motions keep
-    looked   what was looked at, and what was not
-    remarks  what is unlike what was asked for, or cannot be found
+    chain       with the limits that the motions keep
+    is_cleared  whether shapes or a floor were looked at
+    looked      what was looked at, and what was not
+    remarks     what is unlike what was asked for, or cannot be found
     """
 
     runs: tuple[PlannedRun, ...]
     found: Excitation
     chain: Mechanism
+    is_cleared: bool = False
     looked: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
@@ -168,6 +170,7 @@ def plan_campaign(
         tuple(planner.runs),
         found,
         chain,
+        allowed.clearance is not None,
         looked_at(allowed, model, options.shapes, options.floor),
         (*planner.remarks, *said),
     )

@@ -63,5 +63,9 @@ def _found(plan: Plan) -> str:
     start = f"exciting motion: condition number {found.condition:.3g} of {what}"
     if not math.isfinite(found.gain):
         return f"{start}; none of {len(found.random_conditions)} random motions keeps the torque limits"
-    best = found.random_conditions[0]
-    return f"{start}, {found.gain:.2f} times below {best:.3g}, the best of {len(found.random_conditions)} random motions"
+    best, count = found.random_conditions[0], len(found.random_conditions)
+    if plan.is_cleared:
+        return (
+            f"{start}; {best:.3g} is the best of {count} random motions, which were not asked to hit nothing"
+        )
+    return f"{start}, {found.gain:.2f} times below {best:.3g}, the best of {count} random motions"

@@ -27,6 +27,8 @@ APART = 0.01
 """m that shapes keep from each other: models of robots are not exact, nor do robots follow exactly."""
 LARGEST_STEP = 0.02
 """rad (m) by which a joint moves, at most, between two poses that are looked at."""
+FAR = 10.0
+"""A path is looked at in steps this many times longer first: most that hit something are found out so."""
 POSES_TRIED = 300
 """Random poses, to find the pairs that touch in every one: neighbours whose shapes overlap by design."""
 FLOOR = "the floor"
@@ -61,7 +63,7 @@ class Clearance:
         step  rad (m) by which a joint moves, at most, between two poses that are looked at
         """
         data, shaped = self._working
-        for pose in spread(q, step):
+        for pose in itertools.chain(spread(q, FAR * step), spread(q, step)):
             whole = self.held.copy()
             whole[list(self.place)] = pose
             if pin.computeCollisions(self.model, data, self.shapes, shaped, whole, True):

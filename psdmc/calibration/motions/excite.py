@@ -87,9 +87,9 @@ def excite(
     criterion = Criterion(space, columns, options, allowed.torques)
     is_free = None if allowed.clearance is None else _free(space, allowed)
     if is_free is not None:
-        starts = np.array(
-            [p for p in (_cleared(space, p, is_free) for p in starts[:STARTS_FREE]) if p is not None]
-        )
+        cleared = [_cleared(space, point, is_free) for point in starts[:STARTS_FREE]]
+        kept = [point for point in cleared if point is not None]
+        starts = np.array(sorted(kept, key=criterion.score)).reshape(-1, space.size)
     found = search(criterion, starts, is_free, progress)
     reached = [
         _within(space.motion(point), space, columns, allowed) for point in (*found.points, *starts[:1])

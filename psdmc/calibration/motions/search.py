@@ -27,6 +27,8 @@ PER_START = 800
 """Evaluations for which a descent from one start is over, as a rule."""
 TORQUE_COST = 1e4
 """Of the mean square excess of torque; 1 % of excess in each sample costs as much as a condition number e times larger."""
+WALL = 0.5
+"""By how much a motion that hits something counts as worse than the best: the line search then comes back by about half."""
 REMEMBERED = 20
 """Steps that L-BFGS keeps."""
 
@@ -155,7 +157,7 @@ class _Counted:
         self.count += 1
         value, slope, score = self.criterion.smooth(point, self.power)
         if self.is_free is not None and np.isfinite(self.lowest) and not self.is_free(point):
-            return self.lowest + 1e3, np.zeros_like(slope)
+            return self.lowest + WALL, np.zeros_like(slope)
         if value < self.lowest:
             self.lowest, self.point = value, point.copy()
         if score < self.best_score:
