@@ -116,6 +116,19 @@ def test_the_condition_reached_is_the_one_of_columns_built_without_psdmc():
     assert found.condition == pytest.approx(np.linalg.cond(stack / np.linalg.norm(stack, axis=0)), rel=1e-6)
 
 
+def test_the_inertial_steps_columns_are_those_that_gravity_does_not_show():
+    """At rest in any pose they are zero, and at speed they have full rank. Columns of Y alone are not always so."""
+    model = derive_model(load_robot(DENSO, drive_inertia=True).chain, expand=False)
+    columns = inertial_columns(model.chain, ChainRegressor(model), model.l)
+    q, qd, qdd = np.random.default_rng(1).uniform(-2.0, 2.0, (3, 40, 6))
+
+    still = columns.at(q, 0 * qd, 0 * qdd)
+    moving = columns.at(q, qd, qdd).reshape(240, -1)
+
+    assert np.abs(still).max() < 1e-12
+    assert np.linalg.matrix_rank(moving) == moving.shape[1]
+
+
 @pytest.mark.slow
 def test_the_denso_reaches_twice_the_best_of_a_thousand_random_motions():
     """For both fits, in a tenth of the evaluations that the search may make."""
