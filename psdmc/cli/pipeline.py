@@ -257,8 +257,7 @@ def build(
     from psdmc.toolchain.build_package import build_package, checks_of
 
     with steps() as progress:
-        progress("building")
-        built = build_package(directory, edited)
+        built = build_package(directory, edited, progress)
     print(f"{directory}: built, self-test passed ({checks_of(built)})")
     for library in sorted((directory / "build").glob("lib*.*")):
         if library.suffix in (".a", ".so", ".dylib"):

@@ -12,6 +12,8 @@ from pathlib import Path
 from psdmc.atomic import make_folder, system_errors_at
 from psdmc.emit.own_files import edited_files
 from psdmc.errors import InputError, ToolchainError
+from psdmc.progress import Progress, silent
+from psdmc.toolchain.build_progress import told
 from psdmc.toolchain.compiler_command import attempt, failure, find_compiler, run
 
 FAILED = ": FAILED"
@@ -22,10 +24,11 @@ UNFINISHED = ".psdmc-unfinished"
 """Marks a build folder while psdmc builds there, and after it was killed or failed."""
 
 
-def build_package(directory: str | Path, edited: bool = False) -> str:
+def build_package(directory: str | Path, edited: bool = False, progress: Progress = silent) -> str:
     """Build under DIR/build, run the self-test, and return what the tools printed.
 
-    edited  build although files are missing or differ from what emit-c wrote
+    edited    build although files are missing or differ from what emit-c wrote
+    progress  called with how many files are compiled, and their share
 
     With CMake where there is one, else make. InputError where DIR holds no package, or an edited one; ToolchainError
     where a tool is missing or fails.
@@ -33,13 +36,17 @@ def build_package(directory: str | Path, edited: bool = False) -> str:
     root = Path(directory)
     _check_files(root, edited)
     compiler = find_compiler().command
-    if shutil.which("cmake"):
-        with _own_build(root / "build"):
-            return _with_cmake(root)
-    if shutil.which("make"):
-        with _own_build(root / "build"):
-            return _with_make(root, compiler)
+    build = root / "build"
+    for tool in ("cmake", "make"):
+        if shutil.which(tool):
+            with _own_build(build), told(build, _files(root), progress):
+                return _with_cmake(root) if tool == "cmake" else _with_make(root, compiler)
     raise ToolchainError("neither cmake nor make was found", "install one (Debian: apt install cmake)")
+
+
+def _files(root: Path) -> int:
+    """How many files a build compiles: the sources and the self-test."""
+    return len(list((root / "src").glob("*.c"))) + 1
 
 
 def _check_files(root: Path, edited: bool) -> None:

@@ -10,6 +10,8 @@ import pytest
 from bundled import bundled_model
 
 import psdmc
+from psdmc.progress import Step
+from psdmc.toolchain import build_progress
 from psdmc.toolchain.build_package import build_package
 
 TOOLS = ("arm-none-eabi-gcc", "arm-none-eabi-ar", "arm-none-eabi-readelf")
@@ -61,6 +63,22 @@ def test_another_compiler_compiles_everything_again(tmp_path: Path, first: str) 
     assert sorted(members(package / "build" / "libarm.a")) == ["gravity.o", "tables.o"]
     assert calls >= 2
     assert "-c src/" not in again, "nothing changed, nothing is compiled"
+
+
+@pytest.mark.parametrize("tool", ["cmake", "make"])
+def test_a_build_says_how_far_it_is(tmp_path: Path, tool: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    need(tool)
+    if tool == "make":
+        monkeypatch.setattr(shutil, "which", lambda name: None if name == "cmake" else f"/usr/bin/{name}")
+    monkeypatch.setattr(build_progress, "TICK", 0.01)
+    said: list[str] = []
+
+    build_package(emitted(tmp_path / "arm", "scalar"), progress=said.append)
+
+    steps = [step for step in said if isinstance(step, Step)]
+    assert steps[0] == "building: 0 of 3 files"
+    assert [step.share for step in steps] == sorted(step.share for step in steps)
+    assert 0.6 < steps[-1].share <= 1.0
 
 
 def test_a_board_s_library_holds_the_boards_code_alone(tmp_path: Path) -> None:
