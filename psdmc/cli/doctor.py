@@ -38,6 +38,8 @@ OPTIONAL = (
     ("distributed", "cluster", "the same on a cluster"),
     ("xarray", "cluster", "functions of compiled robots over named dimensions"),
     ("crocoddyl", "examples", "the example of trajectory optimisation"),
+    ("osqp", "examples", "the example of a trotting quadruped: its quadratic programme"),
+    ("example-robot-data", "examples", "the same: its robot"),
     ("cvxpy", "calibrate", "psdmc calibrate: physical consistency"),
     ("clarabel", "calibrate", "psdmc calibrate: its solver"),
     ("cma", "calibrate", "friction in psdmc calibrate"),
