@@ -25,7 +25,7 @@ def verdict_table(verdict: Verdict) -> str:
     head = [
         "Joint",
         "R² held out",
-        "RMSE held out [N m]",
+        "RMSE held out",
         "Gain against the file",
         "Power of friction [W]",
         "Residual / noise",
