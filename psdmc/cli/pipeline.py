@@ -240,6 +240,8 @@ def emit_c(
     asked = name or found.mechanism.name
     if identifier(asked) != asked:
         print(f"note: in C '{one_line(asked)}' is {identifier(asked)}")
+    elif output is None and asked != folder.name:
+        print(f"note: in C it is {asked}: #include <{asked}/{asked}.h>; --name gives it another name")
     for note in run_time_only(found, wanted):
         print(f"note: {note}")
     for what in beyond_friction(found):

@@ -32,6 +32,8 @@ def test_a_package_goes_where_its_model_is_called(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("arm: ")
     assert (tmp_path / "arm" / MANIFEST).is_file()
+    assert "note: in C it is two_link: #include <two_link/two_link.h>" in done.stdout
+    assert (tmp_path / "arm" / "include" / "two_link" / "two_link.h").is_file()
     assert done.stderr.splitlines()[-1] == "next: psdmc build arm"
 
 
