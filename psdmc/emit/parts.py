@@ -14,7 +14,7 @@ from psdmc.program.parts import in_parts
 from psdmc.program.products import Product
 from psdmc.program.program import Instr, Op, Program, Slot
 
-LONG = 4500
+LONG = 4950
 """Operations and stores from which on a body is cut: shorter ones compile in seconds, and calls cost a little."""
 
 PART = 800
