@@ -29,7 +29,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 QUICK = CampaignOptions(
     sweep=SweepOptions(speed=0.25, seconds=20.0, range=0.8, period=4e-3),
     sines=SineOptions(smallest=1e-4, ratio=8.0, frequencies=(2.0,), cycles=1, period=2e-3),
-    excite=ExciteOptions(evaluations=100, random=50, samples=50),
+    excite=ExciteOptions(evaluations=100, random=50),
     load=Load(3.5, (0.08, 0.0, 0.06)),
     gravity_runs=1,
     repeats=1,
@@ -59,7 +59,7 @@ def test_from_a_model_without_parameters_to_one_with_them(tmp_path: Path):
     assert (folder / "excitation.svg").read_text(encoding="utf-8").startswith("<svg")
     calibrated = load(tmp_path / "calibrated.npz")
     assert calibrated.theta_b is not None
-    assert np.abs(calibrated.theta_b - model.theta_b).max() < 0.01 * np.abs(model.theta_b).max()
+    assert np.abs(calibrated.theta_b - model.theta_b).max() < 0.05
     assert "denso_wall" in (tmp_path / "page.html").read_text(encoding="utf-8")
     assert (tmp_path / "page.json").exists()
     assert sorted(path.name for path in (tmp_path / "c").rglob("*.*")) == [
