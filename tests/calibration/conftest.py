@@ -9,14 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick_campaign import QUICK
 
 from psdmc.calibration.calibrate import calibrate
-from psdmc.calibration.campaign import CampaignOptions, plan_campaign, write_campaign
+from psdmc.calibration.campaign import plan_campaign, write_campaign
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.motions.excite import ExciteOptions
-from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.calibration.plant.virtual_robot import load_virtual_robot, simulate
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
@@ -91,16 +89,6 @@ viscous_exponent = 0.65
 stiffness = 4e3
 damping = 6.0
 """
-
-QUICK = CampaignOptions(
-    sweep=SweepOptions(speed=0.15, seconds=16.0, range=0.8),
-    sines=SineOptions(smallest=4e-5, largest=0.7, ratio=4.0, frequencies=(2.0, 6.0), cycles=1),
-    excite=ExciteOptions(duration=6.0, samples=60, evaluations=300, random=50, seconds=20.0),
-    load=Load(3.0, (0.1, 0.05, 0.0)),
-    gravity_runs=1,
-    repeats=2,
-    table="npz",
-)
 
 
 @dataclass(frozen=True)

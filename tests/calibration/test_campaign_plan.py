@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import QUICK
+from quick_campaign import QUICK
 
 from psdmc.calibration.calibrate import calibrate
 from psdmc.calibration.campaign import write_campaign

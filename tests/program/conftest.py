@@ -1,43 +1,14 @@
-"""Seeded random PROGRAMs, and a way to compare two of them."""
+"""Random PROGRAMs for the passes' tests."""
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+from random_programs import SEEDS, outputs_of, random_program
 
-from psdmc.program.check import check
-from psdmc.program.interpret import interpret
-from psdmc.program.program import ARITY, Instr, Op, Program, Slot
-
-SEEDS = range(30)
-_SIZES = {"tau": 3}
-
-
-def random_program(seed: int, length: int = 60) -> Program:
-    """Loads, a few constants, then operations that prefer recent values; three outputs of shared parts."""
-    choose = random.Random(seed)
-    body = [Instr(Op.LOAD, slot=Slot(vector, i)) for vector in ("q", "qd") for i in range(3)]
-    body += [Instr(Op.CONST, value=value) for value in (0.0, 1.0, -1.0, 2.5, -0.3)]
-    weights = {Op.ADD: 5, Op.SUB: 5, Op.MUL: 8, Op.NEG: 2, Op.SIN: 1, Op.COS: 1}
-    for _ in range(length):
-        op = choose.choices(list(weights), list(weights.values()))[0]
-        recent = range(max(0, len(body) - 20), len(body))
-        args = tuple(choose.choice([*range(11), *recent]) for _ in range(ARITY[op]))
-        # sums of products would overflow when squared again and again: products take one small factor
-        if op is Op.MUL:
-            args = (args[0], choose.randrange(11))
-        body.append(Instr(op, args))
-    outputs = tuple((Slot("tau", i), choose.randrange(len(body) - 15, len(body))) for i in range(3))
-    return check(Program(tuple(body), outputs))
-
-
-def outputs_of(program: Program) -> np.ndarray:
-    """(50, 3) outputs at fixed random inputs."""
-    q, qd = np.random.default_rng(7).uniform(-1, 1, (2, 50, 3))
-    return interpret(program, {"q": q, "qd": qd}, _SIZES)["tau"]
+from psdmc.program.program import Program
 
 
 @pytest.fixture(params=SEEDS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import SEEDS, outputs_of, random_program
+from random_programs import SEEDS, outputs_of, random_program
 
 from psdmc.program.interpret import interpret
 from psdmc.program.parts import LEEWAY, Parts, in_parts
