@@ -13,7 +13,8 @@ from psdmc.calibration.identify.essential import EssentialOptions
 from psdmc.calibration.identify.four_steps import FourSteps, Runs, calibrate_four_steps, checked_runs
 from psdmc.calibration.identify.knowledge import knowledge_of
 from psdmc.calibration.identify.known_load import KnownLoad
-from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
+from psdmc.calibration.identify.linear_fit import calibrate_linear
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.motor_constants import motors_of_logs
 from psdmc.calibration.identify.physical import (
     NotPhysical,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.calibration.campaign_file import Step
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions, Load
 from psdmc.calibration.logs.table_files import TABLES

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from psdmc.calibration.identify.essential import Essential, EssentialOptions, essential
 from psdmc.calibration.identify.knowledge import Knowledge
-from psdmc.calibration.identify.linear_fit import LinearOptions, LinearResult
+from psdmc.calibration.identify.linear_fit import LinearResult
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.physical import NotPhysical, Physical, PhysicalOptions, nearest_physical
 from psdmc.calibration.identify.stated_prior import theta_covariance, with_prior
 from psdmc.calibration.logs.log import Array

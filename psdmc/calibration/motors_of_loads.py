@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from psdmc.calibration.identify.known_load import KnownLoad
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.motor import MotorResult
 from psdmc.calibration.identify.motor_constants import one_quantity, require_constants
 from psdmc.calibration.identify.motor_logs import motors_by_load

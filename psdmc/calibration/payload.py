@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.least_squares import Estimate
-from psdmc.calibration.identify.linear_fit import LinearOptions, friction_names
+from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import friction_names
 from psdmc.calibration.identify.load_fit import LOAD, LOAD_NAMES, LoadFit, fit_load
 from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
 from psdmc.calibration.identify.physical import require_cvxpy

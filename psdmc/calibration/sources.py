@@ -11,7 +11,7 @@ from psdmc.calibration.description.description import is_description, read_descr
 from psdmc.calibration.description.efforts import torque_constants
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.open_log import open_log
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.logs.wording import listed, quoted

@@ -14,7 +14,7 @@ from bundled import bundled_model, bundled_robot
 
 import psdmc
 from psdmc.calibration.identify.known_load import KnownLoad
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.logs.open_log import open_log

@@ -12,7 +12,7 @@ from typing import Any, TypeVar, cast
 
 from psdmc.calibration.description.table import Reading, Table
 from psdmc.calibration.description.tables import TABLES
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.toml_tables import TomlTable, read_toml, require_none
 
 WHAT = "a log description (log.toml), as `psdmc calibrate --describe` drafts one"

@@ -10,7 +10,7 @@ from psdmc.calibration.description.table import Reading, Table
 from psdmc.calibration.description.table_joints import require_joints
 from psdmc.calibration.description.units import UNITS
 from psdmc.calibration.identify.coupling import Matrix
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, shown
 from psdmc.calibration.logs.wording import listed, quoted
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from psdmc.calibration.description.table import Reading, Table
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.low_pass import LARGEST_CUTOFF, SMALLEST_CUTOFF
 from psdmc.calibration.logs.toml_tables import TomlTable, shown

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from psdmc.calibration.description.table import Reading, Table
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 
 
 def _kept(key: str) -> Table[object]:

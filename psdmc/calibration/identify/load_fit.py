@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.least_squares import Estimate, Prior, estimate_rows
-from psdmc.calibration.identify.linear_fit import LinearOptions, LinearProblem, linear_problem
+from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem
 from psdmc.calibration.identify.linear_rows import Block
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor

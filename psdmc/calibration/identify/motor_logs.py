@@ -25,7 +25,9 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.known_load import REMEDIES, KnownLoad, unreached
 from psdmc.calibration.identify.least_squares import Estimate, Prior, estimate_rows
-from psdmc.calibration.identify.linear_fit import LinearOptions, LinearProblem, linear_prior, linear_problem
+from psdmc.calibration.identify.linear_fit import linear_prior
+from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem
 from psdmc.calibration.identify.linear_rows import Block, residual_of
 from psdmc.calibration.identify.motor import MotorResult, negative_warnings
 from psdmc.calibration.identify.motor_model import Motors

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.identify.gravity import gravity_split
-from psdmc.calibration.identify.linear_fit import LinearOptions, friction_terms
+from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.linear_problem import friction_terms
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
 from psdmc.robot.mechanism import Mechanism

@@ -22,7 +22,7 @@ from psdmc.calibration.identify.friction import FrictionResult, judge_friction, 
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import judge_gravity
 from psdmc.calibration.identify.inertial import judge_inertial
-from psdmc.calibration.identify.linear_fit import friction_names, friction_terms
+from psdmc.calibration.identify.linear_problem import friction_names, friction_terms
 from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
 from psdmc.calibration.identify.motor import judge_motors
 from psdmc.calibration.identify.motor_model import Motors

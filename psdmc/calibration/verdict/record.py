@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.four_steps import FourSteps
-from psdmc.calibration.identify.linear_fit import LinearOptions, LinearResult
+from psdmc.calibration.identify.linear_fit import LinearResult
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.lugre import PARAMETERS, UNITS
 from psdmc.calibration.identify.motor import MotorResult
 from psdmc.calibration.identify.motor_model import Motors

@@ -10,7 +10,7 @@ import pytest
 from psdmc.calibration.description.description import is_description, read_description
 from psdmc.calibration.description.table_fit import FIT, FitChoice
 from psdmc.calibration.description.table_logs import LOGS, LogEntry
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.errors import InputError
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
-from psdmc.calibration.identify.linear_fit import LinearOptions, calibrate_linear
+from psdmc.calibration.identify.linear_fit import calibrate_linear
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.physical import nearest_physical
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log import Log

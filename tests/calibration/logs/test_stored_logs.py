@@ -10,7 +10,7 @@ import pytest
 from calibration.conftest import smooth_log
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs import table_pieces
 from psdmc.calibration.logs.even_grid import even_grid
 from psdmc.calibration.logs.filter import filtered, independent_rows, stretches

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 from arms import urdf
 
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions.excite import ExciteOptions, excite
 from psdmc.calibration.motions.fit_columns import FitColumns, all_columns, inertial_columns

@@ -17,7 +17,7 @@ from unoptimised import wrapper
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_campaign, calibrate_logs
 from psdmc.calibration.campaign_file import read_campaign
-from psdmc.calibration.identify.linear_fit import LinearOptions
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import InertialRun
 from psdmc.calibration.logs.filter import filtered, smoothed_rows, thinned

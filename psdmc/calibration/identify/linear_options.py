@@ -1,0 +1,52 @@
+"""How one linear fit is made: filter, split, friction, and a description's tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from psdmc.calibration.columns.columns import Columns, read_columns
+from psdmc.calibration.identify.coupling import Matrix
+from psdmc.calibration.identify.least_squares import FitOptions
+from psdmc.calibration.logs.check_options import CheckOptions
+from psdmc.calibration.logs.filter import SplitOptions
+from psdmc.calibration.logs.log_survey import STRETCH_ROWS
+from psdmc.calibration.logs.low_pass import FilterOptions
+from psdmc.calibration.logs.row_store import HELD_BYTES
+from psdmc.robot.mechanism import Mechanism
+
+
+@dataclass(frozen=True, slots=True)
+class LinearOptions:
+    """Options of the linear fit of one log.
+
+    exponents   of the viscous terms |qd|^d sign(qd), each with a coefficient of its own; the first is `viscous`
+    sign_speed  rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
+    offset      whether each joint's torque has a constant of its own
+    stretch     rows of a log that are filtered at once
+    coupling    C of q_joint = C q_motor where motors drive several joints: friction acts on the motors; empty: none
+    held_bytes  of columns that are held in memory; more of them go to a temporary file
+    tables      of a log description, as TOML gives them: springs, friction (docs/how-to/springs-and-friction.md, priors.md)
+    tables_from  the file that they are of, for messages
+    columns     made of these for a robot: springs and further friction, each value of which is one more unknown
+    """
+
+    filter: FilterOptions = field(default_factory=lambda: FilterOptions(cutoff=8.0))
+    split: SplitOptions = field(default_factory=lambda: SplitOptions(held_out=0.3, blocks=0))
+    fit: FitOptions = field(default_factory=lambda: FitOptions(method="irls"))
+    check: CheckOptions = field(default_factory=CheckOptions)
+    exponents: tuple[float, ...] = (1.0,)
+    sign_speed: float = 0.03
+    offset: bool = True
+    coupling: Matrix = ()
+    stretch: int = STRETCH_ROWS
+    held_bytes: int = HELD_BYTES
+    tables: Mapping[str, Any] = field(default_factory=dict)
+    tables_from: str = "description"
+    columns: Columns = field(default_factory=Columns)
+
+    def for_robot(self, chain: Mechanism) -> LinearOptions:
+        """These with the columns that the tables mean; InputError names what is wrong in them."""
+        columns = read_columns(self.tables, chain, self.tables_from, self.offset)
+        return replace(self, columns=columns, offset=self.offset and columns.plain_offsets)

@@ -1,0 +1,172 @@
+"""The rows of one linear fit: columns of base parameters, friction and springs, filtered like the measured torques."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.calibration.columns.columns import Columns
+from psdmc.calibration.identify.coupling import coupling_of
+from psdmc.calibration.identify.extra import limits_of, motion_of
+from psdmc.calibration.identify.kept_rows import KeptRows
+from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.progress import Step
+from psdmc.robot.mechanism import Mechanism
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearProblem:
+    """The stacked rows of independent samples.
+
+    rows      of the l + n f + m unknowns, N samples, with what the position sensors' noise alone would make of them
+    torque    (N, n)  N m;  held_out (N,)
+    names     l + n f + m  of the unknowns, for messages
+    columns   whose m values come last
+    """
+
+    chain: Mechanism
+    rows: KeptRows
+    torque: Array
+    held_out: NDArray[np.bool_]
+    l: int
+    friction: tuple[str, ...]
+    columns: Columns = field(default_factory=Columns)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        own = tuple(f"{name} of {joint}" for joint, name in self.plain)
+        return (*(f"theta_{k + 1}" for k in range(self.l)), *own, *self.columns.names)
+
+    @property
+    def plain(self) -> tuple[tuple[str, str], ...]:
+        """n f joints and names of plain friction, in order."""
+        return tuple((joint, name) for joint in self.chain.joint_names for name in self.friction)
+
+    @property
+    def first_extra(self) -> int:
+        return self.l + len(self.chain) * len(self.friction)
+
+    @property
+    def never_negative(self) -> NDArray[np.bool_]:
+        """(l + n f + m,) true for friction other than offsets, which only takes energy and may not be negative, and for
+        extra columns that say so."""
+        own = np.array([name != "offset" for _, name in self.plain], dtype=bool)
+        return np.concatenate([np.zeros(self.l, dtype=bool), own, self.columns.never_negative])
+
+    @property
+    def limits(self) -> Array:
+        """(k, l + n f + m) whose products with the vector may not be negative either."""
+        return limits_of(self.columns, self.plain, self.l)
+
+
+def friction_names(exponents: Sequence[float], offset: bool) -> tuple[str, ...]:
+    """Names of a joint's friction columns, in order."""
+    viscous = tuple("viscous" if k == 0 else f"viscous^{d:g}" for k, d in enumerate(exponents))
+    return ("coulomb", *viscous, *(("offset",) if offset else ()))
+
+
+def friction_terms(qd: Array, sign_speed: float, exponents: Sequence[float], offset: bool) -> list[Array]:
+    """(N, n) each: the factors of the coefficients of Coulomb friction, the viscous terms and the offset, before the
+    filter."""
+    sign = np.tanh(qd / sign_speed)
+    terms = [sign, *(sign * np.abs(qd) ** d for d in exponents)]
+    return [*terms, np.ones_like(sign)] if offset else terms
+
+
+def linear_problem(
+    chain: Mechanism,
+    model: Regressor,
+    l: int,
+    logs: Sequence[AnyLog],
+    options: LinearOptions,
+    motors: Motors,
+    progress: Callable[[str], None],
+    carried: Array | None = None,
+) -> tuple[LinearProblem, tuple[str, ...]]:
+    """The stacked independent samples of all logs, each log split separately; and remarks on joints that rest.
+
+    carried  (l,)  base parameters of the load that friction depends on, where a column asks for it
+    """
+    names = friction_names(options.exponents, options.offset)
+    width = l + len(chain) * len(names) + len(options.columns)
+    rows = KeptRows(len(chain), width, options.held_bytes)
+    torques, outs, remarks = [], [], []
+    for log in logs:
+        count = 0
+        for stretch in stretches(log, options.filter, options.check, options.stretch):
+            states, at = stretch.states, stretch.at
+            rows.append(*_columns(model, states, at, options, carried))
+            torques.append(motors.torque(states.effort)[at])
+            if not count:
+                remarks += _ripples(log, states, options)
+            count += len(at)
+            share = (states.first + at[-1]) / len(log)
+            progress(Step(f"linear fit: {log.name}: {share:.0%}", share))
+        outs.append(held_out_of(log, count, options.split))
+    problem = LinearProblem(
+        chain, rows, np.concatenate(torques), np.concatenate(outs), l, names, options.columns
+    )
+    return problem, tuple(remarks)
+
+
+def _ripples(log: AnyLog, states: States, options: LinearOptions) -> list[str]:
+    """Remarks on joints that move by no more than noise, where the log's own check did not find them at rest."""
+    found = [
+        f"{name} ({size:.1e} rad)" if name not in (log.sliding or ()) else f"{name} ({size:.1e} m)"
+        for name, size, rests in zip(log.joint_names, states.motion, states.still, strict=True)
+        if rests and size >= options.check.smallest_motion
+    ]
+    if not found:
+        return []
+    return [f"{log.name}: joint(s) {', '.join(found)} ripple by no more than sensor noise: taken as resting"]
+
+
+def _columns(
+    model: Regressor, states: States, at: NDArray[np.intp], options: LinearOptions, carried: Array | None
+) -> tuple[Array, Array]:
+    """(rows, n, l + n f + m) columns, filtered like the torque; and the change of them by another draw of the position
+    noise."""
+    measured = (states.q, states.qd, states.qdd)
+    jittered = states.jittered()
+    plain = _filtered_columns(model, states, measured, at, options, carried)
+    if not states.noise.any():
+        return plain, np.zeros_like(plain)
+    return plain, _filtered_columns(model, states, jittered, at, options, carried) - plain
+
+
+def _filtered_columns(
+    model: Regressor,
+    states: States,
+    motion: tuple[Array, Array, Array],
+    at: NDArray[np.intp],
+    options: LinearOptions,
+    carried: Array | None,
+) -> Array:
+    def whole(rows: slice) -> Array:
+        """Rigid columns and extra ones."""
+        q, qd, qdd = (part[rows] for part in motion)
+        rigid = model.regressor(q, qd, qdd)
+        if not len(options.columns):
+            return rigid
+        load = None if carried is None else rigid @ carried
+        extra = options.columns.values(motion_of(q, qd, options.sign_speed, load, coupling))
+        return np.concatenate([rigid, extra], axis=2)
+
+    coupling = coupling_of(options.coupling)
+    smoothed = smoothed_rows(states, at, whole)
+    rigid, extra = np.split(smoothed, [smoothed.shape[2] - len(options.columns)], axis=2)
+    speed = motion[1] if coupling is None else coupling.to_motors(motion[1])
+    terms = friction_terms(speed, options.sign_speed, options.exponents, options.offset)
+    rubbed = np.stack([states.low_pass(term)[at] for term in terms], axis=-1)
+    n, f = rubbed.shape[1:]
+    onto_joints = np.eye(n) if coupling is None else coupling.inverse
+    spread = np.einsum("tkf,kj->tjkf", rubbed, onto_joints).reshape(len(at), n, n * f)
+    return np.concatenate([rigid, spread, extra], axis=2)
