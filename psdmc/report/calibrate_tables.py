@@ -118,7 +118,12 @@ def joint_number(row: NumberRow | None) -> str:
 
 def log_table(record: Calibration) -> str:
     """Names, lengths and dates of the logs; empty text where they are unknown."""
-    uses = (("data", "fitted and held out"), ("with_load", "with the known load"))
+    steps = {} if record.prediction is None else record.prediction.steps
+    is_split = not steps or any(step.split.held_out for step in steps.values())
+    uses = (
+        ("data", "fitted and held out" if is_split else "fitted"),
+        ("with_load", "with the known load"),
+    )
     rows = [
         [
             row["log"],
@@ -142,6 +147,7 @@ def step_table(record: Calibration) -> str:
         split = step.split
         share = f"{split.held_out:.0%}"
         where = f"{share}, the end" if split.blocks == 0 else f"{share}, spread over {split.blocks} blocks"
+        where = where if split.held_out else NOTHING
         title = "whole log" if name == "all" else name
         rows.append([title, f"{step.filter.cutoff:g}", f"{step.filter.order}, both ways", where])
     return table(["Step", "Cut-off [Hz]", "Butterworth order", "Held out"], rows)

@@ -18,6 +18,8 @@ DRIVE = f"{{{SPACE}}}drive"
 """Of a <joint>: inertia, kg m^2 (kg), of its drive."""
 BALL = f"{{{SPACE}}}ball"
 """Of a floating <joint>: it turns about every axis, and stays where it is."""
+STANDS_FOR_BALL = FREE.urdf_words[0]
+"""The type that URDF has for it."""
 NOTE = f"{{{SPACE}}}note"
 """Of the <robot>: text, one sentence for `show`."""
 
@@ -55,7 +57,7 @@ def ball_names(robot: Element) -> tuple[str, ...]:
     return tuple(
         joint.get("name", "")
         for joint in robot.findall("joint")
-        if joint.find(BALL) is not None and joint.get("type") == FREE.urdf_words[0]
+        if joint.find(BALL) is not None and joint.get("type") == STANDS_FOR_BALL
     )
 
 

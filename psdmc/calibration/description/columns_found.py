@@ -9,7 +9,7 @@ from typing import Literal
 from psdmc.calibration.description.description import LogDescription
 from psdmc.calibration.description.table_joints import JOINTS, JointEntry
 from psdmc.calibration.description.table_quantities import EFFORT, POSITION, VELOCITY, Entry, refused
-from psdmc.calibration.description.units import TICKS, UNITS, Kind
+from psdmc.calibration.description.units import TICKS, UNITS, Says
 from psdmc.calibration.logs.log import Quantity
 from psdmc.calibration.logs.some_columns import Columns
 from psdmc.calibration.logs.wording import listed, quoted
@@ -46,7 +46,7 @@ class Found:
     """A column: SI value = factor * (number - zero).
 
     table, place  of the column: name of the table, and place from 0
-    kind          what its unit says
+    says          what its unit says of the joint
     entry         what was said of it
     """
 
@@ -54,7 +54,7 @@ class Found:
     place: int
     factor: float
     zero: float
-    kind: Kind
+    says: Says
     delay: float
     quantity: Quantity
     entry: Entry
@@ -107,11 +107,11 @@ def replace_unit(entry: Entry, unit: str) -> Entry:
 
 
 def _converted(where: str, what: What, entry: Entry, at: tuple[str, int], quantity: Quantity) -> Found:
-    kind: Kind = "any"
+    says: Says = "any"
     size = 1.0
     if entry.unit is not None:
         unit = UNITS[what][entry.unit]
-        size, kind = unit.size, unit.kind
+        size, says = unit.size, unit.says
     if entry.unit in TICKS:
         if entry.ticks_per_rev is None:
             raise refused(f"{where}: unit {quoted(entry.unit or '')} without ticks_per_rev")
@@ -120,7 +120,7 @@ def _converted(where: str, what: What, entry: Entry, at: tuple[str, int], quanti
         raise refused(f"{where}: ticks_per_rev, but its unit is {entry.unit or 'SI'}, expected ticks")
     factor = (entry.sign or 1.0) * (1.0 if entry.scale is None else entry.scale) * size
     gear = entry.gear_ratio or 1.0
-    if kind == "current":
+    if says == "current":
         quantity = "current"
     elif what == "effort":
         if entry.torque_constant is not None:
@@ -128,7 +128,7 @@ def _converted(where: str, what: What, entry: Entry, at: tuple[str, int], quanti
         factor *= gear
     else:
         factor /= gear
-    return Found(at[0], at[1], factor, entry.offset or 0.0, kind, entry.delay or 0.0, quantity, entry)
+    return Found(at[0], at[1], factor, entry.offset or 0.0, says, entry.delay or 0.0, quantity, entry)
 
 
 def _usual(

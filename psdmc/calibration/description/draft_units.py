@@ -70,7 +70,7 @@ def velocity_unit(time: Array, position: Array, velocity: Array) -> str:
         return ""
     ratio = abs(float(np.sum(slope * velocity)) / power)
     for name, unit in UNITS["velocity"].items():
-        if unit.kind == "turning" and name != "ticks/s" and abs(ratio * unit.size - 1.0) < RATIO:
+        if unit.says == "turning" and name != "ticks/s" and abs(ratio * unit.size - 1.0) < RATIO:
             return name
     return ""
 

@@ -113,16 +113,16 @@ def _layout(description: LogDescription, name: str, joints: Sequence[JointColumn
 def _sliding(joints: Sequence[JointColumns]) -> tuple[str, ...] | None:
     """Joints in m; None where a unit was not said. InputError where a joint's units contradict each other."""
     for joint in joints:
-        kinds = {"position": joint.position.kind, "effort": joint.effort.kind}
+        kinds = {"position": joint.position.says, "effort": joint.effort.says}
         if joint.velocity is not None:
-            kinds["velocity"] = joint.velocity.kind
+            kinds["velocity"] = joint.velocity.says
         says = {what: kind for what, kind in kinds.items() if kind in ("turning", "sliding")}
         if len(set(says.values())) > 1:
             both = ", ".join(f"its {what} is of a {kind} one" for what, kind in says.items())
             raise refused(f"joint {joint.name}: {both}, expected units of one kind")
-    if any(joint.position.kind == "any" for joint in joints):
+    if any(joint.position.says == "any" for joint in joints):
         return None
-    return tuple(joint.name for joint in joints if joint.position.kind == "sliding")
+    return tuple(joint.name for joint in joints if joint.position.says == "sliding")
 
 
 def _read(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["turning", "sliding", "current", "any"]
+Says = Literal["turning", "sliding", "current", "any"]
 """What a unit says: of a joint that turns, of one that slides, of a motor's current, or nothing."""
 
 TICKS = ("ticks", "ticks/s")
@@ -19,7 +19,7 @@ class Unit:
     """A unit: `size` in SI units (s, rad, m, rad/s, m/s, N m, N, A)."""
 
     size: float
-    kind: Kind
+    says: Says
 
 
 TIME_UNITS: Mapping[str, Unit] = {

@@ -146,7 +146,12 @@ def test_a_coupled_wrist_is_recovered(folder: Path, capsys: pytest.CaptureFixtur
     shown = capsys.readouterr().out
     assert "log: check.csv, 7,500 rows, 30 s, held out whole" in shown
     assert "friction: of the motors, some of which drive several joints together" in shown
-    assert "check.csv, 7,500 rows, 30 s, held out whole" in (folder / "out.html").read_text(encoding="utf-8")
+    cells = [
+        re.findall(r"<td[^>]*>([^<]*)</td>", row)
+        for row in (folder / "out.html").read_text("utf-8").split("<tr>")
+    ]
+    used = {row[0]: (row[1], row[2], row[4]) for row in cells if len(row) == 5 and row[0].endswith(".csv")}
+    assert used == {"fit.csv": ("15,000", "60", "fitted"), "check.csv": ("7,500", "30", "held out whole")}
     for both in kept["quality"]["All"].values():
         assert both["held_out"]["r2"] > 0.99
 
