@@ -49,6 +49,24 @@ def test_a_certain_value_is_not_replaced_by_a_doubtful_one_from_before():
     assert constants.merged(np.array([3.0]), np.array([1e-13])) == 3.0
 
 
+def test_a_value_as_doubtful_as_itself_draws_no_smaller_one_to_it():
+    """Coefficients of 3e-20 became 2e-10: nonlinear effects of a robot of many scales were wrong by 4e-4."""
+    small, large = merged([3.6e-20, 1.7e-10], [0.82, 0.81])
+
+    assert abs(small - 3.6e-20) <= (0.82 + 0.81) * 3.6e-20
+    assert abs(large - 1.7e-10) <= (0.82 + 0.81) * 1.7e-10
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_value_moves_by_more_than_doubts_of_its_own_size(seed: int) -> None:
+    """Its own doubt, and that of the value it becomes, which is at most ten times as large."""
+    rng = np.random.default_rng(seed)
+    values, doubts = 10.0 ** rng.uniform(-20, 3, 400), 10.0 ** rng.uniform(-3, 0.2, 400)
+    moved = np.abs(Constants().merged(values, doubts) - values)
+
+    assert np.all(moved <= 11.0 * np.maximum(doubts, 1e-15) * values)
+
+
 def terms(*monomials: tuple[int, list[int], float]) -> Terms:
     """Terms from (output, exponents, coefficient)."""
     output, exponents, coefficient = zip(*monomials, strict=True)

@@ -114,7 +114,11 @@ def test_check_compares_with_the_free_flyer_and_with_mujocos_free_joint(tmp_path
     assert by_mujoco.error < 1e-12
     assert [row.name for row in rows if row.limit is None] == []
     compared = {row.name for row in rows}
-    assert compared >= {"derivatives of frame velocities", "derivatives of inverse dynamics", "forward kinematics"}
+    assert compared >= {
+        "derivatives of frame velocities",
+        "derivatives of inverse dynamics",
+        "forward kinematics",
+    }
 
 
 def test_check_finds_a_robot_that_was_read_wrongly(tmp_path: Path) -> None:

@@ -21,7 +21,9 @@ from psdmc import compiler
 from psdmc.cli.boundary import run
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
+from psdmc.functions import RECIPES
 from psdmc.lower import kernels, search
+from psdmc.lower.admitted import require
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.toolchain.build_package import build_package
@@ -124,9 +126,16 @@ def test_python_takes_and_gives_arrays_of_these_shapes(tree: RandomTree, model: 
         model.inverse_dynamics(qd[0], qd[0], qd[0])
 
 
-def test_functions_of_one_coordinate_are_refused_when_they_are_asked_for(model: DynamicsModel) -> None:
-    with pytest.raises(InputError, match=r"no rk4_step_derivatives: .*joint 'joint0' moves freely"):
-        psdmc.compile(model, functions=["gravity", "rk4_step_derivatives"])
+def test_no_function_is_refused_to_joints_of_several_rates(model: DynamicsModel) -> None:
+    require(model, tuple(RECIPES))
+    rates = model.nv
+    with without_optimisation():
+        robot = psdmc.compile(model, functions=["rk4_step_derivatives"])
+    q, qd, tau = model.neutral(), np.zeros(rates), np.zeros(rates)
+    found = robot.rk4_step_derivatives(q, qd, tau, 1e-3)
+    assert found.A.shape == (2 * rates, 2 * rates)
+    assert found.B.shape == (2 * rates, rates)
+    assert_allclose(found.A, model.rk4_step_derivatives(q, qd, tau, 1e-3).A, rtol=0, atol=1e-9)
 
 
 def test_a_model_file_keeps_the_joints(model: DynamicsModel, tmp_path: Path) -> None:

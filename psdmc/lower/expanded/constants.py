@@ -52,8 +52,9 @@ class Constants:
         return right - is_left
 
     def _entered(self, values: Array, uncertainty: Array) -> Array:
-        """One new entry for each run of neighbours: the value that is most certain, of equally certain ones the
-        smallest."""
+        """New entries for runs of neighbours: the value that is most certain, of equally certain ones the smallest. A
+        value that this would move too far, as its run is long or the next value's doubt as large as that value, is in
+        a run of its own."""
         order = np.lexsort((uncertainty, values))
         ordered, doubt = values[order], uncertainty[order]
         gap = np.diff(ordered) > (doubt[1:] + doubt[:-1]) * ordered[1:]
@@ -62,8 +63,12 @@ class Constants:
         first = by_certainty[np.searchsorted(run[by_certainty], np.arange(run[-1] + 1))]
         entries = ordered[first]
         self._insert(entries, doubt[first])
+        too_far = np.abs(entries[run] - ordered) > (doubt + doubt[first][run]) * ordered
         out = np.empty_like(values)
         out[order] = entries[run]
+        left = order[too_far]
+        if len(left):
+            out[left] = self._entered(values[left], uncertainty[left])
         return out
 
     def _insert(self, entries: Array, uncertainty: Array) -> None:
