@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from psdmc.bench.case import generic_chain
@@ -9,11 +11,17 @@ from psdmc.bench.cases import bundled_chain
 from psdmc.bench.fresh import derive_fresh
 from psdmc.bench.scaling import SEED, eight_joints
 from psdmc.derivation.derive import derive_model
+from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import Mechanism
 
 MIB = 2**20
+STANDARD = ("KR6", "LBR7")
+ROBOTS = Path(__file__).resolve().parents[1] / "examples" / "robots"
 
 CASES = {
+    "scara": {"size": (69, 8), "rounds": 5, "bound_s": 0.5, "bound_mib": 1536},
+    "denso_wall": {"size": (1318, 32), "rounds": 5, "bound_s": 0.5, "bound_mib": 1536},
+    "denso_floor": {"size": (1295, 30), "rounds": 5, "bound_s": 0.5, "bound_mib": 1536},
     "KR6": {"size": (6086, 36), "rounds": 5, "bound_s": 0.5, "bound_mib": 1536},
     "LBR7": {"size": (21295, 43), "rounds": 3, "bound_s": 3.0, "bound_mib": 1536},
     "LBR7 and a joint": {"size": (72039, 50), "rounds": 1, "bound_s": 20.0, "bound_mib": 6144},
@@ -24,7 +32,7 @@ CASES = {
 def chain_of(name: str) -> Mechanism:
     if name == "LBR7 and a joint":
         return generic_chain(eight_joints(bundled_chain("LBR7")), SEED)
-    return bundled_chain(name)
+    return bundled_chain(name) if name in STANDARD else load_robot(ROBOTS / f"{name}.toml").chain
 
 
 @pytest.mark.parametrize("name", CASES)

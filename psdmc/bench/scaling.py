@@ -46,5 +46,6 @@ def eight_joints(lbr: Mechanism) -> Mechanism:
         parameters=parameters,
         parameter_span=np.eye(rows),
         parents=serial_parents(len(joints)),
+        coordinates=(),
         tip_body=len(joints) - 1,
     )
