@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.extra import extra_scale
-from psdmc.calibration.identify.least_squares import Estimate, Prior, estimate_rows
+from psdmc.calibration.identify.least_squares import Estimate, FitOptions, Prior, estimate_rows
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem
 from psdmc.calibration.identify.motor_model import Motors, RowsByMotors
@@ -93,13 +93,20 @@ def calibrate_linear(
     options = options or LinearOptions()
     motors = motors or Motors.torques(len(chain))
     checked_logs = [checked(log, chain, options.filter.cutoff, options.check) for log in logs]
+    remarks = tuple(note for log in checked_logs for note in log.notes)
+
+    def fitted(chosen: LinearOptions, carried: Array | None) -> LinearResult:
+        """One fit; `carried` (l,) are the base parameters of the load that friction depends on."""
+        problem, resting = linear_problem(chain, model, l, checked_logs, chosen, motors, progress, carried)
+        progress("linear fit: solving")
+        prior = linear_prior(chain, model, problem, chosen, theta_b)
+        return _solved(problem, prior, motors, chosen.fit, (*remarks, *resting))
+
     whole = options.columns
     first = whole if theta_b is not None else whole.without_load()
-    found = _fitted(
-        chain, model, l, checked_logs, replace(options, columns=first), motors, theta_b, theta_b, progress
-    )
+    found = fitted(replace(options, columns=first), theta_b)
     for _ in range(LOAD_ROUNDS if whole.by_load else 0):
-        found = _fitted(chain, model, l, checked_logs, options, motors, theta_b, found.theta_b, progress)
+        found = fitted(options, found.theta_b)
     return found
 
 
@@ -108,28 +115,16 @@ LOAD_ROUNDS = 2
 times the coefficient of friction, some hundredths."""
 
 
-def _fitted(
-    chain: Mechanism,
-    model: Regressor,
-    l: int,
-    logs: Sequence[AnyLog],
-    options: LinearOptions,
-    motors: Motors,
-    theta_b: Array | None,
-    carried: Array | None,
-    progress: Callable[[str], None],
+def _solved(
+    problem: LinearProblem, prior: Prior, motors: Motors, options: FitOptions, remarks: tuple[str, ...]
 ) -> LinearResult:
-    """One fit; `carried` (l,) are the base parameters of the load that friction depends on."""
-    problem, resting = linear_problem(chain, model, l, logs, options, motors, progress, carried)
-    progress("linear fit: solving")
-    kept = np.repeat(~problem.held_out[:, None], len(chain), axis=1)
-    prior = linear_prior(chain, model, problem, options, theta_b)
+    """The values that fit a problem's rows best, and what was remarked on the way."""
+    kept = np.repeat(~problem.held_out[:, None], len(problem.chain), axis=1)
     uncertain = motors.relative_covariance
     rows = problem.rows if uncertain is None else RowsByMotors(problem.rows, problem.torque)
-    solved = estimate_rows(rows, problem.torque, options.fit, uncertain, kept, prior)
-    notes = tuple(note for log in logs for note in log.notes)
-    warnings = (*notes, *resting, *noise_warnings("linear fit", chain.joint_names, solved))
-    return LinearResult(solved, problem, prior, motors, warnings)
+    solved = estimate_rows(rows, problem.torque, options, uncertain, kept, prior)
+    noisy = noise_warnings("linear fit", problem.chain.joint_names, solved)
+    return LinearResult(solved, problem, prior, motors, (*remarks, *noisy))
 
 
 def linear_prior(
