@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from bundled import bundled_model, bundled_robot
+from bundled import bundled_model
+from loaded_kr6 import motor_torques, sines
 
 import psdmc
 from psdmc.calibration.identify.known_load import KnownLoad
@@ -23,7 +24,6 @@ from psdmc.calibration.verdict.record import Calibration
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.reference import reference
 
 MASS, COM = 2.5, (0.1, -0.05, 0.08)
 INERTIA = np.diag([0.013, 0.011, 0.007])
@@ -50,23 +50,13 @@ class Recording:
 
 def record(path: Path, how: Recording, quantity: str = "current") -> Path:
     """The log of one motion, the same for every recording of the same joints and speed."""
-    rng = np.random.default_rng(1)
-    time = np.arange(0.0, how.seconds, 0.01)
-    rates, starts = how.quick * rng.uniform(0.5, 4.0, (4, 6)), rng.uniform(0.0, 6.0, (4, 6))
-    size = np.where(np.isin(np.arange(6), how.joints), 0.2, 0.0)
-    turning = np.einsum("t,kj->tkj", time, rates) + starts
-    q, qd = size * np.sin(turning).sum(axis=1), size * (rates * np.cos(turning)).sum(axis=1)
-    qdd = -size * (rates**2 * np.sin(turning)).sum(axis=1)
-    robot = reference(bundled_robot("kr6"))
-    if how.loaded:
-        tip = robot.model.frames[robot.model.getFrameId(robot.tip_name)]
-        body = pin.Inertia(MASS, np.array(how.com), INERTIA)
-        robot.model.appendBodyToJoint(tip.parentJoint, body, tip.placement)
-    torque = robot.inverse_dynamics(q, qd, qdd) + np.tanh(qd / 0.03) * (2.0 + np.abs(qd)) + 0.5
+    motion = sines(np.random.default_rng(1), how.seconds, joints=how.joints, quick=how.quick)
+    torque = motor_torques(motion, pin.Inertia(MASS, np.array(how.com), INERTIA) if how.loaded else None)
     noise = np.random.default_rng(how.seed)
     current = torque / np.array(how.constants) + NOISE * noise.normal(size=torque.shape)
-    q = q + noise.normal(scale=2e-6, size=q.shape)
-    write_log(Log(path.stem, bundled_model("kr6").joint_names, time, q, None, current, quantity), path)
+    q = motion.q + noise.normal(scale=2e-6, size=motion.q.shape)
+    names = bundled_model("kr6").joint_names
+    write_log(Log(path.stem, names, motion.time, q, None, current, quantity), path)
     return path
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from bundled import bundled_model, bundled_robot
+from bundled import bundled_model
+from loaded_kr6 import motor_torques, sines
 
 import psdmc
 from psdmc.calibration.logs.log import Log
@@ -18,7 +19,6 @@ from psdmc.calibration.payload_found import PayloadFound, read_load
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.reference import reference
 
 MASS, COM = 2.5, np.array([0.03, -0.02, 0.08])
 INERTIA = np.array([[0.013, 0.001, 0.001], [0.001, 0.011, 0.001], [0.001, 0.001, 0.007]])
@@ -38,22 +38,12 @@ class Run:
 
 def record(path: Path, how: Run, sign: float = 1.0) -> Path:
     rng = np.random.default_rng(how.seed)
-    time = np.arange(0.0, how.seconds, 0.01)
-    rates, starts = rng.uniform(0.5, 4.0, (4, 6)), rng.uniform(0.0, 6.0, (4, 6))
-    size = np.where(np.isin(np.arange(6), how.joints), how.amplitude, 0.0)
-    turning = np.einsum("t,kj->tkj", time, rates) + starts
-    q, qd = size * np.sin(turning).sum(axis=1), size * (rates * np.cos(turning)).sum(axis=1)
-    qdd = -size * (rates**2 * np.sin(turning)).sum(axis=1)
-    robot = reference(bundled_robot("kr6"))
-    if how.loaded:
-        tip = robot.model.frames[robot.model.getFrameId(robot.tip_name)]
-        robot.model.appendBodyToJoint(tip.parentJoint, pin.Inertia(MASS, COM, INERTIA), tip.placement)
-    torque = robot.inverse_dynamics(q, qd, qdd) + np.tanh(qd / 0.03) * (2.0 + np.abs(qd)) + 0.5
+    motion = sines(rng, how.seconds, how.amplitude, how.joints)
+    torque = motor_torques(motion, pin.Inertia(MASS, COM, INERTIA) if how.loaded else None)
     torque += rng.normal(size=torque.shape) * np.array([0.3, 0.3, 0.3, 0.03, 0.03, 0.03])
-    q = q + rng.normal(scale=2e-6, size=q.shape)
-    write_log(
-        Log(path.stem, bundled_model("kr6").joint_names, time, q, None, sign * torque, "motor_torque"), path
-    )
+    q = motion.q + rng.normal(scale=2e-6, size=motion.q.shape)
+    names = bundled_model("kr6").joint_names
+    write_log(Log(path.stem, names, motion.time, q, None, sign * torque, "motor_torque"), path)
     return path
 
 

@@ -150,19 +150,18 @@ stribeck = { speeds = [0.1], joints = ["joint_1"] }
 """
 
 
+def calibration(folder: Path, description: str) -> list[str]:
+    """The words that calibrate the KR6 by this description, both in `folder`."""
+    (folder / "log.toml").write_text(description, encoding="utf-8")
+    bundled_model("kr6").save(folder / "kr6.npz")
+    return ["calibrate", str(folder / "kr6.npz"), str(folder / "log.toml"), "-o", str(folder / "out.npz")]
+
+
 def test_a_description_s_springs_reach_the_calibrated_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_log(recorded(tmp_path / "coil.csv", (torsional_spring,), Run(seconds=20.0)), tmp_path / "coil.csv")
-    (tmp_path / "log.toml").write_text(LOG_TOML, encoding="utf-8")
-    bundled_model("kr6").save(tmp_path / "kr6.npz")
-    words = [
-        "calibrate",
-        str(tmp_path / "kr6.npz"),
-        str(tmp_path / "log.toml"),
-        "-o",
-        str(tmp_path / "out.npz"),
-    ]
+    words = calibration(tmp_path, LOG_TOML)
     with pytest.raises(SystemExit) as left:
         run([*words, "--report", str(tmp_path / "out.html")])
     assert not left.value.code, capsys.readouterr()
@@ -177,15 +176,7 @@ def test_a_description_s_springs_reach_the_calibrated_file(
 
 def test_a_wrong_table_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_log(recorded(tmp_path / "coil.csv", (), Run(seconds=5.0)), tmp_path / "coil.csv")
-    (tmp_path / "log.toml").write_text(LOG_TOML.replace("joint_3", "elbow\\u0007"), encoding="utf-8")
-    bundled_model("kr6").save(tmp_path / "kr6.npz")
-    words = [
-        "calibrate",
-        str(tmp_path / "kr6.npz"),
-        str(tmp_path / "log.toml"),
-        "-o",
-        str(tmp_path / "out.npz"),
-    ]
+    words = calibration(tmp_path, LOG_TOML.replace("joint_3", "elbow\\u0007"))
     with pytest.raises(SystemExit) as left:
         run(words)
     assert left.value.code == 2
