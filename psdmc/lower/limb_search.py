@@ -7,7 +7,7 @@ for all of its group; then exchanges are made in all limbs at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,10 +16,10 @@ from psdmc.dynamics.frames import BASE
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.factored import Arrangement
 from psdmc.lower.limb_frames import possible_groups
-from psdmc.lower.limbs import TracedLimbs, trace_limbs
+from psdmc.lower.limbs import TracedLimbs, cost_of_limbs, trace_limbs
 from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, Search, distinct, for_lanes, for_one_state
-from psdmc.program.cost import cost
-from psdmc.program.limb_program import LimbProgram, Stage
+from psdmc.program.limb_cost import StageCost, stage_costs
+from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.limb_stages import staged
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
@@ -40,24 +40,26 @@ BUDGET = 80
 
 def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
     """Cost of one call with vectors of that many lanes, in the same weights as a straight line's."""
+    return weight_of_stages(limbs.groups, stage_costs(limbs), lanes, costs)
+
+
+def weight_of_stages(
+    groups: Sequence[LimbGroup], stages: Iterable[StageCost], lanes: int, costs: Costs
+) -> float:
+    """The same of groups and the costs of their stages."""
     one, each = for_one_state(costs), for_lanes(costs)
-    groups = {group.number: group for group in limbs.groups}
+    parts_of = {group.number: -(-group.count // lanes) for group in groups}
     total = 0.0
-    for group in limbs.groups:
+    for group in groups:
         reals = group.count * (len(group.inputs) + len(group.outputs))
         total += costs.limb_real * reals
-    for stage in limbs.stages:
-        counted = cost(stage.program)
+    for stage in stages:
         if stage.group is None:
-            total += one.weight(counted)
+            total += one.weight(stage.cost)
             continue
-        group = groups[stage.group]
-        parts = -(-group.count // lanes)
-        own = {group.constant, group.kept} | {slot.vector for slot, _ in group.inputs}
-        shared = sum(slot.vector not in own for slot in stage.program.inputs())
-        sums = sum(slot.vector == group.partial for slot, _ in stage.program.outputs)
-        total += parts * (each.weight(counted) + costs.limb_shared * shared)
-        total += sums * (costs.limb_sum + parts - 1)
+        parts = parts_of[stage.group]
+        total += parts * (each.weight(stage.cost) + costs.limb_shared * stage.shared)
+        total += stage.sums * (costs.limb_sum + parts - 1)
     return total
 
 
@@ -115,9 +117,8 @@ class LimbSearch:
         return best
 
     def _weighed(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> _Candidate:
-        traced = self._traced(arrangement, groups)
-        limbs = LimbProgram(traced.groups, staged(traced.program, traced.groups))
-        return _Candidate(arrangement, groups, weight(limbs, self.lanes, self.costs))
+        found, stages = cost_of_limbs(self.recipe, arrangement, self.search.robot, groups)
+        return _Candidate(arrangement, groups, weight_of_stages(found, stages, self.lanes, self.costs))
 
     def _traced(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> TracedLimbs:
         return trace_limbs(self.recipe, arrangement, self.search.robot, groups)

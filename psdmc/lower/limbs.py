@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, product
+from itertools import accumulate, islice, product
 
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Scalar
@@ -14,9 +14,10 @@ from psdmc.lower.carriers import bodies_from_carriers
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
 from psdmc.lower.limb_frames import Place, one_limb, places
 from psdmc.program.lanes import Lanes
+from psdmc.program.limb_cost import StageCost, traced_stage_costs
 from psdmc.program.limb_program import LimbGroup, Spread
 from psdmc.program.passes.drop_unused import drop_unused
-from psdmc.program.program import Program, Slot
+from psdmc.program.program import Op, Program, Slot
 from psdmc.program.signature import Quantity
 from psdmc.program.trace import Symbol, Tracer, constants_of
 from psdmc.recipes.recipe import ByTheta, Recipe
@@ -39,12 +40,21 @@ def trace_limbs(
     return trace.needed(list(trace.outputs(trace.recorded())))
 
 
+def cost_of_limbs(
+    recipe: Recipe, arrangement: Arrangement, robot: RobotConstants, groups: Sequence[Limbs]
+) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:
+    """The groups of what trace_limbs would return, and what its stages cost."""
+    trace = _Trace(recipe, arrangement, robot, groups)
+    return trace.counted(list(trace.outputs(trace.recorded())))
+
+
 @dataclass(slots=True)
 class _Group:
     """A group while it is traced.
 
     stored    its slot for each value that it puts out
     partials  index of a value to the number of its sum
+    summed    index of a sum to that of its value
     """
 
     number: int
@@ -53,6 +63,7 @@ class _Group:
     outputs: list[Spread] = field(default_factory=list)
     stored: dict[Hashable, Slot] = field(default_factory=dict)
     partials: dict[int, int] = field(default_factory=dict)
+    summed: dict[int, int] = field(default_factory=dict)
 
     @property
     def vectors(self) -> LimbGroup:
@@ -85,24 +96,31 @@ class _Trace:
         return replace(frame, limbs=self._summing(self.groups[place.group]))
 
     def _summing(self, group: _Group) -> Callable[[Scalar], Scalar]:
+        names = group.vectors
+
         def total(value: Scalar) -> Scalar:
             if isinstance(value, Lanes):
                 return math.fsum(value.values)
             if not isinstance(value, Symbol) or self._kind(value.index) != group.number:
                 return value * group.count
             number = group.partials.setdefault(value.index, len(group.partials))
-            summed = self.tracer.symbol(Slot(group.vectors.sum, number))
+            summed = self.tracer.symbol(Slot(names.sum, number))
+            group.summed[summed.index] = value.index
             return -summed if value.negative else summed
 
         return total
 
     def _kind(self, index: int) -> int:
         """Number of the group that a value belongs to; -1: none."""
-        for i in range(len(self.kinds), index + 1):
-            slot = self.tracer.steps[i][1]
-            own = self.vectors.get(slot.vector, -1) if isinstance(slot, Slot) else -1
-            self.kinds.append(max([own, *(self.kinds[a] for a in self.tracer.arguments(i))]))
-        return self.kinds[index]
+        kinds = self.kinds
+        for op, a, b in islice(self.tracer.steps, len(kinds), index + 1):
+            if b is not None:
+                kinds.append(max(kinds[a], kinds[b]))
+            elif op is Op.LOAD:
+                kinds.append(self.vectors.get(a.vector, -1))
+            else:
+                kinds.append(-1 if op is Op.CONST else kinds[a])
+        return kinds[index]
 
     def recorded(self) -> Mapping[Slot, Scalar]:
         """What the recipe gives, by slots whose indices count places."""
@@ -178,6 +196,13 @@ class _Trace:
         for axis, index in zip(quantity.axes, indices, strict=True):
             flat = flat * self.first[axis][-1] + index
         return flat
+
+    def counted(self, outputs: list[tuple[Slot, Scalar]]) -> tuple[tuple[LimbGroup, ...], list[StageCost]]:
+        """The groups, and the cost of each stage, sums that nothing needs left out."""
+        groups = tuple(group.vectors for group in self.groups)
+        partial_of = {index: value for group in self.groups for index, value in group.summed.items()}
+        stored = self.tracer.stored(outputs)
+        return groups, traced_stage_costs(self.tracer.steps, stored, partial_of, groups)
 
     def needed(self, stored: list[tuple[Slot, Scalar]]) -> TracedLimbs:
         """The PROGRAM without sums that nothing needs."""

@@ -105,13 +105,13 @@ class Tracer:
 
     def finish(self, outputs: Outputs) -> Program:
         """The PROGRAM that stores the given values; a negative one costs a negation."""
-        stored = self._stored(outputs)
+        stored = self.stored(outputs)
         return Program(tuple(map(_instruction, self.steps)), tuple(stored))
 
     def cost(self, outputs: Outputs) -> Cost:
         """The cost of the PROGRAM that `finish` would give, values that no output needs left out. For searches, which
         only compare."""
-        stored = self._stored(outputs)
+        stored = self.stored(outputs)
         steps, uses = self.steps, [0] * len(self.steps)
         for _, index in stored:
             uses[index] += 1
@@ -144,7 +144,8 @@ class Tracer:
                 fused += 1
         return Cost(mul, len(sums), div, neg, len(angles), fused)
 
-    def _stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
+    def stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
+        """The outputs with the indices of their values, recorded where they are constants or negative."""
         stored: list[tuple[Slot, int]] = []
         for slot, value in outputs:
             if isinstance(value, Lanes):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,20 +16,24 @@ from whole_robots import ROBOTS, derived, lowered
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.frames import BASE
 from psdmc.functions import RECIPES
-from psdmc.lower.factored import trace_dynamics
+from psdmc.lower.factored import Arrangement, trace_dynamics
 from psdmc.lower.kernels import lower
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limb_search import weight
-from psdmc.lower.limbs import trace_limbs
+from psdmc.lower.limbs import cost_of_limbs, trace_limbs
 from psdmc.lower.search import Search, for_one_state
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
+from psdmc.program.cost import Cost
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
+from psdmc.program.limb_cost import StageCost, stage_costs
 from psdmc.program.limb_program import LimbProgram, unpacked
 from psdmc.program.limb_stages import staged
 from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
+from psdmc.recipes.recipe import Recipe
+from psdmc.robot.limbs import Limbs
 from psdmc.target.native import COSTS
 from psdmc.target.presets import SCALAR
 
@@ -75,6 +80,20 @@ def test_written_out_it_is_the_straight_line(name: str, function: str) -> None:
     )
 
 
+def worth_something(stages: Iterable[StageCost]) -> list[StageCost]:
+    """Stages that cost anything: those that only keep or load values are in no count."""
+    return [
+        each for each in stages if replace(each, group=None) != StageCost(None, Cost(0, 0, 0, 0, 0, 0), 0, 0)
+    ]
+
+
+def counted_without_cutting(
+    recipe: Recipe, arrangement: Arrangement, search: Search, groups: Sequence[Limbs]
+) -> list[StageCost]:
+    """What the search compares arrangements by."""
+    return worth_something(cost_of_limbs(recipe, arrangement, search.robot, groups)[1])
+
+
 @settings(max_examples=25, deadline=None)
 @given(
     seed=some.integers(0, 10_000),
@@ -103,7 +122,9 @@ def test_any_equal_limbs(
 
     for groups in ways:
         traced = trace_limbs(recipe, start, search.robot, groups)
-        found = unpacked(LimbProgram(traced.groups, staged(traced.program, traced.groups)))
+        cut = LimbProgram(traced.groups, staged(traced.program, traced.groups))
+        assert counted_without_cutting(recipe, start, search, groups) == worth_something(stage_costs(cut))
+        found = unpacked(cut)
         assert_same(
             values(found, function, model), wanted, SOLVED if function == "forward_dynamics" else 1e-12
         )

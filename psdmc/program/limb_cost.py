@@ -1,0 +1,224 @@
+"""What the stages of core and limbs cost, counted on PROGRAMs, or on a trace before it is one.
+
+A search weighs some hundred arrangements and cuts only the cheapest into stages. The count of a trace is that of the
+stages which `limb_stages.staged` would give.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from psdmc.errors import InternalError
+from psdmc.program.cost import Cost, cost
+from psdmc.program.limb_program import LimbGroup, LimbProgram
+from psdmc.program.program import Op, Slot
+from psdmc.program.trace import Step
+
+_ADD, _SUB, _MUL, _DIV, _NEG = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG
+_LOAD, _CONST, _SQRT = Op.LOAD, Op.CONST, Op.SQRT
+
+
+@dataclass(frozen=True, slots=True)
+class StageCost:
+    """Of one stage.
+
+    group   number of the group whose limbs compute it; None: the core does
+    cost    its operations, a limb's once
+    shared  values of the core that limbs read
+    sums    over the limbs
+    """
+
+    group: int | None
+    cost: Cost
+    shared: int
+    sums: int
+
+
+def stage_costs(limbs: LimbProgram) -> Iterator[StageCost]:
+    """Of a function that is cut into stages."""
+    groups = {group.number: group for group in limbs.groups}
+    for stage in limbs.stages:
+        counted = cost(stage.program)
+        if stage.group is None:
+            yield StageCost(None, counted, 0, 0)
+            continue
+        group = groups[stage.group]
+        own = {group.constant, group.kept} | {slot.vector for slot, _ in group.inputs}
+        shared = sum(slot.vector not in own for slot in stage.program.inputs())
+        sums = sum(slot.vector == group.partial for slot, _ in stage.program.outputs)
+        yield StageCost(stage.group, counted, shared, sums)
+
+
+def traced_stage_costs(
+    steps: Sequence[Step],
+    stored: Sequence[tuple[Slot, int]],
+    partial_of: Mapping[int, int],
+    groups: Sequence[LimbGroup],
+) -> list[StageCost]:
+    """Of a trace's steps that its outputs need.
+
+    stored      outputs of core and limbs, partial sums left out
+    partial_of  index of a loaded sum to that of the value which it sums
+    InternalError where limbs of two groups meet in one value, or a limb's value is stored as the core's.
+    """
+    needed, partials = _needed(steps, stored, partial_of)
+    return _Count(steps, partial_of, groups).of(needed, stored, partials)
+
+
+def _needed(
+    steps: Sequence[Step], stored: Sequence[tuple[Slot, int]], partial_of: Mapping[int, int]
+) -> tuple[bytearray, list[int]]:
+    """Which steps some output needs, through sums, too, and the values that are summed. A value precedes its sum."""
+    needed, partials = bytearray(len(steps)), []
+    for _, index in stored:
+        needed[index] = 1
+    for i in range(len(steps) - 1, -1, -1):
+        if not needed[i]:
+            continue
+        op, a, b = steps[i]
+        if b is not None:
+            needed[a] = needed[b] = 1
+        elif op is _LOAD:
+            if i in partial_of:
+                partials.append(partial_of[i])
+                needed[partial_of[i]] = 1
+        elif op is not _CONST:
+            needed[a] = 1
+    return needed, partials
+
+
+@dataclass(slots=True)
+class _Stage:
+    """Counts of a stage.
+
+    added   arguments of its sums and differences
+    angles  whose sine or cosine is taken
+    shared  core's values that it reads
+    """
+
+    mul: int = 0
+    div: int = 0
+    neg: int = 0
+    sums: int = 0
+    added: list[tuple[int, int]] = field(default_factory=list)
+    angles: set[int] = field(default_factory=set)
+    shared: set[int] = field(default_factory=set)
+
+
+class _Count:
+    """A stage is a number: sums that lie before it, times groups and core, plus its group; the core is the first."""
+
+    def __init__(
+        self, steps: Sequence[Step], partial_of: Mapping[int, int], groups: Sequence[LimbGroup]
+    ) -> None:
+        self.steps, self.partial_of, self.kinds = steps, partial_of, len(groups) + 1
+        self.owner = {
+            vector: group.number + 1
+            for group in groups
+            for vector in (group.constant, *(slot.vector for slot, _ in (*group.inputs, *group.outputs)))
+        }
+        self.place = [0] * len(steps)
+        self.is_free = bytearray(len(steps))  # constants and loads that every stage may make
+        self.uses = [0] * len(steps)  # within the value's own stage
+        self.crossing: set[int] = set()
+        self.stages: dict[int, _Stage] = {}
+
+    def of(
+        self, needed: bytearray, stored: Sequence[tuple[Slot, int]], partials: Sequence[int]
+    ) -> list[StageCost]:
+        for i, step in enumerate(self.steps):
+            if needed[i]:
+                self._count(i, step)
+        for slot, index in stored:
+            self._store(index, self.owner.get(slot.vector, 0))
+        for index in partials:
+            self._store(index, self.place[index] % self.kinds)
+            self._stage(self.place[index]).sums += 1
+        for index in self.crossing:
+            self.uses[index] += 1
+        return [self._cost(place) for place in sorted(self.stages)]
+
+    def _count(self, i: int, step: Step) -> None:
+        op, a, b = step
+        if op is _CONST:
+            self.is_free[i] = 1
+        elif op is _LOAD:
+            self._load(i, a)
+        elif b is None:
+            place = self.place[i] = self.place[a]
+            stage = self._stage(place)
+            self._read(a, place)
+            if op is _NEG:
+                stage.neg += 1
+            elif op is _SQRT:
+                stage.div += 1
+            else:
+                stage.angles.add(a)
+        else:
+            place = self.place[i] = self._meeting(self.place[a], self.place[b])
+            stage = self._stage(place)
+            self._read(a, place)
+            self._read(b, place)
+            if op is _MUL:
+                stage.mul += 1
+            elif op is _DIV:
+                stage.div += 1
+            else:
+                stage.added.append((a, b))
+
+    def _load(self, i: int, slot: Slot) -> None:
+        summed = self.partial_of.get(i)
+        if summed is not None:
+            level = self.place[summed] // self.kinds
+            self.place[i] = (level + 1) * self.kinds
+        else:
+            self.place[i] = self.owner.get(slot.vector, 0)
+        self.is_free[i] = summed is not None or slot.vector in self.owner
+
+    def _meeting(self, one: int, other: int) -> int:
+        """The stage of a value that is computed from two stages' values."""
+        if one == other:
+            return one
+        kinds = self.kinds
+        group, second = one % kinds, other % kinds
+        if group and second and group != second:
+            raise InternalError("limbs of two groups meet in one value")
+        return max(one // kinds, other // kinds) * kinds + max(group, second)
+
+    def _stage(self, place: int) -> _Stage:
+        found = self.stages.get(place)
+        if found is None:
+            found = self.stages[place] = _Stage()
+        return found
+
+    def _read(self, value: int, place: int) -> None:
+        """A stage reads a value: its own, one that crosses, or one that is there for all."""
+        own = self.place[value]
+        if not self.is_free[value]:
+            if own == place:
+                self.uses[value] += 1
+                return
+            self.crossing.add(value)
+        elif self.steps[value][0] is _CONST:
+            return
+        if place % self.kinds and not own % self.kinds:
+            self.stages[place].shared.add(value)
+
+    def _store(self, value: int, group: int) -> None:
+        level, own = divmod(self.place[value], self.kinds)
+        if own and not group:
+            raise InternalError("a value that differs from limb to limb is stored as the core's")
+        place = level * self.kinds + group
+        self._stage(place)
+        self._read(value, place)
+
+    def _cost(self, place: int) -> StageCost:
+        stage, group = self.stages[place], place % self.kinds
+        fused = sum(self._absorbs(a, place) or self._absorbs(b, place) for a, b in stage.added)
+        counted = Cost(stage.mul, len(stage.added), stage.div, stage.neg, len(stage.angles), fused)
+        return StageCost(group - 1 if group else None, counted, len(stage.shared), stage.sums)
+
+    def _absorbs(self, value: int, place: int) -> bool:
+        """Whether a value is a product that nothing else in its stage uses."""
+        return self.steps[value][0] is _MUL and self.uses[value] == 1 and self.place[value] == place
