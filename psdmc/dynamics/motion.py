@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 from psdmc.dynamics.frames import (
     BASE,
+    IDENTITY,
     NO_TURN,
     Angle,
     Frame,
@@ -183,8 +184,7 @@ def _turned_field(frame: Frame, spin: Spin) -> Spin:
 def _permuted_differences(rotation: Matrix, spin: Spin, field: Matrix) -> Vector:
     """The differences of the turned field: the old ones in another order where axes map to axes, else from the
     diagonal."""
-    columns = transpose(rotation)
-    axes = [next((k for k in range(3) if abs(column[k]) == 1.0), -1) for column in columns]
+    axes = [_axis(column) for column in transpose(rotation)]
     known = {(2, 1): spin.differences[0], (0, 2): spin.differences[1], (1, 0): spin.differences[2]}
     known |= {(b, a): -value for (a, b), value in known.items()}
 
@@ -193,6 +193,12 @@ def _permuted_differences(rotation: Matrix, spin: Spin, field: Matrix) -> Vector
         return known[pair] if pair in known else field[a][a] - field[b][b]
 
     return (difference(2, 1), difference(0, 2), difference(1, 0))
+
+
+def _axis(direction: Vector) -> int:
+    """Which axis a direction is, either way; -1 where it is none. Beside a cosine that is 1.0, a sine may be 1e-9."""
+    sizes = tuple(map(abs, direction))
+    return IDENTITY.index(sizes) if sizes in IDENTITY else -1
 
 
 class _Group(NamedTuple):
