@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-processes test-trees test-demo test-accuracy test-targets test-lowest test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-lowest test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -36,8 +36,11 @@ demo: $(READY) ## derive, emit, build, check and benchmark the bundled Denso VS-
 	$(PSDMC) check $(GENERATED)/denso_wall.npz
 	$(RUN)/python -m psdmc.bench.demo $(GENERATED)/denso_wall.npz
 
-test: $(READY) ## run all tests
-	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal tests
+test: $(READY) ## run the tests, but for what the other test- targets take
+	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' tests
+
+test-slow: $(READY) ## the cases that make test leaves out: further robots, builds, tools and seeds of the same tests; CI runs it
+	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m slow tests
 
 COVERED ?= tests
 coverage: $(READY) ## run all tests (COVERED='tests/program tests/model': these) and say which share of each file they run

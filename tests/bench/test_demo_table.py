@@ -27,6 +27,7 @@ def test_errors_are_those_of_rounding():
     assert found["inverse_dynamics"] < 1e-12
 
 
+@pytest.mark.slow
 def test_the_table_without_a_cpp_compiler(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("CXX", "no-such-compiler")
     monkeypatch.setattr(demo, "SETTINGS", replace(demo.SETTINGS, rounds=1))

@@ -162,6 +162,7 @@ def test_instructions_are_counted_over_longer_positions(bird: Case) -> None:
     assert 20.0 < counted[str(one.library), "gravity"] < 5000.0
 
 
+@pytest.mark.slow
 def test_psdmc_alone_is_measured_where_joints_follow_others() -> None:
     chain = load_robot_text(PAIR, "urdf").mechanism
     case = Case("pair", derive_model(chain))

@@ -135,9 +135,9 @@ def test_the_committed_baseline_names_every_standard_robot_and_function():
         assert list(functions) == [name for name in psdmc_c.FUNCTIONS if not name.endswith(left_out)]
 
 
-@pytest.mark.parametrize("name", ["KR6", "UR5", "Panda", *(["generic 6R", "solo12"] if WHOLE else [])])
+@pytest.mark.parametrize("name", ["KR6", *(["UR5", "Panda", "generic 6R", "solo12"] if WHOLE else [])])
 def test_no_operation_more_than_the_committed_baseline(name):
-    """A wrist, parallel axes, seven joints; `make test-accuracy` takes oblique axes and a quadruped too, whose operations
+    """A wrist; `make test-accuracy` takes parallel axes, seven joints, oblique axes and a quadruped too, whose operations
     test_floating_robots.py bounds, `make bench-compare` every standard robot."""
     text, passed = compare(committed(), count([case_of(name)], with_instructions=False))
 

@@ -29,6 +29,7 @@ def test_a_rival_that_cannot_be_built_says_why(two_link):
     ]
 
 
+@pytest.mark.slow
 def test_without_compiler_nobody_is_dropped_silently(two_link, monkeypatch, tmp_path):
     monkeypatch.setenv("CXX", "no-such-compiler")
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))

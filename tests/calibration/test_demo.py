@@ -12,10 +12,7 @@ from psdmc.calibration.truth import Comparison
 from psdmc.report.calibrate_demo import run_demo
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(os.environ.get("PSDMC_DEMO") != "whole", reason="make test-demo takes it"),
-]
+pytestmark = pytest.mark.skipif(os.environ.get("PSDMC_DEMO") != "whole", reason="make test-demo takes it")
 
 
 def found(variant: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Comparison:

@@ -16,6 +16,7 @@ from campaign_reference import Reference, random_states
 from campaign_robots import LARGEST, STYLES, TILTS, random_robot
 from campaign_run import is_lowered, outcome, seed_range
 from campaign_trees import FEWEST, MOST, random_tree
+from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
 from psdmc.derivation.derive import derive_model
@@ -34,12 +35,15 @@ def failing(seed: int, *, lowered: bool = False) -> dict[str, float]:
     return failures(measured(seed, STATES, lowered=lowered).errors)
 
 
-@pytest.mark.parametrize("seed", [seed for seed in SEEDS if len(random_robot(seed).joints) < EXPANDED_JOINTS])
+SMALL = [seed for seed in SEEDS if len(random_robot(seed).joints) < EXPANDED_JOINTS]
+
+
+@pytest.mark.parametrize("seed", slow_but_for(SMALL[:12], SMALL))
 def test_a_random_robot(seed: int) -> None:
     assert failing(seed) == {}
 
 
-@pytest.mark.parametrize("seed", TREES)
+@pytest.mark.parametrize("seed", slow_but_for(TREES[:6], TREES))
 def test_a_random_tree(seed: int) -> None:
     found = measured(seed, STATES, lowered=False)
     assert failures(found.errors) == {}
@@ -85,7 +89,10 @@ def test_a_robot_beyond_the_declared_limits_is_refused_by_them() -> None:
     assert found.errors == {}
 
 
-@pytest.mark.parametrize("seed", [2035, 2057, 2207, 4387])
+WRONG = [2035, 2057, 2207, 4387]
+
+
+@pytest.mark.parametrize("seed", slow_but_for([2057], WRONG))
 def test_robots_whose_programs_the_campaign_found_wrong(
     seed: int, tmp_path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,7 +137,7 @@ def assert_right_when_lowered(seed: int) -> None:
         assert any(f"PROGRAM factored {function} batch" in what for what in errors)
 
 
-@pytest.mark.parametrize("mixed", [False, True])
+@pytest.mark.parametrize("mixed", slow_but_for([True], [False, True]))
 def test_a_random_robot_lowered_and_compiled(mixed: bool, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
     robots = map(random_robot, range(400))

@@ -21,7 +21,7 @@ from psdmc.robot.reference import reference
 
 ACCURACY = 1e-12
 whole = pytest.mark.skipif(os.environ.get("PSDMC_ACCURACY") != "whole", reason="make test-accuracy takes it")
-"""E and P of seven oblique joints are a hundred thousand monomials; six joints go the same way."""
+"""E and P of seven oblique joints are a hundred thousand monomials; six joints, two of them sliding, go the same way."""
 BUNDLED = (
     "two_link",
     "two_link_full",
@@ -71,7 +71,8 @@ def test_random_chains(seed: int, kinds: str, tidy: bool, weightless: bool) -> N
 
 
 @pytest.mark.parametrize(
-    ("seed", "kinds"), [(1, "RRRRRR"), (2, "RPRRPR"), pytest.param(3, "RRRRRRR", marks=whole)]
+    ("seed", "kinds"),
+    [(2, "RPRRPR"), *(pytest.param(*case, marks=whole) for case in ((1, "RRRRRR"), (3, "RRRRRRR")))],
 )
 def test_oblique_axes(seed: int, kinds: str) -> None:
     chain = random_chain(seed, kinds)

@@ -22,8 +22,8 @@ from psdmc.robot.joints import PRISMATIC, REVOLUTE, JointType
 
 ACCURACY = 1e-12
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
-"""`make test-accuracy`: each chain with and without E and P, and twice as many tilts."""
-TILTS = (0.0, *(10.0**k for k in np.arange(-10.0, -0.9, 0.5 if WHOLE else 1.0)))
+"""`make test-accuracy`: each chain with and without E and P, and four times as many tilts."""
+TILTS = (0.0, *(10.0**k for k in np.arange(-10.0, -0.9, 0.5 if WHOLE else 2.0)))
 
 
 @pytest.mark.parametrize("kinds", ["RR", "RRR", "RRRP", "RPRR"])

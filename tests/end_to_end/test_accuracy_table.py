@@ -2,7 +2,7 @@
 compiled C against Pinocchio.
 
 `pytest tests/end_to_end/test_accuracy_table.py -rP` prints the largest error of each function on each robot;
-`make test-accuracy` takes all of them and compiles them as psdmc.compile does, `make test` one of each kind.
+`make test-accuracy` takes all of them and compiles them as psdmc.compile does, `make test` one of each kind, and C of few.
 """
 
 from __future__ import annotations
@@ -29,10 +29,13 @@ FEW = 100
 """States at which generic robots' other functions are evaluated from E and P: theirs are the largest."""
 
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
-LIKE_ANOTHER = ("UR10", "Z1", "Kinova", "Panda", "denso_floor", "generic 7R")
-"""Robots that differ from UR5, kr6, lbr7, denso_wall and generic 6R in lengths, gravity or their count of joints alone."""
+LIKE_ANOTHER = ("UR10", "Z1", "Kinova", "Panda", "denso_floor", *GENERIC)
+"""Robots that differ from UR5, kr6, lbr7 and denso_wall in lengths, gravity or their count of joints alone; chains with
+oblique axes are in tests/derivation/test_derived_torques.py."""
 
 SHOWN = NAMES if WHOLE else tuple(name for name in NAMES if name not in LIKE_ANOTHER)
+IN_C = NAMES if WHOLE else ("two_link", "scara", "rounded_arm", "kr6")
+"""Two joints, a sliding one, numbers that are rounded, a whole arm."""
 OPTIMISED = NAMES if WHOLE else ("two_link", "scara")
 """Robots whose C is compiled with optimisation. What the C of the others says is compiled without, in a fifth of the
 time."""
@@ -57,7 +60,7 @@ def test_the_model_in_numpy(name: str):
     assert not too_large(told(robot.label, found))
 
 
-@pytest.mark.parametrize("name", NAMES if WHOLE else tuple(name for name in SHOWN if name not in GENERIC))
+@pytest.mark.parametrize("name", IN_C)
 def test_its_program_and_its_c(name: str):
     robot = subject(name, expand=name not in GENERIC)  # E and P of those are too large to be lowered
     questions = Questions(robot)

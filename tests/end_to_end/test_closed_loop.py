@@ -112,6 +112,7 @@ def test_torques_stay_within_the_efforts_of_the_file(example: Any) -> None:
         assert np.any(np.abs(tau) == effort)
 
 
+@pytest.mark.slow
 def test_three_commands_take_a_urdf_to_the_running_loop(tmp_path: Path) -> None:
     """As examples/README.md prints them, but into another folder."""
     text = (ROOT / "examples" / "README.md").read_text(encoding="utf-8")

@@ -8,12 +8,13 @@ from pathlib import Path
 import pytest
 from bundled import robot_path
 from command_line import files_in, typed
+from slow_cases import slow_but_for
 
 SEEDS = {"two_link": ("0", "1", "4242"), "denso_wall": ("0", "4242")}
 """Of each robot: of the larger one, whose emission takes seconds, two."""
 
 
-@pytest.mark.parametrize("name", SEEDS)
+@pytest.mark.parametrize("name", slow_but_for(["two_link"], SEEDS))
 def test_same_model_and_same_c(name: str, tmp_path: Path):
     made = []
     for seed in SEEDS[name]:
@@ -33,7 +34,7 @@ def test_same_model_and_same_c(name: str, tmp_path: Path):
         assert [path for path, content in other.items() if content != made[0][path]] == []
 
 
-@pytest.mark.parametrize("name", ["kr6", "rounded_arm"])
+@pytest.mark.parametrize("name", slow_but_for(["rounded_arm"], ["kr6", "rounded_arm"]))
 def test_another_processors_blas_gives_the_same_operations(name: str, tmp_path: Path):
     """Last digits of BLAS differ between processors; which numbers are zero, one or equal must not."""
     cpu = Path("/proc/cpuinfo")

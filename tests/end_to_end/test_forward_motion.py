@@ -111,6 +111,7 @@ def _free(time: float, q: Array, qd: Array) -> Array:
     return np.zeros(N)
 
 
+@pytest.mark.slow
 def test_a_led_motion_is_pinocchios_for_ten_seconds(compiled: Accelerations, arm: PinocchioArm) -> None:
     own, reference = _motion(compiled, _led, arm), _motion(arm.accelerations, _led, arm)
     assert own.kinetic.max() > 10.0  # J: the arm does move

@@ -18,6 +18,7 @@ from bundled import bundled_model, robot_path
 from command_line import files_in, started, typed
 from full_disk import files_of_at_most
 from killable import run
+from slow_cases import slow_but_for
 from test_killed import a_log, built_package
 
 from psdmc.bench.machine import this_machine
@@ -47,7 +48,7 @@ COMMANDS = {
 }
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", slow_but_for(["emit-c"], COMMANDS))
 def test_a_full_disk_is_one_line_and_the_old_files(name: str, tmp_path: Path):
     words, prepare = COMMANDS[name]
     folder = tmp_path / "work"

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from command_line import typed
+from slow_cases import slow_but_for
 from test_tree_commands import joint, link
 from unoptimised import without_optimisation, wrapper
 
@@ -69,13 +70,17 @@ def test_check_passes_with_both_readers(work: Path) -> None:
     assert "and with MuJoCo" in done.stdout
 
 
-def test_its_package_has_an_entry_for_each_coordinate_and_passes_its_own_test(work: Path) -> None:
-    done = typed("emit-c", "gripper.npz", "-o", "gripper", "--functions", "all", cwd=work)
+@pytest.mark.parametrize("functions", slow_but_for(["default"], ["default", "all"]))
+def test_its_package_has_an_entry_for_each_coordinate_and_passes_its_own_test(
+    work: Path, tmp_path: Path, functions: str
+) -> None:
+    folder = tmp_path / "gripper"
+    done = typed("emit-c", "gripper.npz", "-o", folder, "--functions", functions, cwd=work)
     assert done.returncode == 0, done.stderr
-    header = (work / "gripper/include/gripper/gripper.h").read_text(encoding="utf-8")
+    header = (folder / "include/gripper/gripper.h").read_text(encoding="utf-8")
     assert "#define gripper_DOF 3" in header
     assert "right follows left: q = -0.8 q_left + 0.02" in header
-    built = typed("build", "gripper", cwd=work, CC=str(wrapper(work)))
+    built = typed("build", folder, cwd=work, CC=str(wrapper(tmp_path)))
     assert built.returncode == 0, built.stderr
     assert "self-test passed" in built.stdout
 

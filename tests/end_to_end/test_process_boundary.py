@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from bundled import robot_path
 from command_line import files_in, started, status
+from slow_cases import slow_but_for
 
 from psdmc.toolchain.cache_entry import is_sound
 
@@ -148,16 +149,15 @@ def test_a_closed_error_output_is_no_traceback(tmp_path: Path):
 # text
 
 
-@pytest.mark.parametrize(
-    "environment",
-    [
-        {"LC_ALL": "C"},
-        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-        {"PYTHONIOENCODING": "ascii"},
-        {"PYTHONIOENCODING": "latin-1"},
-    ],
-    ids=str,
-)
+TERMINALS = [
+    {"LC_ALL": "C"},
+    {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    {"PYTHONIOENCODING": "ascii"},
+    {"PYTHONIOENCODING": "latin-1"},
+]
+
+
+@pytest.mark.parametrize("environment", slow_but_for(TERMINALS[1:2], TERMINALS), ids=str)
 def test_any_name_on_any_terminal(environment: dict[str, str], tmp_path: Path):
     text = robot_path("scara").read_text(encoding="utf-8")
     named = text.replace('name = "J1"', 'name = "Gelenk_ü_関節"')

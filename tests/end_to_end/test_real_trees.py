@@ -11,6 +11,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 from real_trees import ROBOTS, RealTree, error
+from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
 import psdmc
@@ -121,7 +122,7 @@ def test_mujoco_says_the_same(tree) -> None:
     assert share <= MUJOCO
 
 
-@pytest.mark.parametrize("name", ROBOTS if WHOLE else COMPILED)
+@pytest.mark.parametrize("name", ROBOTS if WHOLE else slow_but_for(["quadruped.urdf"], COMPILED))
 def test_compiled_functions(name: str) -> None:
     robot = RealTree(name)
     with nullcontext() if WHOLE else without_optimisation():

@@ -72,6 +72,7 @@ def test_crocoddyl_finds_the_same_motion(kr6: ilqr.Problem) -> None:
     assert theirs == pytest.approx(own, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_the_step_of_a_1_khz_controller_compiles_and_arrives(tmp_path: Path) -> None:
     if shutil.which("g++") is None or shutil.which("make") is None:
         pytest.skip("g++ or make is not installed")

@@ -1,6 +1,6 @@
 """examples/trotting: a quadruped in MuJoCo under the whole-body controller in C, held against Pinocchio and MuJoCo.
 
-PSDMC_TREES=whole (make test-trees): ten seconds with a push; else two without one."""
+PSDMC_TREES=whole (make test-trees): ten seconds with a push; else (make test-slow) two without one."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 pytest.importorskip("osqp")
+pytestmark = pytest.mark.slow
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "trotting"
 WHOLE = os.environ.get("PSDMC_TREES") == "whole"

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_chains import Oracle, random_chain, relative_error, states
 from scipy.spatial.transform import Rotation
+from slow_cases import slow_but_for
 
 from psdmc.dynamics.solve import SingularMassMatrix, factorize
 from psdmc.functions import RECIPES
@@ -51,9 +52,16 @@ def test_inverse_dynamics_of_any_chain_in_any_arrangement(seed, kinds, tidy):
             assert relative_error(found, expected) < 1e-11
 
 
-@pytest.mark.parametrize("kinds", ["RRRRRR", "RRPRRR", "RRRRRRR", "RPRRRPRRRR"])
-@pytest.mark.parametrize("tidy", [False, True])
-@pytest.mark.parametrize("baked", [False, True])
+CHAINS = [
+    (kinds, tidy, baked)
+    for baked in (False, True)
+    for tidy in (False, True)
+    for kinds in ("RRRRRR", "RRPRRR", "RRRRRRR", "RPRRRPRRRR")
+]
+QUICK = [("RRPRRR", False, True), ("RRRRRR", True, False), ("RRRRRRR", True, True)]
+
+
+@pytest.mark.parametrize(("kinds", "tidy", "baked"), slow_but_for(QUICK, CHAINS, spread=True))
 def test_every_function_against_pinocchio(kinds, tidy, baked):
     chain = random_chain(7, kinds, tidy=tidy)
     n, oracle = len(chain), Oracle(chain)

@@ -10,6 +10,7 @@ import pytest
 from bundled import bundled_model
 from pinocchio_robots import robot_at_hand
 from random_trees import TREES, RandomTree, assert_near
+from slow_cases import slow_but_for
 from whole_robots import ROBOTS, WHOLE, derived, lowered
 
 from psdmc.derivation.derive import derive_model
@@ -152,7 +153,10 @@ def test_operations(name: str, floating: bool) -> None:
     assert not {f: count for f, count in found.items() if count > AT_MOST[name, f]}
 
 
-@pytest.mark.parametrize(("name", "floating"), [*ROBOTS, ("baxter", False), ("talos", True)])
+BOTH_WAYS = [*ROBOTS, ("baxter", False), ("talos", True)]
+
+
+@pytest.mark.parametrize(("name", "floating"), slow_but_for(ROBOTS[1:], BOTH_WAYS, spread=True))
 def test_both_ways_to_accelerations_give_the_same_and_the_cheaper_is_taken(name: str, floating: bool) -> None:
     robot, model = derived(name, floating)
     search = Search(robot.mechanism, model.representative, model.theta_b, budget=12)
@@ -197,9 +201,19 @@ def test_e_and_p_of_a_free_root_are_refused() -> None:
         derive_model(robot.mechanism, expand=True)
 
 
-@pytest.mark.parametrize("parents", [TREES["a fork"], TREES["a trunk with two arms"], TREES["interleaved"]])
-@pytest.mark.parametrize("kinds", ["FRPRRRRR", "SRFRPLTR", "RPLSRFRR", "TLRRSRRF"])
-@pytest.mark.parametrize("parallel", [0.0, 0.6])
+SHAPES = ("a fork", "a trunk with two arms", "interleaved")
+KINDS = ("FRPRRRRR", "SRFRPLTR", "RPLSRFRR", "TLRRSRRF")
+EVERY_TYPE = [
+    (TREES[shape], kinds, parallel) for parallel in (0.0, 0.6) for kinds in KINDS for shape in SHAPES
+]
+QUICK = [
+    (TREES[shape], kinds, parallel)
+    for shape, kinds, parallel in zip((*SHAPES, SHAPES[0]), KINDS, (0.0, 0.6, 0.6, 0.6), strict=True)
+]
+"""Every shape and every order of types once."""
+
+
+@pytest.mark.parametrize(("parents", "kinds", "parallel"), slow_but_for(QUICK, EVERY_TYPE, spread=True))
 def test_lowered_trees_with_joints_of_every_type_are_pinocchios(parents, kinds: str, parallel: float) -> None:
     """Wherever frames sit: those of joints of several coordinates stay, others are turned and moved towards them."""
     tree = RandomTree(41, parents, kinds, parallel)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from slow_cases import slow_but_for
 
 from psdmc.compiler import derive
 from psdmc.errors import InputError
@@ -332,7 +333,10 @@ def balled(seed: int) -> str:
     return re.sub(r"(<joint [^>]*/>)+", last_turns, random_mjcf(seed))
 
 
-@pytest.mark.parametrize("text", [BALLS, *map(balled, (0, 1, 2, 3, 4, 6, 7, 8))])
+BALLED = [BALLS, *map(balled, (0, 1, 2, 3, 4, 6, 7, 8))]
+
+
+@pytest.mark.parametrize("text", slow_but_for(BALLED[:3], BALLED))
 def test_ball_joints_turn_as_mujocos(text: str, tmp_path: Path) -> None:
     """Alone on a body, before and behind other joints, about other points than the body's origin."""
     robot = balls_agree(written(tmp_path, text))

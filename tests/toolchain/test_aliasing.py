@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from direct import Direct, shared_library, states
+from slow_cases import slow_but_for
 from traced import SIZES, L, N, arm, arm_kernels, arm_package
 
 from psdmc.emit.options import EmitOptions
@@ -24,9 +25,10 @@ OPTIMISED = ("float64", "vectors")
 
 
 CASES = [("float64", "vectors"), ("float64", "plain"), ("float32", "vectors"), ("float64", "parts")]
+QUICK = [OPTIMISED, ("float64", "parts")]
 
 
-@pytest.fixture(scope="module", params=CASES, ids=" ".join)
+@pytest.fixture(scope="module", params=slow_but_for(QUICK, CASES), ids=" ".join)
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     real, build = request.param
     with pytest.MonkeyPatch.context() as patch:

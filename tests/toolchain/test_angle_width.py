@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from direct import write_sources
+from slow_cases import slow_but_for
 from traced import arm_package
 
 from psdmc.emit.options import EmitOptions
@@ -49,14 +50,17 @@ def one_state_has_wide_vectors(folder: Path, *flags: str) -> bool:
     return "%zmm" in one[1]
 
 
-@pytest.mark.parametrize("target", ["native", "x86-64-v4"])
+@pytest.mark.parametrize("target", slow_but_for(["native"], ["native", "x86-64-v4"]))
 def test_one_state_has_vectors_of_64_bytes_only_where_they_cost_nothing(target: str, tmp_path: Path) -> None:
     folder = made(tmp_path, target)
     assert not one_state_has_wide_vectors(folder)
     assert one_state_has_wide_vectors(folder, ON_ZEN)
 
 
-@pytest.mark.parametrize("flags", [["-march=native"], ["-march=native", ON_ZEN], ["-g0"]], ids=" ".join)
+WIDTHS = [["-march=native"], ["-march=native", ON_ZEN], ["-g0"]]
+
+
+@pytest.mark.parametrize("flags", slow_but_for(WIDTHS[:1], WIDTHS), ids=" ".join)
 def test_any_number_of_angles_near_and_far(flags: list[str], tmp_path: Path) -> None:
     folder = made(tmp_path, "native")
     calls = [f"    sincos_reals({n}, angle, sine + {n * MOST}, cosine + {n * MOST});" for n in range(1, MOST)]

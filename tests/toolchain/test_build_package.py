@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from slow_cases import slow_but_for
 from traced import arm_kernels, arm_package, arm_references
 from unoptimised import wrapper
 
@@ -23,6 +24,8 @@ from psdmc.errors import InputError, ToolchainError
 from psdmc.toolchain.build_package import UNFINISHED, build_package
 
 NAMES = ["inverse_dynamics", "forward_dynamics"]
+NANS = ["inverse_dynamics", "forward_dynamics_theta"]
+BUILD_TOOLS = ["cmake", "make"]
 
 
 def _need(*programs: str) -> None:
@@ -96,7 +99,7 @@ def _spoilt(name: str, value: float) -> ReferenceStates:
 
 
 @pytest.mark.usefixtures("unoptimised")
-@pytest.mark.parametrize("tool", ["cmake", "make"])
+@pytest.mark.parametrize("tool", slow_but_for(["cmake"], BUILD_TOOLS))
 def test_a_failed_self_test_says_which_checks_failed_and_by_how_much(
     tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -139,13 +142,13 @@ def test_a_self_test_that_dies_is_not_called_failed_checks(tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("unoptimised")
-@pytest.mark.parametrize("name", ["inverse_dynamics", "forward_dynamics_theta"])
+@pytest.mark.parametrize("name", slow_but_for(["forward_dynamics_theta"], NANS))
 def test_a_self_test_does_not_let_a_nan_pass(name: str, tmp_path: Path) -> None:
     with pytest.raises(ToolchainError, match=rf"{name}, rows: error nan"):
         build_package(_emit(tmp_path / "arm", _spoilt(name, np.nan)))
 
 
-@pytest.mark.parametrize("flags", ["-O2", "-Ofast"])
+@pytest.mark.parametrize("flags", slow_but_for(["-Ofast"], ["-O2", "-Ofast"]))
 def test_a_function_that_gives_no_number_fails_whatever_the_compiler_assumes(
     flags: str, tmp_path: Path
 ) -> None:
@@ -186,7 +189,7 @@ def test_the_self_test_checks_whatever_was_emitted(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("unoptimised")
-@pytest.mark.parametrize("real", ["float64", "float32"])
+@pytest.mark.parametrize("real", slow_but_for(["float64"], ["float64", "float32"]))
 def test_the_self_test_checks_functions_that_add_loads(real: Any, tmp_path: Path) -> None:
     """At the tip and at every frame; a fault in the matrix of one frame is seen."""
     _need("make")
@@ -255,9 +258,10 @@ def test_a_machine_without_build_tools_is_said(emitted: Path, monkeypatch: pytes
         build_package(emitted)
 
 
-@pytest.mark.parametrize(
-    "flags", ["-fsanitize=address,undefined", "-march=native -fsanitize=address,undefined"]
-)
+SANITIZED = ["-fsanitize=address,undefined", "-march=native -fsanitize=address,undefined"]
+
+
+@pytest.mark.parametrize("flags", slow_but_for(SANITIZED[:1], SANITIZED))
 def test_the_self_test_is_clean_under_sanitizers(flags: str, tmp_path: Path) -> None:
     _need("make")
     folder = _emit(tmp_path / "arm")
@@ -354,7 +358,7 @@ def test_a_manifest_that_is_none(text: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("unoptimised")
-@pytest.mark.parametrize("tool", ["cmake", "make"])
+@pytest.mark.parametrize("tool", slow_but_for(["make"], BUILD_TOOLS))
 def test_what_a_killed_build_left_is_not_built_on(
     tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -375,7 +379,7 @@ def test_what_a_killed_build_left_is_not_built_on(
 
 
 @pytest.mark.usefixtures("unoptimised")
-@pytest.mark.parametrize("tool", ["cmake", "make"])
+@pytest.mark.parametrize("tool", slow_but_for(["make"], BUILD_TOOLS))
 def test_spaces_and_letters_in_paths_and_compilers(
     tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -406,7 +410,7 @@ endif()
 
 
 @pytest.mark.usefixtures("unoptimised")
-@pytest.mark.parametrize("asked", [False, True])
+@pytest.mark.parametrize("asked", slow_but_for([False], [False, True]))
 def test_a_subdirectory_leaves_the_parents_tests_and_installation_alone(
     asked: bool, emitted: Path, tmp_path: Path
 ) -> None:

@@ -11,6 +11,7 @@ import pytest
 from bundled import bundled_model
 from c_warnings import EXTRA, STRICT
 from direct import write_sources
+from slow_cases import slow_but_for
 from traced import arm_package
 
 from psdmc.emit.info import package_info
@@ -49,19 +50,20 @@ def _compile(words: list[str]) -> None:
     assert done.stderr == ""
 
 
-@pytest.mark.parametrize(
-    ("options", "flag"),
-    [
-        (("float64", "inline"), "-march=native"),
-        (("float64", "inline"), "-g0"),
-        (("float64", "inline"), "-Dtest_arm_NO_VECTORS"),
-        (("float32", "inline"), "-march=native"),
-        (("float32", "libm"), "-g0"),
-        (("float64", "libm"), "-march=native"),
-        (("float64", "freestanding"), "-march=native"),
-        (("float32", "freestanding"), "-Dtest_arm_NO_VECTORS"),
-    ],
-)
+WARNED = [
+    (("float64", "inline"), "-march=native"),
+    (("float64", "inline"), "-g0"),
+    (("float64", "inline"), "-Dtest_arm_NO_VECTORS"),
+    (("float32", "inline"), "-march=native"),
+    (("float32", "libm"), "-g0"),
+    (("float64", "libm"), "-march=native"),
+    (("float64", "freestanding"), "-march=native"),
+    (("float32", "freestanding"), "-Dtest_arm_NO_VECTORS"),
+]
+"""Options and flag of the packages that must give no warning."""
+
+
+@pytest.mark.parametrize(("options", "flag"), slow_but_for([WARNED[0], WARNED[-1]], WARNED, spread=True))
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_no_warnings(compiler: str, options: tuple[str, str], flag: str, tmp_path: Path) -> None:
     _need(compiler)
@@ -101,7 +103,10 @@ GNU_C = r"\b__(?!builtin_(?:inf|nan)f\b)\w+|#pragma|_Pragma"
 """Names and pragmas of GCC's; INFINITY and NAN are math.h's own business."""
 
 
-@pytest.mark.parametrize("options", [("float64", "inline"), ("float32", "inline"), ("float64", "libm")])
+PLAIN_OPTIONS = [("float64", "inline"), ("float32", "inline"), ("float64", "libm")]
+
+
+@pytest.mark.parametrize("options", slow_but_for(PLAIN_OPTIONS[:1], PLAIN_OPTIONS))
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_without_vectors_it_is_plain_c99(compiler: str, options: tuple[str, str], tmp_path: Path) -> None:
     """No vector extension, attribute, builtin or pragma is left for a compiler that has none of GCC's."""
@@ -120,8 +125,10 @@ def test_without_vectors_it_is_plain_c99(compiler: str, options: tuple[str, str]
         assert [line for line in own if re.search(GNU_C, line)] == []
 
 
-@pytest.mark.parametrize("real", ["float64", "float32"])
-@pytest.mark.parametrize("compiler", COMPILERS)
+FREESTANDING = [(compiler, real) for compiler in COMPILERS for real in ("float64", "float32")]
+
+
+@pytest.mark.parametrize(("compiler", "real"), slow_but_for([("gcc", "float32")], FREESTANDING, spread=True))
 def test_freestanding_code_needs_no_library(compiler: str, real: str, tmp_path: Path) -> None:
     """What it leaves to the linker is what a freestanding compiler itself may call. All functions by gcc in float64."""
     _need(compiler)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from direct import Direct, error, expected, shared_library, states
+from slow_cases import slow_but_for
 from traced import SIZES, L, N, arm_kernels, arm_package
 
 from psdmc.emit.options import EmitOptions
@@ -34,6 +35,13 @@ BUILDS = [
     ("float32", "inline", "sse2"),
 ]
 
+QUICK = [
+    ("float64", "inline", "widest"),
+    ("float64", "libm", "widest"),
+    ("float64", "freestanding", "plain"),
+    ("float32", "inline", "sse2"),
+]
+"""Each kind of sine, each precision, vectors of several widths and none."""
 
 OPTIMISED = {("float64", "inline", "widest"), ("float32", "inline", "widest")}
 """One of each precision shows what a compiler makes of the C; all show what the C says."""
@@ -44,7 +52,7 @@ def _cpu_has(feature: str) -> bool:
     return info.is_file() and f" {feature} " in info.read_text()
 
 
-@pytest.fixture(scope="module", params=BUILDS, ids="-".join)
+@pytest.fixture(scope="module", params=slow_but_for(QUICK, BUILDS), ids="-".join)
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     real, trig, width = request.param
     if width == "avx2" and not _cpu_has("avx2"):

@@ -13,6 +13,7 @@ import pytest
 from bundled import bundled_model
 from direct import write_sources
 from limbed import package_of
+from slow_cases import slow_but_for
 
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
@@ -66,7 +67,7 @@ def program_text(package: PackageView) -> str:
     return "\n".join([*lines, "    }", "    return 0;", "}", ""])
 
 
-@pytest.fixture(scope="module", params=[*PACKAGES, LIMBED])
+@pytest.fixture(scope="module", params=slow_but_for(["two_link"], [*PACKAGES, LIMBED]))
 def shown(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

@@ -24,10 +24,9 @@ DERIVATIVES = ("inverse_dynamics_derivatives", "forward_dynamics_derivatives")
 MOST_OF_DERIVATIVES, MOST_OF_ONE_DERIVATIVE = 19 * 1024, 2560
 """docs/derivatives.md states them: why they are not in the default set."""
 TARGETS = {"sse2": "-march=x86-64", "avx512": "-march=x86-64-v4"}
-WIDEST = "avx512"
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
-TAKEN = TARGETS if WHOLE else [WIDEST]
-"""Stack grows with the vectors, to twice or more from SSE2: `make test-accuracy` takes both, `make test` the wider."""
+whole = pytest.mark.skipif(not WHOLE, reason="make test-accuracy takes it: gcc's time at -O3")
+"""`make test` bounds the stack of a smaller arm's calls (test_c_rules.py)."""
 
 PUBLIC = re.compile(r"kr6_((?!sincos_)\w+?)(?:_batch|_batch_soa)?$")
 
@@ -56,7 +55,8 @@ def source_of(package: Path) -> int:
     return sum(file.stat().st_size for file in files)
 
 
-@pytest.mark.parametrize("target", TAKEN)
+@whole
+@pytest.mark.parametrize("target", TARGETS)
 def test_no_call_takes_more_than_16_kib(target: str, package: Path, tmp_path: Path) -> None:
     deepest = stack_of(package, target, tmp_path)
     assert len(deepest) == 9 * 3 + 6 * 2  # all functions in three forms; with theta_b in two
@@ -64,8 +64,8 @@ def test_no_call_takes_more_than_16_kib(target: str, package: Path, tmp_path: Pa
     assert _of_one_state(deepest) <= MOST_OF_ONE_STATE, deepest
 
 
-@pytest.mark.skipif(not WHOLE, reason="make test-accuracy takes it: gcc's time at -O3")
-@pytest.mark.parametrize("target", TAKEN)
+@whole
+@pytest.mark.parametrize("target", TARGETS)
 def test_derivatives_take_what_the_documents_say(target: str, tmp_path: Path) -> None:
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from direct import Direct, all_expected, error, shared_library, states
+from slow_cases import slow_but_for
 from traced import L, N, arm, arm_kernels, arm_package
 
 from psdmc.emit.options import EmitOptions
@@ -15,10 +16,11 @@ from psdmc.emit.package_files import library_files
 KERNELS = arm_kernels()
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]
 BUILDS = {"vectors": ["-march=native"], "baseline": ["-g0"], "plain": ["-Dtest_arm_NO_VECTORS"]}
+CASES = [*((build, "float64") for build in BUILDS), ("vectors", "float32")]
 COUNT = 19
 
 
-@pytest.fixture(scope="module", params=[*((build, "float64") for build in BUILDS), ("vectors", "float32")])
+@pytest.fixture(scope="module", params=slow_but_for(CASES[:1], CASES))
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     build, real = request.param
     with pytest.MonkeyPatch.context() as patch:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from direct import Direct, all_expected, shared_library, states
+from slow_cases import slow_but_for
 from test_odd_sizes import INFO
 
 from psdmc.emit.options import EmitOptions
@@ -44,15 +45,29 @@ def kernel(n: int, zero: int) -> Kernel:
     return Kernel(FUNCTION, False, whole, whole, "factored", before)
 
 
-@pytest.mark.parametrize("flags", [["-march=native"], ["-g0"], ["-Dpendulum_NO_VECTORS"]], ids=" ".join)
-@pytest.mark.parametrize("real", ["float64", "float32"])
-@pytest.mark.parametrize(("n", "zero"), [(4, 0), (6, 2), (7, 1), (9, 5)])
-def test_all_forms_multiply(n: int, zero: int, real: str, flags: list[str], tmp_path: Path) -> None:
+FLAGS = ("-march=native", "-g0", "-Dpendulum_NO_VECTORS")
+FORMS = [
+    (n, zero, real, flag)
+    for n, zero in ((4, 0), (6, 2), (7, 1), (9, 5))
+    for real in ("float64", "float32")
+    for flag in FLAGS
+]
+QUICK = [
+    (4, 0, "float64", FLAGS[0]),
+    (6, 2, "float32", FLAGS[1]),
+    (7, 1, "float64", FLAGS[2]),
+    (9, 5, "float32", FLAGS[0]),
+]
+"""Each size, precision and kind of vector once."""
+
+
+@pytest.mark.parametrize(("n", "zero", "real", "flag"), slow_but_for(QUICK, FORMS, spread=True))
+def test_all_forms_multiply(n: int, zero: int, real: str, flag: str, tmp_path: Path) -> None:
     info = replace(INFO, joints=INFO.joints * n)
     made = kernel(n, zero)
     package = package_view(info, {"products": made}, EmitOptions(real=real))  # type: ignore[arg-type]
-    optimised = "-O1" if flags == ["-march=native"] else "-O0"
-    call = Direct(package, shared_library(package, tmp_path, [optimised, "-Wall", "-Werror", *flags]))
+    optimised = "-O1" if flag == "-march=native" else "-O0"
+    call = Direct(package, shared_library(package, tmp_path, [optimised, "-Wall", "-Werror", flag]))
     given = states(made, COUNT, n, 1)
     wanted = list(all_expected(made, given, n, 1).values())
     rows = [np.ascontiguousarray(given[name], real) for name in ("left", "right")]

@@ -8,6 +8,7 @@ import pytest
 import sanitizers
 from odd_package import odd_package
 from sanitizers import DYNAMIC, STATIC, Outcome, Tool, look
+from slow_cases import slow_but_for
 from traced import arm_package
 
 from psdmc.emit.options import EmitOptions
@@ -46,6 +47,8 @@ SHORT = {
     "clang, all warnings": ("float32", "inline", arm),
     "clang-tidy": ("float64", "inline", torques),
 }
+QUICK = ("ASan and UBSan, gcc -O0, widest vectors", "guard pages, gcc -O3, SSE2")
+"""Tools that `make test` takes; the others' are `make test-slow`'s."""
 TOOLS = {tool.name: tool for tool in (*DYNAMIC, *STATIC)}
 
 
@@ -56,7 +59,7 @@ def _looked(tool: Tool, package: PackageView, folder: Path) -> Outcome:
     return outcome
 
 
-@pytest.mark.parametrize("name", SHORT)
+@pytest.mark.parametrize("name", slow_but_for(QUICK, SHORT))
 def test_nothing_is_found(name: str, tmp_path: Path) -> None:
     real, trig, package = SHORT[name]
     outcome = _looked(TOOLS[name], package(EmitOptions(real, trig)), tmp_path)
@@ -97,7 +100,11 @@ FAULTS = {
 """File, right and wrong text, a package that has both, and the tools that must see it."""
 
 
-@pytest.mark.parametrize(("fault", "tool"), [(f, tool) for f, row in FAULTS.items() for tool in row[4]])
+SEEN = [(fault, tool) for fault, row in FAULTS.items() for tool in row[4]]
+SEEN_QUICKLY = [("reads beyond the last row", QUICK[0]), ("writes beyond the last row", QUICK[1])]
+
+
+@pytest.mark.parametrize(("fault", "tool"), slow_but_for(SEEN_QUICKLY, SEEN, spread=True))
 def test_a_fault_is_seen(fault: str, tool: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, right, wrong, package, _ = FAULTS[fault]
     write = sanitizers.write_sources

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -130,15 +131,20 @@ def traced(name: str, theta: bool, frames: list[Frame], parameters: np.ndarray) 
 
 def arm_kernels(seed: int = 0, names: Sequence[str] | None = None) -> dict[str, Kernel]:
     """All functions, baked and with theta_b."""
-    frames, parameters = arm(seed)
-    kernels: dict[str, Kernel] = {}
-    for name, function in ((name, SIGNATURES[name]) for name in DEFAULT):
-        for theta in (False, True) if function.theta else (False,):
-            if names is None or name in names:
-                program = traced(name, theta, frames, parameters)
-                kernel = Kernel(function, theta, program, program, "factored")
-                kernels[kernel.name] = kernel
-    return kernels
+    found = [
+        arm_kernel(name, theta, seed)
+        for name in DEFAULT
+        if names is None or name in names
+        for theta in ((False, True) if SIGNATURES[name].theta else (False,))
+    ]
+    return {kernel.name: kernel for kernel in found}
+
+
+@cache
+def arm_kernel(name: str, theta: bool, seed: int) -> Kernel:
+    """Traced once by each process."""
+    program = traced(name, theta, *arm(seed))
+    return Kernel(SIGNATURES[name], theta, program, program, "factored")
 
 
 def arm_info(name: str = "test arm", seed: int = 0) -> PackageInfo:

@@ -21,8 +21,8 @@ from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campai
 from psdmc.calibration.verdict.record import Calibration
 
 RATE = 250.0
-SEEDS = 4 if os.environ.get("PSDMC_DEMO") == "whole" else 2
-"""Campaigns of each noise: `make test-demo` takes all."""
+SEEDS = 4
+"""Campaigns of each noise: minutes. `make test-demo` takes them, `make test` single logs."""
 
 
 def coloured(rng: np.random.Generator, count: int, n: int, times: tuple[float, ...]) -> np.ndarray:
@@ -101,7 +101,7 @@ def test_one_log_with_coloured_noise(arm, times: tuple[float, ...]):
     assert np.mean(inside) >= 0.99
 
 
-@pytest.mark.slow
+@pytest.mark.skipif(os.environ.get("PSDMC_DEMO") != "whole", reason="make test-demo takes it")
 @pytest.mark.parametrize("times", [(0.05,), (0.0, 1.0)])
 def test_a_campaign_with_coloured_noise(arm, campaign: Path, times: tuple[float, ...]):
     """The four steps on Pinocchio and a stiff integrator of LuGre, current noise of several time scales."""

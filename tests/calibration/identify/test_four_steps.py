@@ -65,6 +65,7 @@ def test_the_calibrated_model_is_a_model_file(arm, noisy, tmp_path: Path):
     assert again.provenance["calibration"]["method"] == "four steps, physically consistent"
 
 
+@pytest.mark.slow
 def test_physical_consistency_moves_a_sound_estimate_by_no_more_than_its_uncertainty(arm, noisy):
     folder, physical = noisy
 
@@ -74,6 +75,7 @@ def test_physical_consistency_moves_a_sound_estimate_by_no_more_than_its_uncerta
     assert np.all(np.abs(moved) < 3 * np.array([row.std for row in plain.parameters]))
 
 
+@pytest.mark.slow
 def test_a_harness_that_the_model_lacks_is_noticed(harness):
     record = harness[1]
 
@@ -100,6 +102,7 @@ def test_plain_coulomb_and_viscous_friction_for_those_who_want_no_more(arm, nois
     assert record.steps[-1].joints["shoulder"].held_out.r2 > 0.97
 
 
+@pytest.mark.slow
 def test_friction_that_has_no_stribeck_peak_leaves_its_velocity_unseen(arm, campaign: Path):
     text = arm.plant.read_text(encoding="utf-8").replace("static = 3.8", "static = 3.0")
     flat = arm.folder / "flat.toml"

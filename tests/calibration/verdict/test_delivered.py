@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shared_data import UR10_LOG
+from slow_cases import slow_but_for
 from test_ur10 import model as ur10_model  # noqa: F401  a fixture
 from unoptimised import wrapper
 
@@ -101,7 +102,7 @@ def test_one_log(arm, log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[st
     require_package(record, tmp_path, functions=None)
 
 
-@pytest.mark.parametrize("variant", ["noisy", "harness"])
+@pytest.mark.parametrize("variant", slow_but_for(["noisy"], ["noisy", "harness"]))
 def test_a_campaign(
     variant: str, request: pytest.FixtureRequest, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
