@@ -14,8 +14,9 @@ from psdmc.calibration.identify.stated_prior import theta_covariance, with_prior
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.judged_record import judged_record
+from psdmc.calibration.verdict.linear_record import linear_record
 from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
-from psdmc.calibration.verdict.record import Calibration, linear_record, with_data, with_model
+from psdmc.calibration.verdict.record import Calibration, with_data, with_model
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
