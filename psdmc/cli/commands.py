@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
+from psdmc.cli.benchmarking import bench
+from psdmc.cli.calibrating import calibrate
+from psdmc.cli.campaigning import excite, simulate
 from psdmc.cli.exporting import export_urdf
 from psdmc.cli.loads import payload
-from psdmc.cli.measuring import bench, calibrate, excite, simulate
 from psdmc.cli.pipeline import build, cache, check, derive, emit_c
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new

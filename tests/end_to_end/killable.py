@@ -9,7 +9,7 @@ from pathlib import Path
 
 from command_line import become
 
-import psdmc.cli.measuring  # noqa: F401  loaded before the fork
+import psdmc.cli.commands  # noqa: F401  loaded before the fork
 
 
 def run(words: list[object], folder: Path, kill_after: float | None = None) -> int:

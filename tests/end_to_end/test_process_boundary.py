@@ -385,7 +385,7 @@ robot = psdmc.compile(model, functions=["inverse_dynamics"])
 zero = np.zeros(model.n)
 assert np.isfinite(robot.inverse_dynamics(zero, zero, zero)).all()
 assert all(row.passed for row in check_model(model))
-import psdmc.cli.measuring, psdmc.cli.commands, psdmc.report.calibrate_demo
+import psdmc.cli.commands, psdmc.report.calibrate_demo
 print("done")
 """
 

@@ -1,0 +1,159 @@
+"""psdmc calibrate: a model from logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psdmc.cli import interrupt
+from psdmc.cli.describing import describe_logs, fit_choice, parsed_joint_map
+from psdmc.cli.next_step import say_next
+from psdmc.cli.one_line import one_line
+from psdmc.cli.output import check_output, check_report
+from psdmc.cli.progress import steps
+from psdmc.cli.torque_constants import parsed_torque_constants
+from psdmc.errors import InputError
+
+
+def calibrate(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file")],
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="LOG...", help="campaign folder, a log description (log.toml), or logs"),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="MODEL.npz", help="calibrated model; with --describe the description"
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="write a page, with JSON beside it")
+    ] = None,
+    actuators: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="write friction and motors as C there")
+    ] = None,
+    physical: Annotated[
+        bool | None,
+        typer.Option(
+            "--physical/--no-physical",
+            help="only what a robot can have: bodies of mass, friction not negative (the default); or the bare fit",
+        ),
+    ] = None,
+    torque_constants: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT=KT,...", help="N m/A, for plain logs that hold currents"),
+    ] = None,
+    loaded: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="LOG", help="log of currents with a known load on the tip: shows torque constants"
+        ),
+    ] = None,
+    load: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MASS,X,Y,Z", help="that load: kg, m in the tip's frame; or a load's file (.toml)"
+        ),
+    ] = None,
+    cutoff: Annotated[
+        float | None, typer.Option(metavar="HZ", help="of the filter of plain logs; 8, or less for slow logs")
+    ] = None,
+    essential: Annotated[
+        bool, typer.Option("--essential", help="leave out parameters that the data do not need (F-test)")
+    ] = False,
+    prior_confidence: Annotated[
+        float | None,
+        typer.Option(metavar="SHARE", help="standard deviation of the file's masses and inertias, 0.1: 10 %"),
+    ] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="write the model file even where the verdict is: not usable")
+    ] = False,
+    validate: Annotated[
+        list[Path] | None, typer.Option(metavar="LOG", help="a plain log that is held out as a whole")
+    ] = None,
+    split: Annotated[
+        str | None,
+        typer.Option(metavar="SHARE[,BLOCKS]", help="held out of plain logs: 0.3, the last part; 0.15,40"),
+    ] = None,
+    friction: Annotated[
+        list[str] | None,
+        typer.Option(metavar="TERM,...", help="of plain logs: coulomb,viscous,viscous^2,offset"),
+    ] = None,
+    topic: Annotated[
+        str | None, typer.Option(metavar="TOPIC", help="of joint states, of bags with several")
+    ] = None,
+    joint_map: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LOGGED=JOINT,...", help="plain logs' joint names, and the model's"),
+    ] = None,
+    describe: Annotated[
+        bool,
+        typer.Option("--describe", help="draft a description of [MODEL] LOG...: log.toml, or -o"),
+    ] = False,
+) -> None:
+    """Identify base parameters, friction and motor constants from logs; the verdict comes first, exit 6: not usable."""
+    given = [model, *(logs or [])]
+    if describe:
+        describe_logs(given, output, topic)
+        return
+    if len(given) < 2 or output is None:
+        lacks = "no LOG" if len(given) < 2 else "no -o MODEL.npz"
+        raise InputError(f"calibrate: {lacks}", "psdmc calibrate MODEL.npz LOG... -o CALIBRATED.npz")
+    logs = given[1:]
+    choice = fit_choice(cutoff, split, friction)
+    with interrupt.at_once():
+        from psdmc.calibration.calibrate import CalibrateOptions
+        from psdmc.calibration.identify.essential import EssentialOptions
+        from psdmc.calibration.sources import LogNaming
+        from psdmc.calibration.verdict.record import verdict_of
+        from psdmc.calibration.verdict.said_once import unsaid_warnings
+        from psdmc.cli.show_checks import print_accuracy, print_torque_constants, print_verdict
+        from psdmc.report.calibrate_commands import calibrate_command
+
+    read = [*given, *(validate or []), *(loaded or [])]
+    check_output(output, *read)
+    check_report(report, output, *read)
+    with steps() as progress:
+        record = calibrate_command(
+            model,
+            logs,
+            output,
+            report,
+            CalibrateOptions(
+                physical=physical is not False,
+                choice=choice,
+                prior_confidence=prior_confidence,
+                essential=EssentialOptions() if essential else None,
+            ),
+            parsed_torque_constants(torque_constants),
+            actuators,
+            progress,
+            keep=keep,
+            validation=validate or [],
+            naming=LogNaming(topic or "", parsed_joint_map(joint_map)),
+            loaded=loaded or (),
+            load_on=load,
+        )
+    verdict = verdict_of(record)
+    print_verdict(verdict)
+    print_accuracy(record)
+    print_torque_constants(record)
+    if verdict.usable or keep:
+        print(f"{output}: calibrated model")
+    else:
+        print(f"{output}: not written; --keep writes it all the same")
+    if physical:
+        print("note: --physical is the default now and need not be given")
+    for note in record.notes:
+        print(f"note: {one_line(note)}")
+    for warning in unsaid_warnings(record):
+        print(f"warning: {one_line(warning)}")
+    for written, what in ((report, "page"), (actuators, "friction and motors in C")):
+        if written is not None and written.exists():
+            print(f"{written}: {what}")
+    if not verdict.usable:
+        raise typer.Exit(verdict.exit_status)
+    say_next("emit-c", output, "-o", output.stem)

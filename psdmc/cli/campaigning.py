@@ -1,0 +1,159 @@
+"""psdmc excite and psdmc simulate: a calibration campaign is planned, and recorded from a virtual robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psdmc.calibration.motions.excite_options import (
+    LARGEST_MARGIN,
+    LONGEST_DURATION,
+    MOST_HARMONICS,
+    SMALLEST_MARGIN,
+    ExciteOptions,
+)
+from psdmc.cli import interrupt
+from psdmc.cli.joint_values import acceleration_limits, joint_numbers, joint_ranges, load_numbers
+from psdmc.cli.next_step import quoted, say_next_line
+from psdmc.cli.progress import steps
+
+
+def excite(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder of the campaign")],
+    one_log: Annotated[
+        bool, typer.Option("--one-log", help="the exciting motion alone, for one linear fit of everything")
+    ] = False,
+    load: Annotated[
+        str,
+        typer.Option(metavar="MASS,X,Y,Z", help="kg and m in the tip's frame, of the motor runs; or none"),
+    ] = "3.5,0.08,0,0.06",
+    rate: Annotated[
+        float, typer.Option(min=1.0, max=20_000.0, help="Hz, rows a second of trajectories")
+    ] = 1000.0,
+    duration: Annotated[
+        float, typer.Option(min=0.1, max=LONGEST_DURATION, help="s, period of the exciting motion")
+    ] = 10.0,
+    repeats: Annotated[int, typer.Option(min=1, max=100, help="periods of the exciting motion")] = 6,
+    harmonics: Annotated[int, typer.Option(min=1, max=MOST_HARMONICS, help="sines per joint")] = len(
+        ExciteOptions().harmonics
+    ),
+    margin: Annotated[
+        float,
+        typer.Option(
+            min=SMALLEST_MARGIN, max=LARGEST_MARGIN, help="share of position, speed and acceleration limits"
+        ),
+    ] = ExciteOptions().margin,
+    torque_margin: Annotated[
+        float, typer.Option(min=SMALLEST_MARGIN, max=1.0, help="share of torque limits, by theta_b")
+    ] = ExciteOptions().torque_margin,
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="rad (m), narrower than the file's"),
+    ] = None,
+    speed: Annotated[
+        list[str] | None, typer.Option(metavar="JOINT=V,...", help="rad/s (m/s), below the file's limits")
+    ] = None,
+    acceleration: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="A or JOINT=A,...", help="rad/s^2 (m/s^2); one number: for joints without a limit"
+        ),
+    ] = None,
+    effort: Annotated[
+        list[str] | None, typer.Option(metavar="JOINT=NM,...", help="N m (N), torque limits of joints")
+    ] = None,
+    floor: Annotated[
+        float | None, typer.Option(metavar="HEIGHT", help="m, of a floor above the base's origin")
+    ] = None,
+    meshes: Annotated[
+        list[Path] | None, typer.Option(metavar="DIR", help="where the meshes of collision shapes are")
+    ] = None,
+    collisions: Annotated[
+        bool, typer.Option("--collisions/--no-collisions", help="whether self-collision is looked at")
+    ] = True,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, help="s, longest search; it ends by its count where that is sooner")
+    ] = ExciteOptions().seconds,
+    log_det: Annotated[
+        bool, typer.Option("--log-det", help="maximise log det instead of the condition")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=1, help="of the search")] = 1,
+    force: Annotated[
+        bool, typer.Option("--force", help="replace the campaign that is in DIR; its logs stay")
+    ] = False,
+) -> None:
+    """Plan a calibration campaign: gravity sweeps, friction sines, and an exciting motion within the limits."""
+    with interrupt.at_once():
+        from psdmc.calibration.campaign import CampaignOptions
+        from psdmc.calibration.campaign_summary import summary
+        from psdmc.calibration.identify.steps import Load
+        from psdmc.calibration.motions.given_limits import GivenLimits
+        from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
+        from psdmc.cli.tables import print_line
+        from psdmc.report.calibrate_commands import excite_command
+
+    search = ExciteOptions(
+        duration=duration,
+        harmonics=tuple(range(1, harmonics + 1)),
+        objective="log_det" if log_det else "condition",
+        margin=margin,
+        torque_margin=torque_margin,
+        seconds=seconds,
+        seed=seed,
+    )
+    for_all, by_joint = acceleration_limits(acceleration)
+    limits = GivenLimits(
+        joint_ranges(ranges),
+        joint_numbers(speed, "--speed"),
+        by_joint,
+        for_all,
+        joint_numbers(effort, "--effort"),
+    )
+    carried = load_numbers(load)
+    options = CampaignOptions(
+        sweep=SweepOptions(period=1.0 / rate),
+        sines=SineOptions(period=1.0 / rate),
+        excite=search,
+        load=None if carried is None else Load(*carried),
+        repeats=repeats,
+        one_log=one_log,
+        limits=limits,
+        shapes=tuple(meshes or ()) if collisions else None,
+        floor=floor,
+    )
+    with steps() as progress:
+        plan = excite_command(model, output, options, progress, force)
+    for line in summary(plan, output):
+        print_line(line)
+    for remark in plan.remarks:
+        print_line(f"note: {remark}")
+    print_line(f"{output}: written")
+    calibrated = f"{model.stem}_calibrated.npz"
+    words = " ".join(
+        quoted(word) for word in (model, output, "-o", calibrated, "--report", f"{model.stem}.html")
+    )
+    say_next_line(f"record the runs that {output / 'campaign.toml'} lists, then: psdmc calibrate {words}")
+
+
+def simulate(
+    plant: Annotated[Path, typer.Argument(metavar="PLANT", help="virtual robot (.toml)")],
+    campaign: Annotated[Path, typer.Argument(metavar="DIR", help="campaign made by excite")],
+    ideal: Annotated[bool, typer.Option("--ideal", help="ideal sensors")] = False,
+    harness: Annotated[
+        bool, typer.Option("--harness", help="with a cable harness, which no model has")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=0, help="of the sensors' noise")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 1,
+) -> None:
+    """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
+    with interrupt.at_once():
+        from psdmc.calibration.simulate_campaign import SimulateOptions
+        from psdmc.report.calibrate_commands import simulate_command
+
+    with steps() as progress:
+        count = simulate_command(plant, campaign, SimulateOptions(ideal, harness, seed, workers), progress)
+    print(f"{campaign}: {count} runs simulated, the others were up to date")
+    say_next_line(f"psdmc calibrate MODEL.npz {quoted(campaign)} -o calibrated.npz --report calibrated.html")
