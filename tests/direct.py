@@ -32,12 +32,26 @@ def shared_library(package: PackageView, folder: Path, flags: Sequence[str]) -> 
     return library
 
 
+def declarations(package: PackageView) -> str:
+    """C declarations for cffi of all that a package exports: tables and functions, without macros."""
+    sizes = package.size_macros | {"DOF": package.dof, "BASE_PARAMETERS": package.l}
+    sizes |= {"FRAMES": len(package.info.frames)}
+    lines = list(package.table_declarations)
+    for name, value in sizes.items():
+        lines = [line.replace(f"[{package.robot}_{name}]", f"[{value}]") for line in lines]
+    for kernel in package.kernels:
+        lines += [prototype.text for prototype in kernel.prototypes.values()]
+    lines += [prototype.text for prototype in package.payload.prototypes] if package.payload else []
+    lines += [package.friction_prototype.text] if package.info.friction else []
+    return "".join(f"{line};\n" for line in lines)
+
+
 class Direct:
     """`call(symbol suffix, arguments)`; arrays become pointers, everything else goes through."""
 
     def __init__(self, package: PackageView, library: Path) -> None:
         self.ffi = cffi.FFI()
-        self.ffi.cdef(package.cdef)
+        self.ffi.cdef(declarations(package))
         self.library = self.ffi.dlopen(str(library))
         self.package = package
 

@@ -17,13 +17,15 @@ from psdmc.emit.limbs import LimbVector, limb_units, limb_vectors
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
 from psdmc.emit.patterns import Pattern, patterns
+from psdmc.emit.payload_view import PayloadView
 from psdmc.emit.products import Shape
-from psdmc.emit.prototypes import Prototype, friction_prototype, payload_prototypes
+from psdmc.emit.prototypes import Prototype, friction_prototype
 from psdmc.emit.reals import check_range
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.references import ReferenceView, reference_view
-from psdmc.emit.self_test import TOLERANCES, GivenVector, SelfCheck, given_vectors, labels, self_checks
-from psdmc.emit.tables import Table, number, tables
+from psdmc.emit.self_test import given_vectors, labels
+from psdmc.emit.self_test_view import SelfTestView
+from psdmc.emit.tables import Table, tables
 from psdmc.emit.trig import (
     ScalarTrig,
     TrigPreamble,
@@ -195,17 +197,9 @@ class PackageView:
         return friction_prototype(self.robot, self.real)
 
     @property
-    def payload_prototypes(self) -> tuple[Prototype, ...]:
-        """Functions that add a load to theta_b."""
-        return payload_prototypes(self.robot, self.real) if self.info.payload else ()
-
-    @property
-    def payload_rows(self) -> tuple[tuple[str, ...], ...]:
-        """Rows of the constant matrices of those functions."""
-        return tuple(
-            tuple(", ".join(number(value, self.real) for value in row) for row in matrix.tolist())
-            for matrix in self.info.payload
-        )
+    def payload(self) -> PayloadView | None:
+        """The functions that add a load to theta_b, where the package has them."""
+        return PayloadView(self.robot, self.real, self.info.payload) if self.info.payload else None
 
     @property
     def version(self) -> str:
@@ -220,35 +214,15 @@ class PackageView:
         return next(found, self.n)
 
     @property
+    def self_test(self) -> SelfTestView:
+        own = self.references
+        known = () if own is None else own.expected
+        loads = 0 if own is None or own.load is None or self.payload is None else len(self.payload.prototypes)
+        return SelfTestView(self.kernels, self.dof, self.options, known, loads + bool(self.info.friction))
+
+    @property
     def kernels(self) -> tuple[KernelView, ...]:
         return tuple(kernel for function in self.functions for kernel in function.kernels)
-
-    @property
-    def self_checks(self) -> tuple[SelfCheck, ...]:
-        """The self-test's calls: every kernel; those without a reference value are marked."""
-        known = () if self.references is None else self.references.expected
-        return self_checks(self.kernels, self.dof, self.options, known)
-
-    @property
-    def checked_functions(self) -> int:
-        """Number of C functions whose values the self-test compares: kernels, loads and friction."""
-        loads = 0 if self.references is None or self.references.load is None else len(self.payload_prototypes)
-        kernels = len({check.kernel for check in self.self_checks if check.expected})
-        return kernels + loads + bool(self.info.friction)
-
-    @property
-    def load_tolerance(self) -> str:
-        """Of the functions that add loads."""
-        return TOLERANCES[self.options.real]
-
-    @property
-    def given_vectors(self) -> tuple[GivenVector, ...]:
-        """Inputs of all kernels, by the reference states' names."""
-        return given_vectors(self.kernels, self.dof)
-
-    @property
-    def largest_output(self) -> int:
-        return max(output.size for kernel in self.kernels for output in kernel.outputs)
 
     @property
     def is_mixed(self) -> bool:
@@ -289,19 +263,6 @@ class PackageView:
         return self.info.is_wide and all(recipe in names for recipe in ON_MANIFOLD)
 
     @property
-    def has_several_outputs(self) -> bool:
-        return any(len(kernel.outputs) > 1 for kernel in self.kernels)
-
-    @property
-    def most_outputs(self) -> int:
-        return max(len(kernel.outputs) for kernel in self.kernels)
-
-    @property
-    def given_otherwise(self) -> bool:
-        """Whether some input is not a vector with one entry per joint."""
-        return not all(vector.of_joints for vector in self.given_vectors)
-
-    @property
     def failing(self) -> tuple[FunctionView, ...]:
         """Functions that can fail."""
         return tuple(function for function in self.functions if function.has_pivots)
@@ -310,22 +271,6 @@ class PackageView:
     def uses_frames(self) -> bool:
         """Whether some function is about the named frames."""
         return uses_frames(self.functions) or bool(self.info.payload)
-
-    @property
-    def cdef(self) -> str:
-        """The declarations for cffi: tables and functions, without macros."""
-        macros = {f"{self.robot}_{name}": str(value) for name, value in self.size_macros.items()}
-        macros |= {f"{self.robot}_DOF": str(self.dof), f"{self.robot}_BASE_PARAMETERS": str(self.l)}
-        macros[f"{self.robot}_FRAMES"] = str(len(self.info.frames))
-        lines = list(self.table_declarations)
-        for name, value in macros.items():
-            lines = [line.replace(f"[{name}]", f"[{value}]") for line in lines]
-        for function in self.functions:
-            for kernel in function.kernels:
-                lines += [prototype.text for prototype in kernel.prototypes.values()]
-        lines += [prototype.text for prototype in self.payload_prototypes]
-        lines += [self.friction_prototype.text] if self.info.friction else []
-        return "".join(f"{line};\n" for line in lines)
 
 
 def package_view(
@@ -351,6 +296,9 @@ def package_view(
     package = PackageView(robot, info, options, functions, None, chosen(adapters))
     if references is None:
         return package
-    vectors, takes_theta = package.given_vectors, any(kernel.theta for kernel in package.kernels)
+    vectors, takes_theta = (
+        given_vectors(package.kernels, package.dof),
+        any(kernel.theta for kernel in package.kernels),
+    )
     view = reference_view(references, options.c_real, vectors, labels(package.kernels), takes_theta)
     return replace(package, references=view)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from direct import declarations
 from small import (
     FORWARD,
     INVERSE,
@@ -137,7 +138,7 @@ def test_the_header_and_cffi_know_the_same_functions() -> None:
     package = pendulum()
     header = package_files(package)["include/pendulum/pendulum.h"]
     known = re.findall(r"\b(pendulum_\w+)\(", header)
-    assert known == re.findall(r"\b(pendulum_\w+)\(", package.cdef)
+    assert known == re.findall(r"\b(pendulum_\w+)\(", declarations(package))
     assert known == [
         "pendulum_inverse_dynamics",
         "pendulum_inverse_dynamics_batch",

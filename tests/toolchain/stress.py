@@ -21,9 +21,9 @@ def stress_program(package: PackageView) -> str:
         f"#define L {package.l}",
         f"#define LANES {package.lanes}",
         f"#define VECTORS {max(len(kernel.inputs) for kernel in package.kernels)}",
-        f"#define OUTPUTS {package.most_outputs}",
+        f"#define OUTPUTS {package.self_test.most_outputs}",
         f"#define WIDEST {widest}",
-        f"#define MOST {max(package.largest_output, widest, package.l)}",
+        f"#define MOST {max(package.self_test.largest_output, widest, package.l)}",
     ]
     for kernel in package.kernels:
         lines += _wrappers(kernel)
