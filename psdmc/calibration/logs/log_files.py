@@ -82,13 +82,21 @@ class Layout:
         return (*self.positions, *(self.velocities or ()), *self.efforts)
 
 
+DRAFTED = "psdmc calibrate --describe MODEL.npz LOG drafts a description of columns by other names"
+
+
+def _of_other_names(columns: Sequence[str]) -> str:
+    """The hint for a log whose columns are not called as psdmc calls them."""
+    return f"it has {listed([quoted(column) for column in columns])}; {DRAFTED}"
+
+
 def layout_of(name: str, columns: Sequence[str]) -> Layout:
     """The layout of a table with these columns; InputError names a missing column and the names that would be accepted."""
     if "time_s" not in columns:
-        raise InputError(f"{name}: no column 'time_s'", f"it has {listed(tuple(columns))}")
+        raise InputError(f"{name}: no column 'time_s'", _of_other_names(columns))
     joints = _joints(name, columns, POSITIONS)
     if not joints:
-        raise InputError(f"{name}: no column 'position_rad.<joint>'", f"it has {listed(tuple(columns))}")
+        raise InputError(f"{name}: no column 'position_rad.<joint>'", _of_other_names(columns))
     quantity, effort_names, notes = _efforts(name, columns, tuple(joints))
     velocities = _joints(name, columns, VELOCITIES)
     lacking = [joint for joint in joints if joint not in velocities]
@@ -151,7 +159,7 @@ def _efforts(
     kinds = {quantity: prefix for prefix, quantity in EFFORTS if prefix in present}
     if not kinds:
         wanted = "current_a.<joint>, motor_torque_nm.<joint> or joint_torque_nm.<joint>"
-        raise InputError(f"{name}: no column of current or torque", f"expected {wanted}")
+        raise InputError(f"{name}: no column of current or torque", f"expected {wanted}; {DRAFTED}")
     if len(kinds) > 1:
         both = " and ".join(f"{prefix} ({quantity})" for quantity, prefix in kinds.items())
         raise InputError(f"{name}: columns of {both}: only one kind can be read", "leave the others out")

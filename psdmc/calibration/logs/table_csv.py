@@ -1,7 +1,7 @@
 """CSV files of loggers and spreadsheets: named columns of numbers, every fault with its line and column.
 
-UTF-8, with or without a byte-order mark; cells separated by comma, semicolon or tab, quoted or not. Where a semicolon
-or tab separates them, numbers may have decimal commas.
+UTF-8, with or without a byte-order mark; cells separated by comma, semicolon, tab or spaces, quoted or not. Where no comma
+separates them, numbers may have decimal commas.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from psdmc.calibration.logs.table_limits import require_names, require_size
 from psdmc.calibration.logs.wording import quoted
 from psdmc.errors import InputError
 
-SEPARATORS = (",", ";", "\t")
+SEPARATORS = (",", ";", "\t", SPACE := " ")
+"""The last stands for any number of spaces."""
 TIME = "time_s"
 
 _OTHER_MARKS = (
@@ -136,8 +137,9 @@ def _header_and_body(text: str, name: str) -> tuple[int, str, str]:
 
 
 def _separator(header: str) -> str:
-    """The separator that leaves a column of time; else the one that leaves most columns."""
-    counted = []
+    """The separator that leaves a column of time; else the one that leaves most columns, spaces only where no other mark
+    separates any."""
+    counts: dict[str, int] = {}
     for separator in SEPARATORS:
         try:
             cells = _cells(header, separator)
@@ -145,13 +147,16 @@ def _separator(header: str) -> str:
             continue
         if TIME in cells:
             return separator
-        counted.append((len(cells), separator))
-    most = max((count for count, _ in counted), default=0)
-    return next((separator for count, separator in counted if count == most), SEPARATORS[0])
+        counts[separator] = len(cells)
+    marked = {mark: count for mark, count in counts.items() if mark != SPACE and count > 1}
+    likely = marked or counts
+    return max(likely, key=lambda mark: likely[mark], default=SEPARATORS[0])
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+    words = line.strip() if separator == SPACE else line
+    reader = csv.reader([words], delimiter=separator, skipinitialspace=separator == SPACE)
+    return [cell.strip() for cell in next(reader, [])]
 
 
 def _require_header(names: Sequence[str], name: str) -> None:
@@ -177,7 +182,8 @@ def _with_points(body: str, separator: str, name: str) -> str:
 def _numbers(body: str, separator: str) -> Array | None:
     """(rows, columns), or None where a cell is no number or a line has more cells than another."""
     try:
-        return np.loadtxt(body.split("\n"), delimiter=separator, comments=None, quotechar='"', ndmin=2)
+        mark = None if separator == SPACE else separator
+        return np.loadtxt(body.split("\n"), delimiter=mark, comments=None, quotechar='"', ndmin=2)
     except (ValueError, csv.Error):
         return None
 
@@ -207,7 +213,7 @@ def _first_fault(body: str, names: Sequence[str], separator: str, first: int, na
 def _no_number(name: str, line: int, column: str, cell: str) -> InputError:
     what = f"{quoted(cell)} is no number" if cell else "the cell is empty"
     decimal = is_number(cell.replace(",", ".", 1))
-    comma = "decimal commas are read where ';' or tab separates the columns"
+    comma = "decimal commas are read where ';', tab or spaces separate the columns"
     hint = comma if decimal else "below the header each cell is a number"
     return InputError(f"{name}: line {line}, column {quoted(column)}: {what}", hint)
 

@@ -34,13 +34,18 @@ def text(separator: str = ",", point: str = ".", header: str = HEADER) -> str:
         text("\t").encode(),
         text(";", ",").encode(),
         text("\t", ",").encode(),
+        text(" ").encode(),
+        text(" ", ",").replace(" ", "   ").encode(),
+        text(" ").replace("\n", " \n").encode(),
+        text(" ", header='"time_s","position_rad.a","current_a.a"').encode(),
         text(header='"time_s","position_rad.a","current_a.a"').encode(),
         text(", ").encode(),
         b'time_s,position_rad.a,current_a.a\n"0.0","1.5","-2.25"\n"0.5","1.25","3e0"\n',
     ],
     ids=[
         "plain", "mark", "windows", "mac", "blank lines", "no last newline", "semicolons", "tabs",
-        "decimal commas", "decimal commas and tabs", "quoted names", "spaces", "quoted numbers",
+        "decimal commas", "decimal commas and tabs", "spaces", "decimal commas and many spaces", "spaces at ends",
+        "quoted names between spaces", "quoted names", "commas and spaces", "quoted numbers",
     ],
 )  # fmt: skip
 def test_common_dialects_are_read(tmp_path: Path, data: bytes):
@@ -86,6 +91,9 @@ def test_a_quoted_name_may_hold_the_separator():
         (text(";").encode() + b"1.234,5;1;2\n", "numbers with both ',' and '.'"),
         (b"time_s," + b"x" * 200_000 + b"\n1,2\n", "not a header, or damaged"),
         (",".join(f"c{k}" for k in range(1001)).encode() + b"\n1\n", "1,001 columns, expected at most 1,000"),
+        (text(" ").encode() + b"1 zero 2\n", "line 4, column 'position_rad.a': 'zero' is no number"),
+        (text(" ").encode() + b"1 2\n", "line 4 has 2 cells under 3 names"),
+        (b"my time;my angle\n1;2\n", "no column 'time_s'"),
         (b"time_s,position_rad.a\x01\n1,2\n", "control characters in the name of column"),
     ],
 )
@@ -105,4 +113,21 @@ def test_decimal_commas_under_commas_get_their_remedy():
     with pytest.raises(InputError) as raised:
         columns_from_csv(HEADER.encode() + b'\n0,"1,5",2\n', "run.csv")
 
-    assert "';' or tab" in (raised.value.hint or "")
+    assert "';', tab or spaces" in (raised.value.hint or "")
+
+
+def test_columns_by_other_names_are_told_of_descriptions(tmp_path: Path):
+    """As UR's recorder writes them: separated by spaces."""
+    (tmp_path / "ur.csv").write_text("timestamp actual_q_0 actual_current_0\n0.0 1.0 2.0\n", encoding="utf-8")
+
+    with pytest.raises(InputError, match="no column 'time_s'") as raised:
+        read_log(tmp_path / "ur.csv")
+
+    assert "it has 'timestamp', 'actual_q_0', 'actual_current_0'" in (raised.value.hint or "")
+    assert "psdmc calibrate --describe MODEL.npz LOG" in (raised.value.hint or "")
+
+
+def test_spaces_within_names_separate_nothing_where_another_mark_does():
+    columns = columns_from_csv(b"time_s;my other angle;x\n1;2;3\n", "run.csv")
+
+    assert list(columns) == ["time_s", "my other angle", "x"]
