@@ -19,6 +19,7 @@ from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, standard_parameters
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BASE, Array, Joint, NamedFrame, Placement
+from psdmc.robot.right_angles import coarse_right_angles
 from psdmc.robot.rotation import about
 from psdmc.robot.small import times
 from psdmc.robot.snap import ROUNDING, snap_rotation
@@ -46,7 +47,10 @@ def dh_draft(text: str, source: str, gravity: Array | None, snap: float, frames:
         gravity=np.array(robot.gravity) if gravity is None else gravity,
         tip=joints[tip].link_frame,
         snaps=snaps,
-        notes=_faults(robot),
+        notes=(
+            *coarse_right_angles({j.name: (j.alpha, j.theta) for j in robot.joints}, snap),
+            *_faults(robot),
+        ),
         frames=named,
         parents=parents,
         tip_body=tip,

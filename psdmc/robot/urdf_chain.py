@@ -16,6 +16,7 @@ from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 from psdmc.robot.mimic import mimic_coordinates
+from psdmc.robot.right_angles import coarse_right_angles
 from psdmc.robot.small import times
 from psdmc.robot.snap import (
     ROUNDING,
@@ -82,6 +83,9 @@ def urdf_draft(
             *(f"link '{link}' has no inertia: none assumed" for link in bare),
             *_of_several_coordinates(route),
             *_unmodelled(route),
+            *coarse_right_angles(
+                {j.name: j.origin.rpy for j in route.path if j.origin.quaternion is None}, snap
+            ),
             *_faults(robot),
         ),
         frames=urdf_frames(robot, route, placed.joints, placed.tip, frames or route.ends, source),
