@@ -12,6 +12,7 @@ from psdmc.calibration.description.efforts import torque_constants
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
 from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.logs.log_bag import is_bag
 from psdmc.calibration.logs.open_log import open_log
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.logs.wording import listed, quoted
@@ -103,6 +104,8 @@ def log_sources(
             "name the other logs in it, each as a [[log]]",
         )
     if not described:
+        if naming.topic and not any(is_bag(path) for path in (*paths, *validation)):
+            raise InputError(f"--topic {quoted(naming.topic)}: none of the logs is a bag", "leave it out")
         fit = [naming.opened(path, progress) for path in paths]
         held = [replace(naming.opened(path, progress), use="validate") for path in validation]
         return LogSources((*fit, *held), _options(linear, FitChoice(), choice, bool(held)))

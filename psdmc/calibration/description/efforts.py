@@ -15,11 +15,15 @@ from psdmc.calibration.logs.wording import listed, quoted
 def held_quantity(efforts: Sequence[tuple[str, Found]], coupled: bool) -> Quantity:
     """The quantity of a log whose joints have these efforts. Currents stay currents where all joints have them and no
     coupling mixes them; InputError where torques of two kinds would mix, or a torque constant is missing for it."""
+    _require_motor_torques(efforts)
     held = {found.quantity for _, found in efforts}
     if held == {"current"} and not coupled:
         _require_known_gears(efforts)
         return "current"
     torques = sorted(held - {"current"})
+    if "current" in held and "joint_torque" in held:
+        both = ", ".join(f"{quoted(name)} {found.quantity}" for name, found in efforts)
+        raise refused(f"effort: {both}: currents make motor torques, expected one quantity")
     if len(torques) > 1:
         both = ", ".join(f"{quoted(name)} {found.quantity}" for name, found in efforts)
         raise refused(f"effort: joints hold {both}, expected one quantity")
@@ -34,6 +38,20 @@ def held_quantity(efforts: Sequence[tuple[str, Found]], coupled: bool) -> Quanti
             f"effort: torque_constant missing for joint(s) {listed(lacking)}: {why}, expected N m/A"
         )
     return "joint_torque" if torques == ["joint_torque"] else "motor_torque"
+
+
+def _require_motor_torques(efforts: Sequence[tuple[str, Found]]) -> None:
+    """A current is of a motor, whose torque has friction in it."""
+    odd = [
+        quoted(name)
+        for name, found in efforts
+        if found.quantity == "current" and found.entry.quantity == "joint_torque"
+    ]
+    if odd:
+        raise refused(
+            f"effort: quantity 'joint_torque' of joint(s) {listed(odd)}, whose unit is A or mA: expected "
+            "'motor_torque', which it is unless said"
+        )
 
 
 def _require_known_gears(efforts: Sequence[tuple[str, Found]]) -> None:

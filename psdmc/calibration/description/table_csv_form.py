@@ -19,7 +19,7 @@ def _read(value: object, reading: Reading) -> TextForm:
     return TextForm(
         separator=SEPARATOR_WORDS.get(word),
         header=header,
-        skip=int(table.number("skip", 0, MOST_SKIPPED, 0.0)),
+        skip=table.whole("skip", 0, MOST_SKIPPED, 0),
     )
 
 

@@ -74,7 +74,7 @@ def split_of(shares: Sequence[float]) -> SplitOptions | str:
 def _split(table: TomlTable) -> SplitOptions:
     usual = LinearOptions().split
     share = table.number("held_out", 0.0, LARGEST_HELD_OUT, usual.held_out)
-    return SplitOptions(share, int(table.number("blocks", 0, MOST_BLOCKS, usual.blocks)))
+    return SplitOptions(share, table.whole("blocks", 0, MOST_BLOCKS, usual.blocks))
 
 
 def _friction(table: TomlTable, faults: list[str]) -> tuple[tuple[float, ...], bool]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
 from psdmc.calibration.description.table import Reading, Table
-from psdmc.calibration.description.units import UNITS
+from psdmc.calibration.description.units import CURRENTS, TICKS, UNITS
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Quantity
 from psdmc.calibration.logs.toml_tables import TomlTable, shown
 from psdmc.errors import InputError
@@ -58,8 +58,13 @@ class Entry:
     quantity: Quantity | None = None
 
     def over(self, other: Entry) -> Entry:
-        """This entry, with the other's where it says nothing."""
+        """This entry, with the other's where it says nothing: of ticks and of motors only where this one's unit is not
+        another."""
         said = {f.name: value for f in fields(self) if (value := getattr(self, f.name)) is not None}
+        if self.unit is not None and self.unit not in TICKS:
+            other = replace(other, ticks_per_rev=None)
+        if self.unit is not None and self.unit not in CURRENTS:
+            other = replace(other, torque_constant=None)
         return replace(other, **said)
 
 

@@ -56,6 +56,7 @@ EFFORT_UNITS: Mapping[str, Unit] = {
     "A": Unit(1.0, "current"),
     "mA": Unit(1e-3, "current"),
 }
+CURRENTS = tuple(name for name, unit in EFFORT_UNITS.items() if unit.says == "current")
 UNITS: Mapping[str, Mapping[str, Unit]] = {
     "position": POSITION_UNITS,
     "velocity": VELOCITY_UNITS,

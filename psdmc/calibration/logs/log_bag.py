@@ -174,6 +174,11 @@ def _packs_messages(folder: Path) -> bool:
     return "compression_mode" in text and PLAIN_MODE.search(text) is None
 
 
+def is_bag(path: Path) -> bool:
+    """Whether a log is read as a bag: by its ending, or as it is a folder."""
+    return path.suffix.lower() in BAGS or is_folder(path)
+
+
 def is_folder(path: Path) -> bool:
     """Whether there is a folder of this name; names that no file can have are none."""
     try:

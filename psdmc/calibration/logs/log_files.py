@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.calibration.logs.log import Array, Log, Quantity
-from psdmc.calibration.logs.log_bag import BAGS, is_folder, read_bag
+from psdmc.calibration.logs.log_bag import BAGS, is_bag, read_bag
 from psdmc.calibration.logs.log_date import date_of
 from psdmc.calibration.logs.table_files import TABLES, read_columns, write_columns
 from psdmc.calibration.logs.wording import listed, quoted
@@ -46,8 +46,7 @@ def read_log(path: str | Path) -> Log:
     InputError where the file is missing, no log, damaged, or lacks a column.
     """
     path = Path(path)
-    kind = path.suffix.lower()
-    if kind in BAGS or is_folder(path):
+    if is_bag(path):
         bag = read_bag(path)
         return bag if isinstance(bag, Log) else bag.held()
     require_format(path)

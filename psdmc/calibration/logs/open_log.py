@@ -9,7 +9,7 @@ import numpy as np
 
 from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED, opened
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.log_bag import BAGS, is_folder, read_bag
+from psdmc.calibration.logs.log_bag import is_bag, read_bag
 from psdmc.calibration.logs.log_date import date_of
 from psdmc.calibration.logs.log_files import Layout, layout_of, read_log, require_format
 from psdmc.calibration.logs.row_store import HELD_BYTES, RowStore
@@ -35,7 +35,7 @@ def open_log(
     InputError as of read_log.
     """
     path = Path(path)
-    if path.suffix.lower() in BAGS or is_folder(path):
+    if is_bag(path):
         return read_bag(path, topic, held)
     require_format(path)
     with opened(path, LARGEST_STORED) as file:

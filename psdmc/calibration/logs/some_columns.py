@@ -13,7 +13,7 @@ import numpy as np
 
 from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED, decoding, opened
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.log_bag import BAGS, is_folder, read_bag
+from psdmc.calibration.logs.log_bag import BAGS, is_bag, read_bag
 from psdmc.calibration.logs.row_store import HELD_BYTES
 from psdmc.calibration.logs.table_binary import NUMBERS, array_of, parquet_module
 from psdmc.calibration.logs.table_limits import require_size, require_unpacked
@@ -51,9 +51,11 @@ def open_columns(path: Path, form: TextForm, topic: str = "", held: int = HELD_B
     held   bytes of a bag's rows in memory; more go to a temporary file
     """
     kind = path.suffix.lower()
-    if kind in BAGS or is_folder(path):
+    if is_bag(path):
         yield _of_bag(path, topic, held)
         return
+    if topic:
+        raise InputError(f"{path}: topic {quoted(topic)}, but it is no bag", "leave the topic out")
     if kind not in (*TEXTS, *BINARY):
         known = ", ".join((*TEXTS, *BINARY, *BAGS))
         raise InputError(f"{path}: '{path.suffix}' is no log format", f"known are {known}")

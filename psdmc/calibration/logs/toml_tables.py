@@ -76,6 +76,14 @@ class TomlTable:
         self._fault(key, value, f"a number from {low:g} to {high:g}")
         return low
 
+    def whole(self, key: str, low: int, high: int, default: int) -> int:
+        """A whole number from `low` to `high`."""
+        value = self.content.get(key, default)
+        if is_number(value) and low <= value <= high and value == int(value):
+            return int(value)
+        self._fault(key, value, f"a whole number from {low} to {high}")
+        return low
+
     def text(self, key: str, default: str | None = None) -> str:
         """A text that is neither empty nor longer than LONGEST_TEXT, and has no control characters."""
         if key not in self.content and default is not None:

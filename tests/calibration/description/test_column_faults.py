@@ -67,6 +67,13 @@ FAULTS = {
     + "[[coupling]]\njoints = ['a', 'b']\nmatrix = [[1, 0]]": "coupling 1: matrix: found a list of 1, expected 2 ro",
     JOINTS
     + "[[coupling]]\njoints = ['a', 'b']\nmatrix = [[1, 0], [0, 1]]\nquantities = ['x']": "quantities: found 'x'",
+    JOINTS.replace('"i1"', "{ column = 'i1', unit = 'A', torque_constant = 1 }").replace(
+        '"i2"', "{ column = 'i2', quantity = 'joint_torque' }"
+    ): "effort: 'a' current, 'b' joint_torque: currents make motor torques, expected one quantity",
+    JOINTS
+    + "[effort]\nunit = 'A'\nquantity = 'joint_torque'": "quantity 'joint_torque' of joint(s) 'a', 'b', whose unit is A",
+    JOINTS + "[csv]\nskip = 1.5": "csv: skip: found 1.5, expected a whole number from 0 to 10000",
+    JOINTS + "[fit]\nblocks = 2.5": "fit: blocks: found 2.5, expected a whole number from 0 to 1000",
     "[[joint]]\nname = 'a'\nlogged_as = 'x'": "joint 'a': no column for its position, expected 'position_rad.x', or",
 }
 
@@ -103,6 +110,10 @@ def test_what_does_not_fit_is_named(folder: Path, text: str):
             '[[log]]\nfile = "run.csv"\nstart = 5\n' + HEAD[24:] + JOINTS,
             "no rows from 5 to inf s, it lasts 0.19 s",
         ),
+        (
+            '[[log]]\nfile = "run.csv"\ntopic = "/arm"\n' + HEAD[24:] + JOINTS,
+            "run.csv: topic '/arm', but it is no bag",
+        ),
         ('[[log]]\nfile = "run.csv"\n' + JOINTS, "time: no column 'time_s' in"),
         (
             '[[log]]\ntables = { x = "run.csv", y = "run.csv" }\n' + HEAD[24:] + JOINTS,
@@ -120,3 +131,21 @@ def test_a_log_that_is_not_what_is_said(folder: Path, text: str, fault: str):
 
     assert raised.value.message.startswith(f"{path}: ")
     assert fault in raised.value.message
+
+
+def test_a_joint_of_another_unit_does_not_have_the_others_ticks_and_torque_constant(folder: Path):
+    """What [position] and [effort] say of ticks and of motors holds for joints in ticks and amperes."""
+    path = folder / "log.toml"
+    odd = JOINTS.replace('"q2"', "{ column = 'q2', unit = 'deg' }").replace(
+        '"i2"', "{ column = 'i2', unit = 'Nm' }"
+    )
+    usual = "[position]\nunit = 'ticks'\nticks_per_rev = 4096\n[effort]\nunit = 'A'\ntorque_constant = 0.3\n"
+    path.write_text(HEAD + usual + odd, encoding="utf-8")
+    table = np.loadtxt(folder / "run.csv", delimiter=",", skiprows=1, usecols=range(5))
+
+    (log,) = described_logs(read_description(path, NAMES), NAMES)
+
+    turns = table[:, 1:3] * [2.0 * np.pi / 4096, np.pi / 180.0]
+    assert np.abs(log.rows(0, 20).position - turns).max() < 1e-12
+    assert np.abs(log.rows(0, 20).effort - table[:, 3:] * [0.3, 1.0]).max() < 1e-12
+    assert log.quantity == "motor_torque"

@@ -12,11 +12,14 @@ from test_payload_identification import COM, MASS, Run, record
 import psdmc
 from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
+from psdmc.calibration.description.table_fit import FitChoice
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_bag import read_bag
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.logs.table_files import write_columns
+from psdmc.calibration.sources import LogNaming, log_sources
 from psdmc.errors import InputError
 
 rosbags = pytest.importorskip("rosbags.rosbag2")
@@ -63,6 +66,16 @@ def test_a_topic_is_named_or_the_only_one(tmp_path: Path, mcap: bool, alone: boo
     assert "--topic" in (raised.value.hint or "")
     with pytest.raises(InputError, match="on topic '/none': it has them on '/left'"):
         read_bag(both, "/none")
+
+
+def test_a_topic_of_plain_logs_that_are_no_bags_is_refused(tmp_path: Path):
+    log = record(tmp_path / "run.csv", Run(seed=1, loaded=False, seconds=1.0))
+    naming = LogNaming("/arm")
+
+    with pytest.raises(InputError, match=r"--topic '/arm': none of the logs is a bag") as raised:
+        log_sources([log], (), bundled_model("kr6").joint_names, LinearOptions(), FitChoice(), naming, print)
+
+    assert raised.value.hint == "leave it out"
 
 
 MORE = """
