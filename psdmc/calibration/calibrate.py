@@ -90,7 +90,7 @@ def calibrate(
     Raises InputError where a file is missing or a log cannot be used.
     """
     require_axes(model.mechanism, "calibration")
-    options = options or CalibrateOptions()
+    options, naming = options or CalibrateOptions(), naming or LogNaming()
     if options.physical:
         require_cvxpy()
     regressor = regressor or ChainRegressor(model)
@@ -105,17 +105,15 @@ def calibrate(
     if plain is not None:
         paths, campaign = list(plain), None
     if campaign is not None:
-        _require_plain(campaign, options, held, naming or LogNaming(), with_load)
+        _require_plain(campaign, options, held, naming, with_load)
         runs = read_campaign(campaign, model.joint_names)
         return calibrate_campaign(model, runs, options, regressor, torque_constants, progress)
+    naming.require_bag([*paths, *held, *with_load])
     progress("reading logs")
-    found = log_sources(
-        paths, held, model.joint_names, options.linear, options.choice, naming or LogNaming(), progress
-    )
+    found = log_sources(paths, held, model.joint_names, options.linear, options.choice, naming, progress)
     full = None
     if load is not None:
-        names = naming or LogNaming()
-        own = log_sources(with_load, [], model.joint_names, options.linear, options.choice, names, progress)
+        own = log_sources(with_load, [], model.joint_names, options.linear, options.choice, naming, progress)
         full = LoadedLogs(own.logs, load)
     options = replace(options, linear=found.linear)
     constants = {**found.constants, **(torque_constants or {})}

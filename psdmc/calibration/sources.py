@@ -49,6 +49,11 @@ class LogNaming:
         """Options of the command line that say so."""
         return (["--topic"] if self.topic else []) + (["--joint-map"] if self.joints else [])
 
+    def require_bag(self, paths: Sequence[Path]) -> None:
+        """InputError where a topic is named, and no log has any. A description says its topics itself."""
+        if self.topic and not any(is_bag(path) or is_description(path) for path in paths):
+            raise InputError(f"--topic {quoted(self.topic)}: none of the logs is a bag", "leave it out")
+
     def opened(self, path: Path, progress: Progress) -> AnyLog:
         """A log with the model's joint names; InputError where it has no joint of a given name."""
         log = open_log(path, progress, topic=self.topic)
@@ -104,8 +109,6 @@ def log_sources(
             "name the other logs in it, each as a [[log]]",
         )
     if not described:
-        if naming.topic and not any(is_bag(path) for path in (*paths, *validation)):
-            raise InputError(f"--topic {quoted(naming.topic)}: none of the logs is a bag", "leave it out")
         fit = [naming.opened(path, progress) for path in paths]
         held = [replace(naming.opened(path, progress), use="validate") for path in validation]
         return LogSources((*fit, *held), _options(linear, FitChoice(), choice, bool(held)))

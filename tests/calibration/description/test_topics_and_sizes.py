@@ -10,16 +10,15 @@ from bundled import bundled_model
 from test_payload_identification import COM, MASS, Run, record
 
 import psdmc
+from psdmc.calibration.calibrate import calibrate
 from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
-from psdmc.calibration.description.table_fit import FitChoice
-from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_bag import read_bag
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.logs.table_files import write_columns
-from psdmc.calibration.sources import LogNaming, log_sources
+from psdmc.calibration.sources import LogNaming
 from psdmc.errors import InputError
 
 rosbags = pytest.importorskip("rosbags.rosbag2")
@@ -73,7 +72,7 @@ def test_a_topic_of_plain_logs_that_are_no_bags_is_refused(tmp_path: Path):
     naming = LogNaming("/arm")
 
     with pytest.raises(InputError, match=r"--topic '/arm': none of the logs is a bag") as raised:
-        log_sources([log], (), bundled_model("kr6").joint_names, LinearOptions(), FitChoice(), naming, print)
+        calibrate(bundled_model("kr6"), log, naming=naming)
 
     assert raised.value.hint == "leave it out"
 
