@@ -183,11 +183,11 @@ def _relieved(
     loads: Sequence[Sequence[Scalar]],
     along: int | None,
 ) -> list[list[Scalar]]:
-    """The inertia seen through a joint that moves freely; exactly nothing is left along it."""
+    """The inertia seen through a joint that moves freely, its upper triangle; exactly nothing is left along the joint."""
     return [
         [
             0.0
-            if along in (a, b)
+            if b < a or along in (a, b)
             else rows[a][b] - _dot([c[a] for c in columns], [load[b] for load in loads])
             for b in range(6)
         ]

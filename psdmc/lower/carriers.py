@@ -182,16 +182,20 @@ class CarrierSpace:
         return self._transfers[key]
 
     def _transfer(self, carriers: tuple[int, ...]) -> Array:
-        raw = self._coordinates(carriers, range(self.count, self.tableau.entries.shape[1]))
-        contribution = np.abs(raw) * self.lengths[list(carriers), None]
-        out = np.where(contribution < EXACT * self.whole, 0.0, raw)
-        nearest = np.round(out)
-        return np.asarray(np.where((np.abs(out - nearest) < EXACT) & (np.abs(nearest) == 1), nearest, out))
+        out = self._coordinates(carriers, slice(self.count, None))
+        rows, columns = np.nonzero(out)
+        raw = out[rows, columns]
+        contribution = np.abs(raw) * self.lengths[np.array(carriers)[rows]]
+        kept = np.where(contribution < EXACT * self.whole[columns], 0.0, raw)
+        nearest = np.round(kept)
+        is_one = (np.abs(kept - nearest) < EXACT) & (np.abs(nearest) == 1)
+        out[rows, columns] = np.where(is_one, nearest, kept)
+        return out
 
-    def _coordinates(self, carriers: Sequence[int], wanted: Sequence[int]) -> Array:
+    def _coordinates(self, carriers: Sequence[int], wanted: Sequence[int] | slice) -> Array:
         """Some of the columns and of the model's behind them, in the basis of the carriers."""
         if self.careful is not None:  # exchanges would magnify what rounding left of the smallest columns
-            return Tableau.of(self.careful.rows, carriers).entries[:, list(wanted)].astype(np.float64)
+            return Tableau.of(self.careful.rows, carriers).entries[:, wanted].astype(np.float64)
         return self.tableau.within(carriers, wanted).astype(np.float64)
 
 

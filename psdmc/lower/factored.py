@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -162,14 +163,15 @@ def _flat(values: Any) -> list[Symbol | Number]:
 def carrier_values(arrangement: Arrangement, theta_b: Array | None, tracer: Tracer) -> list[Scalar]:
     """Values of the carriers; of a theta_b that is not known as symbols."""
     transfer = arrangement.transfer
+    rows, columns = np.nonzero(transfer)
+    factors = transfer[rows, columns]
     if theta_b is not None:
-        return [math.fsum(row) for row in (transfer * theta_b).tolist()]
+        parts = (factors * theta_b[columns]).tolist()
+        ends = np.searchsorted(rows, range(1, len(transfer) + 1)).tolist()
+        return [math.fsum(parts[start:end]) for start, end in pairwise([0, *ends])]
     theta = tracer.symbols("theta_b", transfer.shape[1])
     values: list[Scalar] = [0.0] * len(transfer)
-    rows, columns = np.nonzero(transfer)
-    for row, column, factor in zip(
-        rows.tolist(), columns.tolist(), transfer[rows, columns].tolist(), strict=True
-    ):
+    for row, column, factor in zip(rows.tolist(), columns.tolist(), factors.tolist(), strict=True):
         values[row] = values[row] + theta[column] * factor
     return values
 

@@ -46,11 +46,13 @@ class Tableau:
         entries[range(len(basis)), list(basis)] = 1.0
         return Tableau(tuple(basis), entries)
 
-    def within(self, basis: Sequence[int], wanted: Sequence[int]) -> Long:
-        """(r, len(wanted)) some columns' coordinates in another basis, which must be one."""
-        entering = [j for j in basis if j not in self.basis]
-        leaving = [i for i, j in enumerate(self.basis) if j not in basis]
-        now, entries = list(self.basis), self.entries[:, [*entering, *wanted]]
+    def within(self, basis: Sequence[int], wanted: Sequence[int] | slice) -> Long:
+        """(r, wanted) some columns' coordinates in another basis, which must be one."""
+        old, new = set(self.basis), set(basis)
+        entering = [j for j in basis if j not in old]
+        leaving = [i for i, j in enumerate(self.basis) if j not in new]
+        now = list(self.basis)
+        entries = np.concatenate([self.entries[:, entering], self.entries[:, wanted]], axis=1)
         places = list(range(len(entering)))
         while places:
             block = np.abs(entries[leaving][:, places])
@@ -58,7 +60,8 @@ class Tableau:
             i, place = leaving.pop(row), places.pop(column)
             _pivot(entries, i, place)
             now[i] = entering[place]
-        order = [now.index(j) for j in basis]
+        row_of = {j: i for i, j in enumerate(now)}
+        order = [row_of[j] for j in basis]
         return np.asarray(entries[order, len(entering) :])
 
 
@@ -78,10 +81,12 @@ def _row_pivots(rest: Long) -> tuple[list[int], Long]:
 
 
 def _pivot(entries: Long, row: int, column: int) -> None:
-    """Make `column` the unit vector of `row`."""
-    entries[row] /= entries[row, column]
+    """Make `column` the unit vector of `row`. Of a tree's columns most have nothing in a row."""
+    filled = np.flatnonzero(entries[row])
+    behind = entries[row, filled] / entries[row, column]
+    entries[row, filled] = behind
     factors = entries[:, column].copy()
     factors[row] = 0.0
     used = np.flatnonzero(factors)
-    entries[used] -= factors[used, None] * entries[row]
+    entries[used[:, None], filled] -= factors[used, None] * behind
     entries[used, column] = 0.0

@@ -16,7 +16,7 @@ from typing import Any
 
 from psdmc.program.cost import Cost
 from psdmc.program.lanes import Lanes
-from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.program import Instr, Op, Program, Slot, operation
 
 Number = float | int
 Constant = Number | Lanes
@@ -163,10 +163,10 @@ class Tracer:
 def _instruction(step: Step) -> Instr:
     op, a, b = step
     if b is not None:
-        return Instr(op, (a, b))
+        return operation(op, (a, b))
     if op is _LOAD:
         return Instr(op, slot=a)
-    return Instr(op, value=a) if op is _CONST else Instr(op, (a,))
+    return Instr(op, value=a) if op is _CONST else operation(op, (a,))
 
 
 class Symbol:

@@ -21,14 +21,15 @@ def traced_rows(
     needed = [j for j in range(len(g.lift)) if g.lift[j].any()]
     q, qd = g.inputs["q"], g.inputs["qd"]
     found = regressor(g.frames, g.link_frames, set(needed), q, qd, qdd, g.base_acceleration, qd_r)
-    return [[_entry(g.lift[:, k], needed, row) for k in range(g.lift.shape[1])] for row in found]
+    weights = [[(j, float(column[j])) for j in np.flatnonzero(column).tolist()] for column in g.lift.T]
+    return [[_entry(column, row) for column in weights] for row in found]
 
 
-def _entry(weights: Array, needed: Sequence[int], row: dict[int, Scalar]) -> Scalar:
+def _entry(weights: Sequence[tuple[int, float]], row: dict[int, Scalar]) -> Scalar:
     total: Scalar = 0.0
-    for j in needed:
-        if weights[j] and j in row:
-            total = total + row[j] * float(weights[j])
+    for j, weight in weights:
+        if j in row:
+            total = total + row[j] * weight
     return total
 
 
