@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from psdmc.dynamics.body import Body
+from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
@@ -78,7 +79,8 @@ RANK = 1e-12
 See MISS."""
 
 SAMPLED_JOINTS = 10
-"""Robots with more joints are not sampled as a whole."""
+"""Robots with more joints are not sampled as a whole, unless joints follow others: what their summed torques depend on is
+not found joint by joint."""
 
 STATES = 48
 SEED = 20211
@@ -202,11 +204,9 @@ class CarrierSpace:
 def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     """The carriers' space of a model. `representative` takes theta_b to standard parameters about the link frames."""
     n = len(reframed.frames)
-    samples = _sampled_columns(reframed) if n <= SAMPLED_JOINTS else _torque_rows(reframed)
-    lift = np.zeros((PARAMETERS_PER_LINK * n, representative.shape[1]), np.longdouble)
-    for k, place in enumerate(reframed.link_frames):
-        rows = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
-        lift[rows] = times(link_map(place).astype(np.longdouble), representative[rows])
+    is_sampled = n <= SAMPLED_JOINTS or any_follows(reframed.frames)
+    samples = _sampled_columns(reframed) if is_sampled else _torque_rows(reframed)
+    lift = _lifted(reframed, representative)
     unused_drives = [
         j for j in range(DRIVE, PARAMETERS_PER_LINK * n, PARAMETERS_PER_LINK) if not np.any(lift[j])
     ]
@@ -226,6 +226,23 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     if rank >= len(whole) and _is_fair(space, samples, target, units):
         return space
     return _careful_space(samples, target, units[0])
+
+
+def every_parameter(reframed: Reframed, representative: Array) -> tuple[tuple[int, ...], Array]:
+    """All link parameters that theta_b has a part in, and (count, l) theta_b to their values: more than carriers would be,
+    but none of them stands for another, whatever its size."""
+    lift = _lifted(reframed, representative).astype(np.float64)
+    reached = np.flatnonzero(lift.any(axis=1))
+    return tuple(reached.tolist()), lift[reached]
+
+
+def _lifted(reframed: Reframed, representative: Array) -> Long:
+    """(11 n, l) theta_b to link parameters in pseudo-inertia form about the re-framed joint frames."""
+    lift = np.zeros((PARAMETERS_PER_LINK * len(reframed.frames), representative.shape[1]), np.longdouble)
+    for k, place in enumerate(reframed.link_frames):
+        rows = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
+        lift[rows] = times(link_map(place).astype(np.longdouble), representative[rows])
+    return lift
 
 
 def _in_their_span(columns: Array) -> Array:

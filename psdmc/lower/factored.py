@@ -53,6 +53,7 @@ class Arrangement:
     carriers  which link parameters carry the model (indices, 11 per link)
     transfer  (len(carriers), l)  theta_b to their values
     choices   how the recursions are arranged
+    is_basis  whether no carrier could be left out; else they are all parameters that theta_b has a part in
     """
 
     reframed: Reframed
@@ -60,6 +61,7 @@ class Arrangement:
     carriers: tuple[int, ...]
     transfer: Array
     choices: Choices
+    is_basis: bool = True
 
     @property
     def n(self) -> int:

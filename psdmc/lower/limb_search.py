@@ -159,6 +159,8 @@ class LimbSearch:
 
     def _exchanged(self, found: Arrangement, groups: Sequence[Limbs]) -> Iterator[Arrangement]:
         """Exchanges among the core's parameters, or among a group's first limb's, the others' following."""
+        if not found.is_basis:
+            return
         limb_of = {joint: limbs for limbs in groups for limb in limbs for joint in limb}
         space = self.search.geometry.space(found.reframed)
         for leaving, entering in space.exchanges(found.carriers):
@@ -181,7 +183,7 @@ class LimbSearch:
 
     def _carried_by(self, found: Arrangement, carriers: set[int]) -> Iterator[Arrangement]:
         """So carried, where these can be carriers."""
-        if len(carriers) != len(found.carriers):
+        if not found.is_basis or len(carriers) != len(found.carriers):
             return
         chosen = tuple(sorted(carriers))
         with np.errstate(all="ignore"):

@@ -18,7 +18,7 @@ from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.motion import Choices
 from psdmc.errors import InternalError
 from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy
-from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace
+from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace, every_parameter
 from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
 from psdmc.lower.geometry import LARGE, Geometry
 from psdmc.lower.reframe import Foot, Reframed
@@ -152,17 +152,24 @@ class Search:
             pass
         return descent.arrangement
 
-    def _accurate(self, firsts: Iterable[Arrangement], accuracy: Accuracy) -> Arrangement:
-        """The most accurate of several arrangements; one within LIMIT where exchanges of its carriers lead to it."""
+    def _accurate(self, firsts: Sequence[Arrangement], accuracy: Accuracy) -> Arrangement:
+        """The most accurate of several arrangements; one within LIMIT where exchanges of its carriers lead to it, or where
+        nothing is carried by other parameters than its own."""
         best = min(firsts, key=accuracy.error)
         error = accuracy.error(best)
         while error > LIMIT:
             others = {accuracy.error(each): each for each in self._exchanges(best)}
             least = min(others, default=error)
             if least >= error:
-                break
+                return min([best, *map(self._uncarried, firsts)], key=accuracy.error)
             best, error = others[least], least
         return best
+
+    def _uncarried(self, found: Arrangement) -> Arrangement:
+        """With every parameter by itself. Which of them may stand for others is found by columns of all joints' torques
+        together, of which a small joint's are a small part: on robots of many scales its digits are lost there."""
+        carriers, transfer = every_parameter(found.reframed, self.robot.representative)
+        return replace(found, carriers=carriers, transfer=transfer, is_basis=False)
 
     def _admits(self, accurate: Arrangement | None) -> Callable[[Arrangement], bool]:
         accuracy = self.accuracy
@@ -227,6 +234,8 @@ class Search:
             yield replace(found, unit=unit)
 
     def _exchanges(self, found: Arrangement) -> Iterator[Arrangement]:
+        if not found.is_basis:
+            return
         space = self.geometry.space(found.reframed)
         for leaving, entering in space.exchanges(found.carriers):
             carriers = tuple(sorted({*found.carriers, entering} - {leaving}))

@@ -17,6 +17,7 @@ from psdmc.lower.carriers import SAMPLED_JOINTS
 from psdmc.lower.kernels import lower
 from psdmc.lower.search import SINGLE, Search
 from psdmc.program.interpret import interpret
+from psdmc.robot.coordinates import Coordinate, own_coordinates
 
 SERIAL = tuple(range(-1, 11))
 BUDGET = 40
@@ -45,8 +46,29 @@ def test_the_program_s_torques_are_pinocchio_s(tree: RandomTree, monkeypatch: py
     assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
+def test_the_program_s_torques_are_summed_where_joints_follow_others(monkeypatch: pytest.MonkeyPatch):
+    """Campaign tree 1000000 was lowered with one state for each joint, of which it has fewer: a traceback."""
+    monkeypatch.setattr(search, "BUDGET", BUDGET)
+    ratios = np.eye(12)[:, :10]
+    ratios[10, 8], ratios[11, 2] = -0.5, 2.0
+    shift = 0.25 * (np.arange(12) == 10)
+    follows = (Coordinate(8, -0.5, 0.25), Coordinate(2, 2.0))
+    tree = LARGE[0]
+    model = derive_model(
+        replace(tree.mechanism(), coordinates=(*own_coordinates(10), *follows)), expand=False
+    )
+    q, qd, qdd = (vector[:, :10] for vector in tree.motion(20))
+    given = {"q": q, "qd": qd, "qdd": qdd, "theta_b": model.theta_b}
+
+    expected = tree.each(pin.rnea, q @ ratios.T + shift, qd @ ratios.T, qdd @ ratios.T) @ ratios
+
+    for kernel in lower(model, "factored", ["inverse_dynamics"]).values():
+        found = interpret(kernel.single, given, {"tau": model.nv})["tau"]
+        assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
+
+
 def test_an_arrangement_that_gives_other_torques_is_a_bug_and_no_code(monkeypatch: pytest.MonkeyPatch):
-    """Carriers of one robot with the values of another."""
+    """Carriers of one robot with the values of another, and no way round them."""
     model = derive_model(LARGE[0].mechanism(), expand=False)
     starts = Search.starts
 
@@ -55,6 +77,7 @@ def test_an_arrangement_that_gives_other_torques_is_a_bug_and_no_code(monkeypatc
 
     monkeypatch.setattr(Search, "starts", spoilt)
     monkeypatch.setattr(Search, "_exchanges", lambda self, found: iter(()))
+    monkeypatch.setattr(Search, "_uncarried", lambda self, found: found)
     found = Search(model.mechanism, model.representative, model.theta_b, BUDGET)
 
     with pytest.raises(InternalError, match="inverse_dynamics"):
