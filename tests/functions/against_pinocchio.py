@@ -31,14 +31,17 @@ from psdmc.toolchain.interface import interface_of
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
 """`make test-accuracy`: more robots, and all that are compiled whole optimised."""
 
-ROBOTS = ("two_link", "scara", "kr6", *(("Panda", "UR5") if WHOLE else ()), "sliding", "first slides")
+ARM = "kr6" if WHOLE else "scara"
+"""The arm of tests that need one."""
+
+ROBOTS = ("two_link", "scara", *(("kr6", "Panda", "UR5") if WHOLE else ()), "sliding", "first slides")
 SLIDING = {"sliding": (5, "RPRP"), "first slides": (8, "PRPR")}
 """Seed and joints of oblique chains with sliding joints."""
 
-SINGLE = ("scara", "kr6", "sliding")
+SINGLE = ("scara", *(("kr6",) if WHOLE else ()), "sliding")
 """Robots that are compiled in float32 too."""
 
-COMPILED = {("scara", "float64"), ("kr6", "float64"), ("sliding", "float64"), ("sliding", "float32")}
+COMPILED = {("scara", "float64"), (ARM, "float64"), ("sliding", "float64"), ("sliding", "float32")}
 """Robots and precisions whose long functions are compiled; of other robots their PROGRAMs are interpreted."""
 
 OPTIMISED = COMPILED if WHOLE else {("two_link", "float64"), ("scara", "float32")}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-from against_pinocchio import EVERY, bench, matches_pinocchio
+from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from wide_robots import KINDS, is_pinocchios, wide_robot
 
 from psdmc.robot.joints import FREE, PLANAR, SPHERICAL
@@ -17,7 +17,7 @@ def test_it_is_pinocchios(robot: str, real: str) -> None:
 
 
 def test_a_chain_subtracts() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     q0, q1 = own.given["q0"], own.given["q1"]
     np.testing.assert_array_equal(own.robot.difference(q0, q1), q1 - q0)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import EVERY, bench, matches_pinocchio
+from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from robots_at_hand import drawn
 from unoptimised import without_optimisation
 
@@ -42,7 +42,7 @@ def test_on_random_robots_the_programs_are_pinocchios(seed: int, kinds: str, tid
             assert error <= allowed * max(np.abs(values).max(), least), f"{name}: {block}"
 
 
-@pytest.mark.parametrize("robot", ["scara", "kr6"])
+@pytest.mark.parametrize("robot", sorted({"scara", ARM}))
 def test_they_are_the_slopes_of_forward_dynamics(robot: str) -> None:
     own = bench(robot)
     step, states = 1e-6, [own.given[name][:10] for name in ("q", "qd", "tau")]

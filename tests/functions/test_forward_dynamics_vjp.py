@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 from fifty_digits import fifty_digit_jacobian
 
 from psdmc.lower.kernels import lower
@@ -37,7 +37,7 @@ def test_it_is_what_fifty_digit_differences_say() -> None:
             np.testing.assert_allclose(found[f"grad_{by}"], expected, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("robot", ["kr6", "sliding"])
+@pytest.mark.parametrize("robot", [ARM, "sliding"])
 def test_gradient_times_tangent_is_cotangent_times_slope(robot: str) -> None:
     """Reverse against forward mode."""
     own = bench(robot)
@@ -50,7 +50,7 @@ def test_gradient_times_tangent_is_cotangent_times_slope(robot: str) -> None:
 
 
 def test_where_the_mass_matrix_is_not_positive_nothing_is_a_number() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     g, count = own.given, 11
     states = [g[name][:count] for name in ("q", "qd", "tau", "cotangent")]
     for output in own.robot.forward_dynamics_vjp(*states, theta_b=-np.asarray(own.model.theta_b)):

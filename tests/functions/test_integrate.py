@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from against_pinocchio import EVERY, bench, matches_pinocchio
+from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from wide_robots import KINDS, is_pinocchios, wide_robot
 
 from psdmc.errors import InputError
@@ -17,7 +17,7 @@ def test_it_is_pinocchios(robot: str, real: str) -> None:
 
 
 def test_a_chain_adds() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     np.testing.assert_array_equal(
         own.robot.integrate(own.given["q"], own.given["v"]), own.given["q"] + own.given["v"]
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import EVERY, bench, matches_pinocchio
+from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 
 from psdmc.lower.kernels import lower
 from psdmc.program.differentiate import Block, jacobians
@@ -19,7 +19,7 @@ def test_they_are_pinocchios(robot: str, real: str) -> None:
 
 
 @pytest.mark.parametrize("mode", ["forward", "reverse"])
-@pytest.mark.parametrize("robot", ["two_link", "scara", "kr6", "sliding"])
+@pytest.mark.parametrize("robot", sorted({"two_link", "scara", ARM, "sliding"}))
 def test_they_are_what_differentiating_inverse_dynamics_gives(robot: str, mode: str) -> None:
     own = bench(robot)
     n = own.model.n
@@ -37,7 +37,7 @@ def test_they_are_what_differentiating_inverse_dynamics_gives(robot: str, mode: 
 
 
 def test_the_derivative_by_accelerations_is_the_mass_matrix() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     q, qd, qdd = (own.given[name] for name in ("q", "qd", "qdd"))
     found = own.robot.inverse_dynamics_derivatives(q, qd, qdd).dtau_dqdd
     np.testing.assert_allclose(found, own.model.mass_matrix(q), atol=1e-13 * np.abs(found).max())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from against_pinocchio import (
+    ARM,
     INTERPRETED,
     SEVERAL,
     bench,
@@ -35,7 +36,7 @@ def test_the_gradient_by_theta_is_the_torques_of_every_other_body() -> None:
 
 
 def test_the_rest_is_the_gradient_without_theta() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     given = [own.given[name] for name in ("q", "qd", "qdd", "cotangent")]
     whole, part = own.robot.inverse_dynamics_vjp_parameters(*given), own.robot.inverse_dynamics_vjp(*given)
     for one, other in zip(whole, part, strict=False):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import EVERY, bench, matches_pinocchio
+from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from bundled import robot_path
 from unoptimised import without_optimisation
 
@@ -16,7 +16,7 @@ def test_the_energy_is_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("kinetic_energy", robot, real)
 
 
-@pytest.mark.parametrize("robot", ["two_link", "scara", "kr6"])
+@pytest.mark.parametrize("robot", sorted({"two_link", "scara", ARM}))
 def test_it_is_half_of_qd_m_qd(robot: str) -> None:
     own = bench(robot)
     q, qd = own.given["q"], own.given["qd"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 from direct import Direct
 
 
@@ -18,7 +18,7 @@ def test_its_programs_are_pinocchios(robot: str) -> None:
     program_matches_pinocchio("mass_matrix_inverse", robot)
 
 
-@pytest.mark.parametrize("robot", ["kr6", "sliding"])
+@pytest.mark.parametrize("robot", [ARM, "sliding"])
 def test_it_takes_the_mass_matrix_to_one(robot: str) -> None:
     own = bench(robot)
     mass = own.model.mass_matrix(own.given["q"])
@@ -29,7 +29,7 @@ def test_it_takes_the_mass_matrix_to_one(robot: str) -> None:
 
 
 def test_a_mass_matrix_that_is_not_positive_has_none_and_says_where() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     q, n = np.ascontiguousarray(own.given["q"][:1]), own.model.n
     found, theta_b = np.zeros((1, n, n)), -np.asarray(own.model.theta_b)
     call = Direct(own.package, own.robot.library)

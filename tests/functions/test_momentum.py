@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from against_pinocchio import EVERY, bench, matches_pinocchio
+from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from bundled import bundled_model
 
 from psdmc.errors import InputError
@@ -20,7 +20,7 @@ def test_the_momentum_is_pinocchios_about_the_bases_origin(robot: str, real: str
 
 def test_along_the_first_axis_it_is_what_the_mass_matrix_says() -> None:
     """kr6's first axis is vertical through the base's origin: what turns about it is (M qd)_1."""
-    own = bench("kr6")
+    own = bench(ARM)
     first = own.model.chain.joints[0].placement
     axis = first.rotation[:, 2]
     q, qd = own.given["q"], own.given["qd"]

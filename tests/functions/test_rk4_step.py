@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 
 
 @pytest.mark.parametrize(("robot", "real"), SEVERAL)
@@ -34,7 +34,7 @@ def test_half_the_step_has_a_sixteenth_of_the_error() -> None:
 
 
 def test_a_stage_without_a_positive_mass_matrix_spoils_the_step() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     states = [own.given[name][:9] for name in ("q", "qd", "tau")]
     for output in own.robot.rk4_step(*states, 0.01, theta_b=-np.asarray(own.model.theta_b)):
         assert np.isnan(output).all()

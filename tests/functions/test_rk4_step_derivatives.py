@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 from bundled import bundled_model
 from fifty_digits import fifty_digit_jacobian
 from unoptimised import without_optimisation
@@ -42,7 +42,7 @@ def test_they_are_the_slopes_of_the_step_at_fifty_digits() -> None:
 
 
 def test_it_is_rk4_steps_state() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     states = [own.given[name][:9] for name in ("q", "qd", "tau")]
     found, step = own.robot.rk4_step_derivatives(*states, 0.01), own.robot.rk4_step(*states, 0.01)
     np.testing.assert_allclose(found.q_next, step.q_next, rtol=1e-12)
@@ -50,7 +50,7 @@ def test_it_is_rk4_steps_state() -> None:
 
 
 def test_a_stage_without_a_positive_mass_matrix_spoils_the_step() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     states = [own.given[name][:9] for name in ("q", "qd", "tau")]
     for output in own.robot.rk4_step_derivatives(*states, 0.01, theta_b=-np.asarray(own.model.theta_b)):
         assert np.isnan(output).all()

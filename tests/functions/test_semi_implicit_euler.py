@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against_pinocchio import INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
+from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 
 from psdmc.emit.package_files import package_files
 
@@ -20,7 +20,7 @@ def test_its_programs_are_pinocchios(robot: str) -> None:
 
 
 def test_the_step_may_be_one_number_for_all_states() -> None:
-    own = bench("kr6")
+    own = bench(ARM)
     states = [own.given[name] for name in ("q", "qd", "tau")]
     found = own.robot.semi_implicit_euler(*states, 0.002)
     for one, other in zip(

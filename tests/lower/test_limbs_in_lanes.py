@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from limbed import FUNCTIONS, SHAPES, kernels, limbed, shape
+from slow_cases import slow_but_for
 from whole_robots import ROBOTS, derived, lowered
 
 from psdmc.derivation.derive import derive_model
@@ -42,6 +43,8 @@ SAME = 1e-13
 """Of each entry's largest value: rounding of the same sums in another order."""
 SOLVED = 1e-10
 """The same of accelerations, which a mass matrix's condition magnifies."""
+QUICK = [name for name in SHAPES if name != "arms on a trunk, legs on its root"]
+"""The largest is searched longest."""
 
 
 def sizes_of(model: DynamicsModel) -> Sizes:
@@ -67,7 +70,7 @@ def assert_same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray], exa
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", slow_but_for(QUICK, SHAPES))
 def test_written_out_it_is_the_straight_line(name: str, function: str) -> None:
     model, kernel = shape(name)[1], kernels(name)[function]
     if kernel.limbs is None:
@@ -152,7 +155,7 @@ def test_real_robots_limbs_run_in_lanes_and_agree_with_pinocchio(name: str, floa
     assert_same({"qdd": accelerated["qdd"]}, {"qdd": qdd}, 1e-10)
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", slow_but_for(QUICK, SHAPES))
 def test_it_is_taken_only_where_it_costs_less(name: str) -> None:
     taken = {function: kernel for function, kernel in kernels(name).items() if kernel.limbs}
     for kernel in taken.values():

@@ -160,6 +160,7 @@ def test_unknown_parameters_and_single_precision_are_refused(tmp_path: Path) -> 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_an_optimal_control_problem_has_the_same_optimum_with_another_model(kr6: External) -> None:
     """KR6 from rest to rest, multiple shooting in IPOPT; the other model is Newton-Euler on CasADi's own symbols."""
     from shooting import point_to_point

@@ -97,6 +97,7 @@ def _assert_torques_of_the_state(output: str) -> None:
     np.testing.assert_allclose(found[:, 1], qdd, rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_c_through_find_package(prefix: Path, tmp_path: Path) -> None:
     _assert_torques_of_the_state(_with_cmake("c", prefix, tmp_path))
 
@@ -113,6 +114,7 @@ def _last_torques(robot: str, steps: int = 20000) -> np.ndarray:
     return model.inverse_dynamics(q, 0.5 - q, q - 0.2)
 
 
+@pytest.mark.slow
 def test_cpp17_class_of_two_robots_in_two_threads(prefix: Path, tmp_path: Path) -> None:
     """The program itself checks that each thread got what it gets alone."""
     _need("g++")

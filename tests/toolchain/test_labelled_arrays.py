@@ -87,6 +87,7 @@ def test_equal_robots_have_equal_tokens(robot: CompiledRobot) -> None:
     assert tokenize(other) != tokenize(robot)
 
 
+@pytest.mark.slow
 def test_a_cluster_of_processes_has_the_same_values(robot: CompiledRobot, tmp_path) -> None:
     """Any cluster by its address: the client connects to the scheduler of a LocalCluster by one."""
     distributed = pytest.importorskip("distributed")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from direct import Direct, shared_library
 from limbed import FUNCTIONS, kernels, package_of, shape
+from slow_cases import slow_but_for
 
 from psdmc.emit.options import EmitOptions
 from psdmc.functions import RECIPES
@@ -45,6 +46,14 @@ CASES = [
     (LEGS, "4 lanes", "float32", "inline"),
     (BOTH, "2 lanes", "float32", "libm"),
 ]
+QUICK = [
+    (LEGS, "2 lanes", "float64", "inline"),
+    (LEGS, "no vectors", "float64", "inline"),
+    (FIVE, "4 lanes", "float64", "inline"),
+    (FINGERS, "4 lanes", "float64", "inline"),
+    (LEGS, "4 lanes", "float32", "inline"),
+]
+"""Limbs that fill the lanes and limbs that do not, two widths and none, both precisions."""
 
 
 def runs_here(build: str) -> bool:
@@ -77,7 +86,7 @@ def called(compiled: Direct, function: str, state: dict[str, np.ndarray], size: 
     return out
 
 
-@pytest.mark.parametrize(("name", "build", "real", "trig"), CASES)
+@pytest.mark.parametrize(("name", "build", "real", "trig"), slow_but_for(QUICK, CASES, spread=True))
 def test_one_state_is_the_straight_lines(name: str, build: str, real: str, trig: str, tmp_path: Path) -> None:
     compiled, model, given = (
         built(name, build, tmp_path, real, trig),
@@ -130,19 +139,19 @@ def test_nan_in_one_limb_stays_out_of_what_does_not_depend_on_it(build: str, tmp
     assert np.isnan(torques[:7]).all()
 
 
-@pytest.mark.parametrize("limb", range(4))
-def test_a_pivot_that_is_not_positive_is_reported_as_by_the_straight_line(limb: int, tmp_path: Path) -> None:
-    """An angle that is not a number makes pivots that are none."""
-    given = given_states(LEGS)
-    nv, statuses = shape(LEGS)[1].nv, []
-    for build in ("4 lanes", "no vectors"):
-        compiled = built(LEGS, build, tmp_path / build.replace(" ", "_"))
+def test_a_pivot_that_is_not_positive_is_reported_as_by_the_straight_line(tmp_path: Path) -> None:
+    """An angle of any limb that is not a number makes pivots that are none."""
+    given, nv = given_states(LEGS), shape(LEGS)[1].nv
+    builds = [built(LEGS, build, tmp_path / build.replace(" ", "_")) for build in ("4 lanes", "no vectors")]
+    for limb in range(4):
         state = {key: rows[0].copy() for key, rows in given.items()}
         state["q"][7 + 3 * limb + 2] = np.nan
-        out = np.zeros(nv)
-        statuses.append(compiled("forward_dynamics", state["q"], state["qd"], state["tau"], out))
-        assert np.isnan(out).all()
-    assert statuses[0] == statuses[1] > 0
+        statuses = []
+        for compiled in builds:
+            out = np.zeros(nv)
+            statuses.append(compiled("forward_dynamics", state["q"], state["qd"], state["tau"], out))
+            assert np.isnan(out).all()
+        assert statuses[0] == statuses[1] > 0, limb
 
 
 def test_the_package_says_what_it_has(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -39,6 +40,13 @@ COUNT = 21
 """States: whole blocks of lanes and some more."""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def short_search() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "Search", partial(search.Search, budget=BUDGET))
+        yield
+
+
 @pytest.fixture(scope="module")
 def tree() -> RandomTree:
     """A free root with a planar joint, a spherical one behind a revolute one, and a translating one."""
@@ -53,9 +61,7 @@ def model(tree: RandomTree) -> DynamicsModel:
 @pytest.fixture(scope="module")
 def package(model: DynamicsModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wide") / "tree"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kernels, "Search", partial(search.Search, budget=BUDGET))
-        compiler.emit_c(model, folder, functions=[*FUNCTIONS, *BETWEEN])
+    compiler.emit_c(model, folder, functions=[*FUNCTIONS, *BETWEEN])
     return folder
 
 
@@ -105,7 +111,6 @@ def test_the_class_has_the_lengths_too(package: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.usefixtures("package")
 def test_python_takes_and_gives_arrays_of_these_shapes(tree: RandomTree, model: DynamicsModel) -> None:
     with without_optimisation():
         robot = psdmc.compile(model, functions=FUNCTIONS)
@@ -128,6 +133,10 @@ def test_python_takes_and_gives_arrays_of_these_shapes(tree: RandomTree, model: 
 
 def test_no_function_is_refused_to_joints_of_several_rates(model: DynamicsModel) -> None:
     require(model, tuple(RECIPES))
+
+
+@pytest.mark.slow
+def test_a_steps_jacobians_have_the_rates_lengths(model: DynamicsModel) -> None:
     rates = model.nv
     with without_optimisation():
         robot = psdmc.compile(model, functions=["rk4_step_derivatives"])
