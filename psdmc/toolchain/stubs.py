@@ -1,4 +1,5 @@
-"""python -m psdmc.toolchain.stubs: writes call.pyi, the compiled robot's methods for type checkers."""
+"""python -m psdmc.toolchain.stubs: writes call.pyi and model/answers.pyi, the methods of compiled robots and of models for
+type checkers."""
 
 from __future__ import annotations
 
