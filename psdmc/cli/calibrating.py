@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from psdmc.cli import interrupt
-from psdmc.cli.describing import describe_logs, fit_choice, parsed_joint_map
+from psdmc.cli.describing import describe_logs, fit_choice, parsed_joint_map, require_none
 from psdmc.cli.next_step import say_next
 from psdmc.cli.one_line import one_line
 from psdmc.cli.output import check_output, check_report
@@ -97,6 +97,23 @@ def calibrate(
     """Identify base parameters, friction and motor constants from logs; the verdict comes first, exit 6: not usable."""
     given = [model, *(logs or [])]
     if describe:
+        of_a_fit = {
+            "--report": report,
+            "--actuators": actuators,
+            "--physical/--no-physical": physical is not None,
+            "--torque-constants": torque_constants,
+            "--loaded": loaded,
+            "--load": load,
+            "--cutoff": cutoff is not None,
+            "--essential": essential,
+            "--prior-confidence": prior_confidence is not None,
+            "--keep": keep,
+            "--validate": validate,
+            "--split": split,
+            "--friction": friction,
+            "--joint-map": joint_map,
+        }
+        require_none([flag for flag, value in of_a_fit.items() if value])
         describe_logs(given, output, topic)
         return
     if len(given) < 2 or output is None:

@@ -18,6 +18,10 @@ from psdmc.cli import interrupt
 from psdmc.cli.joint_values import acceleration_limits, joint_numbers, joint_ranges, load_numbers
 from psdmc.cli.next_step import quoted, say_next_line
 from psdmc.cli.progress import steps
+from psdmc.errors import InputError
+
+USUAL_LOAD = "3.5,0.08,0,0.06"
+"""kg and m, of the tip."""
 
 
 def excite(
@@ -27,9 +31,12 @@ def excite(
         bool, typer.Option("--one-log", help="the exciting motion alone, for one linear fit of everything")
     ] = False,
     load: Annotated[
-        str,
-        typer.Option(metavar="MASS,X,Y,Z", help="kg and m in the tip's frame, of the motor runs; or none"),
-    ] = "3.5,0.08,0,0.06",
+        str | None,
+        typer.Option(
+            metavar="MASS,X,Y,Z",
+            help=f"kg and m in the tip's frame, of the motor runs; or none; default: {USUAL_LOAD}",
+        ),
+    ] = None,
     rate: Annotated[
         float, typer.Option(min=1.0, max=20_000.0, help="Hz, rows a second of trajectories")
     ] = 1000.0,
@@ -95,6 +102,12 @@ def excite(
         from psdmc.cli.tables import print_line
         from psdmc.report.calibrate_commands import excite_command
 
+    if one_log and (load or "none").strip() != "none":
+        raise InputError("--load is of the motor runs, which --one-log leaves out", "leave one of them out")
+    if meshes and not collisions:
+        raise InputError(
+            "--meshes, and --no-collisions, with which no shape is read", "leave one of them out"
+        )
     search = ExciteOptions(
         duration=duration,
         harmonics=tuple(range(1, harmonics + 1)),
@@ -112,7 +125,7 @@ def excite(
         for_all,
         joint_numbers(effort, "--effort"),
     )
-    carried = load_numbers(load)
+    carried = load_numbers(load or USUAL_LOAD)
     options = CampaignOptions(
         sweep=SweepOptions(period=1.0 / rate),
         sines=SineOptions(period=1.0 / rate),

@@ -34,6 +34,15 @@ def describe_logs(given: Sequence[Path], output: Path | None, topic: str | None)
     say_next("calibrate", model or "MODEL.npz", output, "-o", calibrated)
 
 
+def require_none(flags: Sequence[str]) -> None:
+    """InputError where options of a fit are given with --describe, which fits nothing."""
+    if flags:
+        raise InputError(
+            f"--describe drafts a description, and reads no {', '.join(flags)}",
+            "give them to the command that it prints, or write them into the draft",
+        )
+
+
 def fit_choice(cutoff: float | None, split: str | None, friction: Sequence[str] | None) -> FitChoice:
     """The options of the linear fit that the command line gives; InputError where one is none."""
     with interrupt.at_once():

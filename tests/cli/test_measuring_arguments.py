@@ -79,6 +79,36 @@ def test_excite_has_bounds(
     assert not (tmp_path / "campaign").exists()
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--one-log", "--load", "2,0,0,0.1"), "--load is of the motor runs, which --one-log leaves out"),
+        (("--no-collisions", "--meshes", "."), "--meshes, and --no-collisions, with which no shape is read"),
+    ],
+)
+def test_options_of_excite_that_exclude_each_other(
+    capsys: pytest.CaptureFixture[str], model: Path, tmp_path: Path, given: tuple[str, ...], message: str
+):
+    assert message in refused(capsys, "excite", model, "-o", tmp_path / "campaign", *given)
+    assert not (tmp_path / "campaign").exists()
+
+
+def test_a_draft_refuses_what_it_would_not_read(
+    capsys: pytest.CaptureFixture[str], model: Path, tmp_path: Path
+):
+    draft = tmp_path / "draft.toml"
+    words = ("calibrate", "--describe", model, log(tmp_path, "motor_torque"), "-o", draft)
+    further = ("--cutoff", "5", "--report", tmp_path / "page.html", "--essential", "--no-physical")
+
+    said = refused(capsys, *words, *further)
+
+    assert (
+        "--describe drafts a description, and reads no --report, --physical/--no-physical, --cutoff," in said
+    )
+    assert "--essential" in said
+    assert not draft.exists()
+
+
 def test_excite_does_not_overwrite(capsys: pytest.CaptureFixture[str], model: Path, tmp_path: Path):
     (tmp_path / "campaign.toml").write_text("mine", encoding="utf-8")
 
