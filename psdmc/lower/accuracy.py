@@ -12,20 +12,22 @@ from psdmc.lower.factored import Arrangement, RobotConstants, trace_dynamics
 from psdmc.model import recursive
 from psdmc.model.random_states import states_of
 from psdmc.program.interpret import interpret
+from psdmc.program.program import Program
+from psdmc.recipes.recipe import Polynomials, Recipe
 from psdmc.robot.mechanism import Array
 
 STATES, SEED = 32, 20_260_417
 
 LIMIT = 2e-12
-"""Error of an arrangement that may be taken: a fifth of what is promised, as these states are few. Robots of one scale
-have 1e-16 to 1e-13."""
+"""Error of an arrangement, or of an expanded PROGRAM, that may be taken: a fifth of what is promised, as these states are
+few. Robots of one scale have 1e-16 to 1e-13."""
 
 WRONG = 1e-8
 """Error that no rounding makes: an arrangement of another robot. The largest seen of robots that are admitted is 1e-10."""
 
 
 class Accuracy:
-    """Errors of a model's arrangements, by inverse dynamics: it runs the arithmetic of all other functions.
+    """Errors of a model's arrangements, by inverse dynamics: it runs the arithmetic of all other functions; and of PROGRAMs.
 
     robot    constants of the traces, with theta_b or with theta_b as an input
     theta_b  (l,)
@@ -37,16 +39,54 @@ class Accuracy:
         self._states = dict(zip(("q", "qd", "qdd"), vectors, strict=True))
 
     def error(self, arrangement: Arrangement) -> float:
-        """Largest difference from Newton-Euler about the file's link frames, relative to the joint's largest torque;
-        absolute, in N m or N, where that is zero."""
+        """That of inverse dynamics in an arrangement."""
         recipe = inverse_dynamics.RECIPE
-        program = trace_dynamics(recipe, arrangement, self.robot)
-        sizes = recipe.signature.sizes(self.robot.sizes)
-        found = interpret(program, self._states | {"theta_b": self.theta_b}, sizes)["tau"]
-        largest = np.abs(self._torques).max(axis=0)
-        return float(np.max(np.abs(found - self._torques) / np.where(largest > 0, largest, 1.0)))
+        return self.error_of(recipe, trace_dynamics(recipe, arrangement, self.robot))
+
+    def error_of(self, recipe: Recipe, program: Program) -> float:
+        """Largest difference of a function that is a part of the torques from Newton-Euler and composite bodies about the
+        file's link frames, as a torque (accelerations times the mass matrix) relative to the joint's largest one, of the
+        mass matrix relative to its row's largest entry; absolute where that is zero."""
+        signature, part = recipe.signature, recipe.polynomials
+        given = self._states | {"tau": self._torques, "theta_b": self.theta_b}
+        with np.errstate(all="ignore"):  # accelerations of a mass matrix that has no inverse
+            found = interpret(program, given, signature.sizes(self.robot.sizes))[signature.outputs[0].name]
+        count, nv = self._torques.shape
+        if part is Polynomials.MASS:
+            return _relative(found.reshape(count, nv, nv) - self._mass, self._mass)
+        if part is Polynomials.SOLVED:
+            lacking = np.einsum("sij,sj->si", self._mass, found - self._states["qdd"])
+        elif part is Polynomials.REGRESSOR:
+            lacking = found.reshape(count, nv, -1) @ self.theta_b - self._torques
+        else:
+            lacking = found - self._part(part)
+        return _relative(lacking, self._torques)
+
+    def _part(self, part: Polynomials | None) -> Array:
+        """The torques without what a function leaves out."""
+        q, qd, qdd = self._states.values()
+        if part is Polynomials.BIAS:
+            return self._newton_euler(q, qd, 0.0 * qdd)
+        return self._newton_euler(q, 0.0 * qd, 0.0 * qdd) if part is Polynomials.GRAVITY else self._torques
+
+    def _newton_euler(self, *states: Array) -> Array:
+        return recursive.torques(self.robot.chain, self._parameters, list(states))
+
+    @cached_property
+    def _parameters(self) -> Array:
+        return np.asarray(self.robot.representative @ self.theta_b)
 
     @cached_property
     def _torques(self) -> Array:
-        parameters = self.robot.representative @ self.theta_b
-        return recursive.torques(self.robot.chain, parameters, list(self._states.values()))
+        return self._newton_euler(*self._states.values())
+
+    @cached_property
+    def _mass(self) -> Array:
+        return recursive.mass_matrix(self.robot.chain, self._parameters, self._states["q"])
+
+
+def _relative(difference: Array, whole: Array) -> float:
+    """Largest difference of a joint's or a row's entries, relative to the largest of them; absolute where that is zero."""
+    others = tuple(axis for axis in range(whole.ndim) if axis != 1)
+    largest = np.abs(whole).max(axis=others)
+    return float(np.max(np.abs(difference).max(axis=others) / np.where(largest > 0, largest, 1.0)))

@@ -10,7 +10,9 @@ from typing import Literal
 from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, RECIPES, default_of
+from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.expanded.lowering import lower_expanded
+from psdmc.lower.expanded.terms import COEFFICIENT_NOISE
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
 from psdmc.lower.limb_search import LimbSearch
@@ -29,6 +31,10 @@ from psdmc.target.costs import Costs
 from psdmc.target.native import COSTS
 
 Lowering = Literal["auto", "expanded", "factored"]
+
+COEFFICIENT_NOISES = (COEFFICIENT_NOISE, 1e-15)
+"""Uncertainties of coefficients: the usual one, and next to none for robots of many scales, where what is left out of a
+large parameter's effect may be as large as a small one's."""
 
 EXPANDED_LIMIT = 600
 """Largest p for which `auto` tries the expanded lowering; beyond it, the factored one has always been cheaper."""
@@ -139,9 +145,9 @@ class _Lowered:
             return Kernel(recipe.signature, theta, program, program, "factored")
         candidates: list[Kernel] = []
         n = self.model.nv
-        if self._may_expand(recipe):
-            program = lower_expanded(self.model, recipe, theta, self.costs)
-            candidates.append(_kernel(recipe, theta, program, program, "expanded", self.costs, n))
+        expanded = self._expanded(recipe, theta) if self._may_expand(recipe) else None
+        if expanded is not None:
+            candidates.append(_kernel(recipe, theta, expanded, expanded, "expanded", self.costs, n))
         if self.lowering != "expanded" or not candidates:
             single = self._factored(recipe, theta, self.single)
             batch = self._factored(recipe, theta, self.batch)
@@ -156,6 +162,16 @@ class _Lowered:
         start = self._arrangement(recipe, False)
         limbs = LimbSearch(self._search(False), recipe, self.costs).best(start, kernel.single)
         return kernel if limbs is None else replace(kernel, limbs=limbs)
+
+    def _expanded(self, recipe: Recipe, theta: bool) -> Program | None:
+        """By the expanded lowering, with fewer coefficients left out or made one where that loses digits; None where they
+        are lost all the same."""
+        accuracy = self._search(theta).accuracy
+        for noise in COEFFICIENT_NOISES:
+            program = lower_expanded(self.model, recipe, theta, self.costs, noise)
+            if accuracy is None or accuracy.error_of(recipe, program) <= LIMIT:
+                return program
+        return None
 
     def _may_expand(self, recipe: Recipe) -> bool:
         if self.lowering == "factored" or recipe.polynomials is None or self.model.p is None:

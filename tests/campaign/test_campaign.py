@@ -22,6 +22,7 @@ from unoptimised import without_optimisation
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
+from psdmc.lower.kernels import lower
 from psdmc.lower.search import BUDGET, Search
 from psdmc.program.interpret import interpret
 from psdmc.robot.load import LoadedRobot, load_robot_text
@@ -118,6 +119,20 @@ def test_no_search_takes_an_arrangement_that_loses_digits(budget: int) -> None:
     for program in search.rearrangements(recipe, search.best(recipe, search.single)):
         found = interpret(program, given, {"tau": model.n})["tau"]
         assert np.all(np.abs(found - expected).max(axis=0) <= 1e-11 * np.abs(expected).max(axis=0))
+
+
+def test_no_coefficient_of_the_expanded_lowering_is_left_out_that_a_small_joint_feels() -> None:
+    """637, of many scales: entries of the mass matrix by theta_b were off by 9e-11."""
+    robot = random_robot(637)
+    chain = load_robot_text(robot.text, "urdf", snap=0.0).mechanism
+    model = derive_model(chain)
+    states = random_states(robot.seed, model.n, STATES)
+    reference = Reference.of(Textbook(Pinocchio.of_robot(robot)), states)
+    for kernel in lower(model, "expanded", ["mass_matrix"]).values():
+        assert kernel.lowering == "expanded"
+        given = {"q": states[0], "theta_b": model.theta_b}
+        found = interpret(kernel.single, given, {"M": model.n**2})["M"]
+        assert reference.mass_error(found.reshape(-1, model.n, model.n)) < 2e-12
 
 
 def test_no_accelerations_are_accepted_only_where_the_precision_leaves_none() -> None:

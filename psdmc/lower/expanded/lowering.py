@@ -11,6 +11,7 @@ from psdmc.dynamics.solve import factorize, solve
 from psdmc.lower.expanded.diagram import Diagram, nested_horner, operations, with_constants
 from psdmc.lower.expanded.orders import Joints, base_first, candidates, tip_first
 from psdmc.lower.expanded.terms import (
+    COEFFICIENT_NOISE,
     Terms,
     baked_torque_terms,
     gravity_terms,
@@ -41,9 +42,15 @@ TRACED = 3
 """How many diagrams, the cheapest by count, are traced and optimized to find the cheapest PROGRAM."""
 
 
-def lower_expanded(model: DynamicsModel, recipe: Recipe, theta: bool, costs: Costs = COSTS) -> Program:
+def lower_expanded(
+    model: DynamicsModel,
+    recipe: Recipe,
+    theta: bool,
+    costs: Costs = COSTS,
+    noise: float = COEFFICIENT_NOISE,
+) -> Program:
     """The PROGRAM of one function that is a part of the torques' polynomials. With `theta`, theta_b is an input; else
-    its values are constants.
+    its values are constants; `noise` is the uncertainty of coefficients.
 
     The order of rows, and whether parameters enter before or after equal parts are found, are chosen by cost, the same
     on every machine. Raises InputError where the model has no E and P, or its base parameters are needed and unknown;
@@ -51,27 +58,27 @@ def lower_expanded(model: DynamicsModel, recipe: Recipe, theta: bool, costs: Cos
     """
     if recipe.polynomials is None or (theta and not recipe.signature.theta):
         raise ValueError(f"the expanded lowering does not make {recipe.name}{'_theta' * theta}")
-    diagrams = sorted(_diagrams(model, recipe.polynomials, theta), key=lambda d: sum(operations(d)))
+    diagrams = sorted(_diagrams(model, recipe.polynomials, theta, noise), key=lambda d: sum(operations(d)))
     programs = (_traced(model, recipe, theta, diagram, costs) for diagram in diagrams[:TRACED])
     return min(programs, key=lambda program: cost(program).total)
 
 
-def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool) -> Iterator[Diagram]:
+def _diagrams(model: DynamicsModel, part: Polynomials, theta: bool, noise: float) -> Iterator[Diagram]:
     """Candidate diagrams. Baked parameters enter in one of two ways: as rows that become constants afterwards (equal
     parts are then found whatever the parameters' values are, and constants stand innermost), or in the coefficients
     at once."""
     n = model.n
     if part is Polynomials.REGRESSOR:
-        yield from _in_all_orders(with_gravity(regressor_terms(model), model.mechanism), tip_first(n))
+        yield from _in_all_orders(with_gravity(regressor_terms(model, noise), model.mechanism), tip_first(n))
         return
-    symbolic = _part(part, with_gravity(torque_terms(model), model.mechanism), n)
+    symbolic = _part(part, with_gravity(torque_terms(model, noise), model.mechanism), n)
     if theta:
         yield from _in_all_orders(symbolic, base_first(n))
         return
     values = dict(enumerate(known_parameters(model).tolist(), start=BLOCKS * n))
     present = _without_zero_rows(symbolic, values)
     yield from (with_constants(diagram, values) for diagram in _in_all_orders(present, base_first(n)))
-    baked = _part(part, with_gravity(baked_torque_terms(model), model.mechanism), n)
+    baked = _part(part, with_gravity(baked_torque_terms(model, noise), model.mechanism), n)
     yield from _in_all_orders(baked, base_first(n))
 
 

@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 COEFFICIENT_NOISE = 1e-13
-"""Uncertainty of a coefficient, relative to the largest one of its joint (and parameter): rounding of the derivation, a
-tenth of the accuracy that every lowering must keep."""
+"""Usual uncertainty of a coefficient, relative to the largest one of its joint (and parameter): rounding of the
+derivation, a hundredth of the accuracy that every lowering must keep. Smaller coefficients are left out, and such as are
+nearer to each other are made one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,16 +56,16 @@ class Terms:
         )
 
 
-def torque_terms(model: DynamicsModel) -> Terms:
+def torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
     """tau[0..n-1] over rows of E and theta_b; InputError where the model was not expanded."""
     expansion = _expanded(model)
-    terms, parameter = _stacked(expansion.E, expansion.entries, model.l)
+    terms, parameter = _stacked(expansion.E, expansion.entries, model.l, noise)
     one_hot = (np.arange(model.l)[:, None] == parameter).astype(np.uint8)
     exponents = np.concatenate([terms.exponents, one_hot])
     return Terms(terms.output, exponents, terms.coefficient, terms.uncertainty)
 
 
-def baked_torque_terms(model: DynamicsModel) -> Terms:
+def baked_torque_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
     """tau[0..n-1] over rows of E, theta_b in the coefficients; InputError where it is unknown."""
     expansion, theta_b = _expanded(model), known_parameters(model)
     n, p = expansion.n, expansion.p
@@ -72,13 +73,13 @@ def baked_torque_terms(model: DynamicsModel) -> Terms:
     weights = np.bincount(joint * np.int64(p) + row, value * theta_b[column], n * p).reshape(n, p)
     joints, monomials = np.nonzero(weights)
     entries = Entries(joints, monomials, np.zeros_like(joints), weights[joints, monomials])
-    return _stacked(expansion.E, entries, 1)[0]
+    return _stacked(expansion.E, entries, 1, noise)[0]
 
 
-def regressor_terms(model: DynamicsModel) -> Terms:
+def regressor_terms(model: DynamicsModel, noise: float = COEFFICIENT_NOISE) -> Terms:
     """Y[i, k] as output i * l + k, over rows of E."""
     expansion = _expanded(model)
-    terms, parameter = _stacked(expansion.E, expansion.entries, model.l)
+    terms, parameter = _stacked(expansion.E, expansion.entries, model.l, noise)
     output = terms.output * model.l + parameter
     return Terms(output, terms.exponents, terms.coefficient, terms.uncertainty)
 
@@ -102,13 +103,13 @@ def known_parameters(model: DynamicsModel) -> Array:
     return model.theta_b
 
 
-def _stacked(E: NDArray[np.uint8], weights: Entries, width: int) -> tuple[Terms, Integers]:
-    """One term for each entry of the joints' (p, width) weights, and the column of each. Uncertainties are relative to
-    the largest entry of a joint's column."""
+def _stacked(E: NDArray[np.uint8], weights: Entries, width: int, noise: float) -> tuple[Terms, Integers]:
+    """One term for each entry of the joints' (p, width) weights, and the column of each. Uncertainties are `noise` times the
+    largest entry of a joint's column."""
     place = weights.joint * np.int64(width) + weights.column
     largest = np.zeros((E.shape[0] // 5) * width)
     np.maximum.at(largest, place, np.abs(weights.value))
-    doubt = COEFFICIENT_NOISE * largest[place]
+    doubt = noise * largest[place]
     keep = np.abs(weights.value) > doubt
     terms = Terms(
         weights.joint[keep].astype(np.int64), E[:, weights.row[keep]], weights.value[keep], doubt[keep]
