@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.linear_rows import Block, Rows, collected, reduced, residual_of
 from psdmc.calibration.identify.residuals import sample_correlation, spread, widening
+from psdmc.calibration.identify.reweighted import Sandwich, huber_sandwich, squares
 from psdmc.calibration.logs.log import Array
 
 Method = Literal["ols", "wls", "irls"]
@@ -264,21 +265,21 @@ class _Solved:
         )
 
     def estimate(self, covariance: Array | None) -> Estimate:
-        l = len(self.values)
-        freedom = max(int(np.count_nonzero(self.weights)) - self.rank, 1)
+        l, use = len(self.values), self.weights > 0
         weighted = self.residual * self.weights
-        variance = float(np.sum(weighted**2)) / freedom
-        own = widening(weighted, self.weights > 0)
         sums = collected(self.rows, self.weights, weighted, self._clusters(len(weighted)))
-        joints = np.tensordot(own**2, sums.squares, axes=1)
-        fit = variance * self.inverse @ (self.inverse.T @ joints @ self.inverse) @ self.inverse.T
-        fit *= max(self._optimism(np.diag(fit), sums.scores), 1.0) ** 2
+        sandwich = self._sandwich(weighted, use)
+        by_scores = self._by_scores(sandwich, sums.squares)
+        white = by_scores @ np.tensordot(sandwich.level, sums.squares, axes=1) @ by_scores.T
+        level = sandwich.level * widening(weighted, use) ** 2
+        fit = by_scores @ np.tensordot(level, sums.squares, axes=1) @ by_scores.T
+        fit *= max(self._optimism(np.diag(fit), sums.scores @ by_scores.T), 1.0) ** 2
         considered, total = np.zeros((l, 0)), fit
         if covariance is not None and sums.consider.shape[1]:
             considered = -self.inverse @ (self.inverse.T @ sums.consider)
             total = fit + considered @ covariance @ considered.T
-        factor = self._noise_factor(np.diag(fit), variance)
-        unit = np.sqrt(variance) or 1.0
+        factor = self._noise_factor(np.diag(fit), np.diag(white))
+        unit = np.sqrt(sandwich.unit) or 1.0
         by_prior = self.unseen.T / self.scale / self.options.seen
         return Estimate(
             values=self.values,
@@ -292,15 +293,29 @@ class _Solved:
             identifiable=self.identifiable,
             singular_values=self.column_values,
             rank=self.rank,
-            sigma=spread(self.residual, self.weights > 0),
+            sigma=spread(self.residual, use),
             weights=self.weights,
-            correlation=sample_correlation(self.residual, self.weights > 0),
+            correlation=sample_correlation(self.residual, use),
             noise_factor=factor,
         )
 
-    def _noise_factor(self, widened: Array, variance: float) -> float:
+    def _sandwich(self, weighted: Array, use: NDArray[np.bool_]) -> Sandwich:
+        """How sizes and slopes of the weighted residual enter the covariance."""
+        count = max(int(np.count_nonzero(use)), 1)
+        freedom = max(count - self.rank, 1)
+        if self.options.method == "irls":
+            return huber_sandwich(weighted, use, self.options.huber, freedom / count)
+        return squares(weighted.shape[1], float(np.sum(weighted**2)) / freedom)
+
+    def _by_scores(self, sandwich: Sandwich, own: Array) -> Array:
+        """(l, l) change of the values per unit of the score A' r; own (n, l, l) are the joints' squares A'A."""
+        slopes = np.tensordot(sandwich.slope, own, axes=1)
+        return np.asarray(
+            self.inverse @ np.linalg.solve(self.inverse.T @ slopes @ self.inverse, self.inverse.T)
+        )
+
+    def _noise_factor(self, widened: Array, white: Array) -> float:
         """The largest ratio of a standard deviation to that for white residuals."""
-        white = variance * np.sum(self.inverse**2, axis=1)
         seen = np.flatnonzero((white > 0) & self.identifiable)
         return float(np.sqrt(np.max(widened[seen] / white[seen]))) if len(seen) else 1.0
 
@@ -309,14 +324,14 @@ class _Solved:
         clusters = min(self.options.clusters, count // 4)
         return clusters if clusters >= FEWEST_CLUSTERS and self.rank else 0
 
-    def _optimism(self, widened: Array, scores: Array) -> float:
+    def _optimism(self, widened: Array, moved: Array) -> float:
         """Cluster-robust over widened standard deviation, median over parameters (Liang and Zeger 1986): clusters are
-        stretches of time."""
-        count = len(scores)
+        stretches of time. moved (c, l) is what each stretch's score does to the values."""
+        count = len(moved)
         seen = np.flatnonzero((widened > 0) & self.identifiable)
         if not count or not len(seen):
             return 1.0
-        robust = np.sum((scores @ self.inverse @ self.inverse.T) ** 2, axis=0) * count / (count - 1)
+        robust = np.sum(moved**2, axis=0) * count / (count - 1)
         return float(np.sqrt(np.median(robust[seen] / widened[seen])))
 
 

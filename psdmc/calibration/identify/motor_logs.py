@@ -50,9 +50,6 @@ LARGEST_STEP = 1.0
 """Of a step after the first, in the constant's logarithm."""
 WORST = 0.05
 """Relative standard deviation from which a torque constant is not found: the motor sweeps' limit, too."""
-REWEIGHTED = 1.1
-"""Standard deviations of a reweighted fit are too small by this where errors are normal: Huber's weights at 1.345 leave 0.82
-of the errors' square and 0.95 of the rows' weight, and the estimate's own variance is 1.05."""
 MOST_POSES = 400
 """Of a log, in which the load's weight is looked at."""
 
@@ -123,7 +120,7 @@ def motors_by_load(
     constants, solved = _settled(
         chain, model, problem, known, np.arange(len(known)) >= count, options, theta_b
     )
-    std = (REWEIGHTED if options.fit.method == "irls" else 1.0) * solved.std[-len(chain) :]
+    std = solved.std[-len(chain) :]
     found = std < WORST
     _require_some(listed([log.name for log in loaded], 3), constants, found)
     warnings = [note for log in loaded for note in log.notes]
