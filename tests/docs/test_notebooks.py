@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from slow_cases import slow_but_for
 from unoptimised import wrapper
 
 nbformat = pytest.importorskip("nbformat")
@@ -30,7 +31,7 @@ def test_a_notebook_is_kept_without_outputs(path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", slow_but_for(NOTEBOOKS[:1], NOTEBOOKS), ids=lambda path: path.stem)
 def test_a_notebook_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What it compiles is not optimised: no assertion of theirs is about speed."""
     monkeypatch.setenv("MPLBACKEND", "agg")

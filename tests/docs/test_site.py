@@ -38,6 +38,7 @@ def test_links_out_of_the_site_are_names():
     assert text == "the consumers (`examples/consumers`), [pass](passes.md#x), h (`README.md`)"
 
 
+@pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path: Path):
     pytest.importorskip("furo")
     site_pages.gather(tmp_path / "source")
@@ -46,6 +47,7 @@ def test_the_site_builds_without_a_warning(tmp_path: Path):
     assert (tmp_path / "site/reference/cli.html").exists()
 
 
+@pytest.mark.slow
 def test_a_broken_link_is_an_error(tmp_path: Path):
     pytest.importorskip("furo")
     source = tmp_path / "source"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from against_pinocchio import WHOLE
 from pinocchio_robots import path_of
 from unoptimised import without_optimisation
 from wide_robots import KINDS, is_pinocchios, wide_robot
@@ -33,7 +34,7 @@ def test_the_recursion_is_pinocchios(name: str) -> None:
             assert np.abs(found[block] - values).max() <= limit * np.abs(values).max(), (function, block)
 
 
-@pytest.mark.parametrize("name", ["small", "hand"])
+@pytest.mark.parametrize("name", ["small", *(["hand"] if WHOLE else [])])
 @pytest.mark.parametrize("function", [*TORQUES, "inverse_dynamics_jvp"])
 def test_torques_derivatives_are_pinocchios(function: str, name: str) -> None:
     is_pinocchios(function, name, EXACT, in_c=name == "small")
@@ -62,6 +63,7 @@ def test_columns_are_difference_quotients_along_integrate() -> None:
         np.testing.assert_allclose(by_q[:, :, k], (ahead - behind) / 2e-6, atol=1e-7 * np.abs(by_q).max())
 
 
+@pytest.mark.skipif(not WHOLE, reason="make test-accuracy takes it")
 def test_a_quadrupeds_in_c_one_state_after_the_other() -> None:
     """Products with M^-1 in loops, and no code for lanes: as lines they would take gcc minutes."""
     path = path_of("solo12")
