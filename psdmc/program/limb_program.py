@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
 from psdmc.program.replay import Value, replayed
-from psdmc.program.trace import Tracer, constants_of
+from psdmc.program.trace import Tracer, constants_of, group_name
 
 Spread = tuple[Slot, tuple[Slot, ...]]
 """A slot of a limb, and the function's own slots that it stands for, limb by limb."""
@@ -42,7 +42,8 @@ class LimbGroup:
 
     @property
     def name(self) -> str:
-        return f"limbs{self.number}"
+        """What its vectors' names begin with. Names of what belongs to a number of limbs begin otherwise."""
+        return group_name(self.number)
 
     @property
     def constant(self) -> str:

@@ -33,9 +33,14 @@ Outputs = Sequence[tuple[Slot, "Symbol | Constant"]]
 """What a trace puts out, in order of storing."""
 
 
+def group_name(group: int) -> str:
+    """What the names of a group's vectors begin with."""
+    return f"group{group}"
+
+
 def constants_of(group: int) -> str:
     """Name of the vector of a group's constants."""
-    return f"limbs{group}_constants"
+    return f"{group_name(group)}_constants"
 
 
 class Tracer:

@@ -15,25 +15,25 @@ from psdmc.program.text import parse, show
 TWO = LimbGroup(
     number=0,
     count=2,
-    inputs=((Slot("limbs0_q", 0), (Slot("q", 1), Slot("q", 2))),),
+    inputs=((Slot("group0_q", 0), (Slot("q", 1), Slot("q", 2))),),
     constants=((3.0, 5.0),),
-    outputs=((Slot("limbs0_output", 0), (Slot("tau", 1), Slot("tau", 2))),),
+    outputs=((Slot("group0_output", 0), (Slot("tau", 1), Slot("tau", 2))),),
 )
 WHOLE = """
     body = load q[0]
-    leg = load limbs0_q[0]
-    k = load limbs0_constants[0]
+    leg = load group0_q[0]
+    k = load group0_constants[0]
     s = sin body
     c = cos leg
     force = mul s c
     own = mul force k
-    all = load limbs0_sum[0]
+    all = load group0_sum[0]
     carried = mul all s
     pushed = mul carried c
     back = add pushed own
     out tau[0] = carried
-    out limbs0_partial[0] = own
-    out limbs0_output[0] = back
+    out group0_partial[0] = own
+    out group0_output[0] = back
 """
 
 
@@ -43,7 +43,7 @@ def test_core_limbs_core_limbs():
     assert [stage.group for stage in stages] == [None, 0, None, 0]
     assert show(stages[0].program).splitlines() == ["t0 = load q[0]", "t1 = sin t0", "out core[0] = t1"]
     assert show(stages[2].program).splitlines() == [
-        "t0 = load limbs0_sum[0]",
+        "t0 = load group0_sum[0]",
         "t1 = load core[0]",
         "t2 = mul t0 t1",
         "out tau[0] = t2",
@@ -66,12 +66,12 @@ def test_written_out_limb_by_limb_it_is_the_same_function():
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("a = load limbs0_q[0]\nout tau[0] = a", "differs from limb to limb"),
-        ("a = load limbs0_q[0]\nb = load limbs1_q[0]\nc = add a b\nout tau[0] = c", "two groups"),
-        ("a = load limbs0_sum[0]\nout tau[0] = a\nout limbs0_partial[0] = a", "depends on itself"),
+        ("a = load group0_q[0]\nout tau[0] = a", "differs from limb to limb"),
+        ("a = load group0_q[0]\nb = load group1_q[0]\nc = add a b\nout tau[0] = c", "two groups"),
+        ("a = load group0_sum[0]\nout tau[0] = a\nout group0_partial[0] = a", "depends on itself"),
     ],
 )
 def test_what_is_no_function_of_core_and_limbs_is_refused(text: str, fault: str):
-    other = LimbGroup(1, 2, ((Slot("limbs1_q", 0), (Slot("q", 3), Slot("q", 4))),), (), ())
+    other = LimbGroup(1, 2, ((Slot("group1_q", 0), (Slot("q", 3), Slot("q", 4))),), (), ())
     with pytest.raises(InternalError, match=fault):
         staged(parse(text), [TWO, other])

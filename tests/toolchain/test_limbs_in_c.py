@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import platform
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from direct import Direct, shared_library
-from limbed import FUNCTIONS, kernels, package_of, shape
+from limbed import FUNCTIONS, kernels, limbed, package_of, shape
 from slow_cases import slow_but_for
 
+from psdmc.derivation.derive import derive_model
+from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
+from psdmc.emit.package import package_view
 from psdmc.functions import RECIPES
+from psdmc.lower.kernels import lower
 from psdmc.model.random_states import states_of
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import Sizes
+from psdmc.target.native import COSTS
 from psdmc.target.presets import SCALAR, preset
 
 LEGS, FIVE, BOTH = (
@@ -25,6 +32,8 @@ LEGS, FIVE, BOTH = (
     "arms on a trunk, legs on its root",
 )
 FINGERS = "three fingers on a wrist"
+EAGER = replace(COSTS, worth_limbs=0.1)
+"""Limbs run in lanes, whether that pays or not."""
 COUNT = 8
 EXACT = {"float64": 1e-12, "float32": 2e-3}
 """Of an output's largest value; accelerations follow the mass matrix's condition."""
@@ -171,3 +180,21 @@ def test_machines_without_vectors_and_packages_without_limbs_have_no_trace_of_th
         assert not [path for path in package_files(package_of(LEGS, options)) if "limbs" in path]
     narrow = package_files(package_of(LEGS, EmitOptions(target=preset("x86-64-v2"))))
     assert "#define LIMBS4_WIDTH 2" in narrow["src/vectors.h"]
+
+
+def test_the_third_group_s_sums_are_no_sum_over_two_limbs(tmp_path: Path) -> None:
+    """Vectors are named by their group's number, functions over limbs by how many these are: both are two here."""
+    tree = limbed(1, "FR", [(1, "RR", 2), (0, "RRR", 2), (0, "RR", 3)])
+    model = derive_model(tree.mechanism(), expand=False)
+    made = lower(model, "factored", ["mass_matrix"], theta_variants=False, costs=EAGER)
+    limbs = made["mass_matrix"].limbs
+    assert limbs is not None
+    assert [group.count for group in limbs.groups] == [2, 3, 2]
+    package = package_view(package_info(model), made, EmitOptions())
+
+    compiled = Direct(package, shared_library(package, tmp_path, ["-O0", *BUILDS["4 lanes"]]))
+
+    (q,) = tree.motion(1)[0]
+    found = called(compiled, "mass_matrix", {"q": q.copy()}, model.nv**2).reshape(model.nv, model.nv)
+    upper = np.triu(tree.each(pin.crba, q[None])[0])
+    assert np.abs(found - upper - np.triu(upper, 1).T).max() <= EXACT["float64"] * upper.max()
