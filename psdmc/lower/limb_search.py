@@ -7,17 +7,22 @@ for all of its group; then exchanges are made in all limbs at once.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from psdmc.dynamics.frames import BASE
+from psdmc.dynamics.motion import Choices
+from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.lower.accuracy import LIMIT
+from psdmc.lower.branches import limbs_in
 from psdmc.lower.factored import Arrangement
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limbs import TracedLimbs, cost_of_limbs, trace_limbs
-from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, Search, distinct, for_lanes, for_one_state
+from psdmc.lower.reframe import Reframed
+from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, ROUNDING, Search, distinct, for_lanes, for_one_state
 from psdmc.program.limb_cost import StageCost, stage_costs
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.limb_stages import staged
@@ -76,6 +81,7 @@ class LimbSearch:
     def __init__(self, search: Search, recipe: Recipe, costs: Costs) -> None:
         self.search, self.recipe, self.costs = search, recipe, costs
         self.lanes = min(USUAL, costs.angles_per_sincos)
+        self._parts: dict[tuple[Reframed, tuple[int, ...], Choices, tuple[Limbs, ...]], float] = {}
 
     def best(self, start: Arrangement, straight: Program) -> LimbProgram | None:
         """The function with limbs in lanes; None where no width makes it worth while against the straight line."""
@@ -99,7 +105,8 @@ class LimbSearch:
             improved = best
             for candidate in self._exchanged(best.arrangement, groups):
                 budget -= 1
-                improved = self._cheapest(improved, [candidate])
+                if self._expected(best, candidate) < improved.weight - ROUNDING:
+                    improved = self._cheapest(improved, [candidate])
                 if budget == 0:
                     break
             if improved is best:
@@ -119,6 +126,28 @@ class LimbSearch:
     def _weighed(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> _Candidate:
         found, stages = cost_of_limbs(self.recipe, arrangement, self.search.robot, groups)
         return _Candidate(arrangement, groups, weight_of_stages(found, stages, self.lanes, self.costs))
+
+    def _expected(self, best: _Candidate, candidate: Arrangement) -> float:
+        """The weight of an exchange, told from the branches that it changes; -inf where it is not told."""
+        found, groups, branches = best.arrangement, best.groups, self.search.branches
+        kept = branches.changed(self.recipe, found, candidate, groups)
+        if kept is None:
+            return -math.inf
+        try:
+            before, behind = (self._weight_of_part(each, groups, kept) for each in (found, candidate))
+        except SingularMassMatrix:  # what the branches hang on has its inertia from others
+            return -math.inf
+        return best.weight - before + behind
+
+    def _weight_of_part(
+        self, arrangement: Arrangement, groups: tuple[Limbs, ...], kept: tuple[int, ...]
+    ) -> float:
+        part, robot = self.search.branches.part(arrangement, kept)
+        key = part.reframed, part.carriers, part.choices, groups
+        if key not in self._parts:
+            found, stages = cost_of_limbs(self.recipe, part, robot, limbs_in(groups, kept))
+            self._parts[key] = weight_of_stages(found, stages, self.lanes, self.costs)
+        return self._parts[key]
 
     def _traced(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> TracedLimbs:
         return trace_limbs(self.recipe, arrangement, self.search.robot, groups)

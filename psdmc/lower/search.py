@@ -16,8 +16,10 @@ import numpy as np
 
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.motion import Choices
+from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.errors import InternalError
 from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy
+from psdmc.lower.branches import Branches
 from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace, every_parameter
 from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
 from psdmc.lower.geometry import LARGE, Geometry
@@ -36,6 +38,10 @@ BUDGET = 600
 LARGEST_TRANSFER = 1e4
 """Carriers whose values would be larger multiples of theta_b (lengths in the chain's unit) are not considered: torques
 would be small differences of large numbers."""
+
+
+ROUNDING = 1e-6
+"""Differences of scores below this are rounding: weights have few decimals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +108,7 @@ class Search:
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
         self.is_large = len(chain) > LARGE
+        self.branches = Branches(self.robot)
         self._is_arm = chain.is_serial and not self.is_large and all(kind.about_z for kind in chain.types)
         self.budget = budget * LARGE**2 // max(LARGE, len(chain)) ** 2
         self._costs: dict[tuple[str, Reframed, float, tuple[int, ...], Choices], Cost] = {}
@@ -148,9 +155,36 @@ class Search:
             for feet in self.geometry.feet:
                 descent.consider(self.starts(feet))
             descent.consider(self._units(descent.arrangement))
-        while descent.consider(self._exchanges(descent.arrangement)):
+        while descent.consider(
+            self._exchanges(descent.arrangement), self._expected(recipe, scoring, descent.arrangement)
+        ):
             pass
         return descent.arrangement
+
+    def _expected(
+        self, recipe: Recipe, scoring: Scoring, found: Arrangement
+    ) -> Callable[[Arrangement], float]:
+        """The score of an exchange, told from the branches that it changes; -inf where it is not told."""
+
+        def expected(candidate: Arrangement) -> float:
+            kept = self.branches.changed(recipe, found, candidate)
+            if kept is None:
+                return -math.inf
+            try:
+                costs = [self._branch_cost(recipe, each, kept) for each in (found, candidate)]
+            except SingularMassMatrix:  # what the branches hang on has its inertia from others
+                return -math.inf
+            before, behind = map(scoring.weight, costs)
+            return scoring.weight(self.cost(recipe, found)) - before + behind
+
+        return expected
+
+    def _branch_cost(self, recipe: Recipe, a: Arrangement, kept: tuple[int, ...]) -> Cost:
+        part, robot = self.branches.part(a, kept)
+        key = recipe.name, part.reframed, a.unit, part.carriers, a.choices
+        if key not in self._costs:
+            self._costs[key] = cost_of_dynamics(recipe, part, robot)
+        return self._costs[key]
 
     def _accurate(self, firsts: Sequence[Arrangement], accuracy: Accuracy) -> Arrangement:
         """The most accurate of several arrangements; one within LIMIT where exchanges of its carriers lead to it, or where
@@ -274,13 +308,20 @@ class _Descent:
         self._score_of, self._left, self._score = score, budget, math.inf
         self._is_admitted = is_admitted
 
-    def consider(self, candidates: Iterator[Arrangement]) -> bool:
-        """Try candidates in order, moving to each that is cheaper. Returns whether any was."""
+    def consider(
+        self, candidates: Iterator[Arrangement], expected: Callable[[Arrangement], float] | None = None
+    ) -> bool:
+        """Try candidates in order, moving to each that is cheaper. Returns whether any was.
+
+        expected  a score that costs less to find: candidates that are no cheaper by it are not tried
+        """
         improved = False
         for candidate in candidates:
             if self._left == 0:
                 return False
             self._left -= 1
+            if expected is not None and expected(candidate) > self._score + ROUNDING:
+                continue
             score = self._score_of(candidate)
             if score < self._score and self._is_admitted(candidate):
                 self.arrangement, self._score, improved = candidate, score, True
