@@ -44,6 +44,7 @@ def test_its_states_are_pinocchios(from_python) -> None:
     assert np.abs(model.inverse_dynamics(q, v, a) - expected).max() <= 1e-5 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_from_numpy_on_one_and_on_two_threads(
     from_python, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -135,6 +135,7 @@ def test_a_c_program_moves_it_as_readme_says(work: Path, oracle: pin.Model) -> N
     np.testing.assert_allclose(tau, pin.rnea(oracle, oracle.createData(), q, rest, rest), atol=1e-13)
 
 
+@pytest.mark.slow
 def test_compiled_functions_are_pinocchios(model: DynamicsModel, oracle: pin.Model) -> None:
     assert list(oracle.names)[1:] == list(model.joint_names)
     with without_optimisation():
