@@ -37,7 +37,6 @@ QUICK = CampaignOptions(
 )
 
 
-@pytest.mark.slow
 def test_from_a_model_without_parameters_to_one_with_them(tmp_path: Path):
     model = derive_model(load_robot(EXAMPLES / "robots" / "denso_wall.toml", drive_inertia=True).chain)
     save(replace(model, theta_b=None), tmp_path / "unknown.npz")
