@@ -21,13 +21,7 @@ def integrated(frames: Sequence[Frame], q: Sequence[Scalar], step: Sequence[Scal
 
 def difference(frames: Sequence[Frame], q: Sequence[Scalar], other: Sequence[Scalar]) -> list[Scalar]:
     """nv constant rates that lead from q to `other` in a second, the short way round."""
-    found: list[Scalar] = []
-    used = 0
-    for frame in leading(frames):
-        part = slice(used, used + frame.joint.nq)
-        found += frame.joint.difference(q[part], other[part])
-        used = part.stop
-    return found
+    return [x for joint, here, there in _coordinates(frames, q, other) for x in joint.difference(here, there)]
 
 
 def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Scalar]:
@@ -45,13 +39,7 @@ def rates_bent(
 
 def tangent(frames: Sequence[Frame], q: Sequence[Scalar], moved: Sequence[Scalar]) -> list[Scalar]:
     """nv rates at which `restored(q)` moves while coordinates q, of any length, move by nq of `moved` per second."""
-    found: list[Scalar] = []
-    used = 0
-    for frame in leading(frames):
-        part = slice(used, used + frame.joint.nq)
-        found += frame.joint.tangent(q[part], moved[part])
-        used = part.stop
-    return found
+    return [x for joint, here, own in _coordinates(frames, q, moved) for x in joint.tangent(here, own)]
 
 
 def restored(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
@@ -62,17 +50,25 @@ def restored(frames: Sequence[Frame], q: Sequence[Scalar]) -> list[Scalar]:
 def pulled_back(frames: Sequence[Frame], q: Sequence[Scalar], gradient: Sequence[Scalar]) -> list[Scalar]:
     """nv derivatives by the tangent at q of what has these nq derivatives by the coordinates."""
     found: list[Scalar] = []
+    for joint, here, own in _coordinates(frames, q, gradient):
+        for k in range(joint.nv):
+            moved = joint.coordinate_rates(here, [1.0 if i == k else 0.0 for i in range(joint.nv)])
+            total: Scalar = 0.0
+            for rate, slope in zip(moved, own, strict=True):
+                total = total + rate * slope
+            found.append(total)
+    return found
+
+
+def _coordinates(
+    frames: Sequence[Frame], q: Sequence[Scalar], other: Sequence[Scalar]
+) -> Iterator[tuple[JointType, Sequence[Scalar], Sequence[Scalar]]]:
+    """Joint by joint what two vectors of nq have of it."""
     used = 0
     for frame in leading(frames):
-        part, nv = slice(used, used + frame.joint.nq), frame.joint.nv
-        for k in range(nv):
-            moved = frame.joint.coordinate_rates(q[part], [1.0 if i == k else 0.0 for i in range(nv)])
-            total: Scalar = 0.0
-            for rate, own in zip(moved, gradient[part], strict=True):
-                total = total + rate * own
-            found.append(total)
+        part = slice(used, used + frame.joint.nq)
+        yield frame.joint, q[part], other[part]
         used = part.stop
-    return found
 
 
 def _joints(

@@ -280,28 +280,13 @@ def test_an_output_that_is_the_input(model: Path, tmp_path: Path, capsys: pytest
     (tmp_path / "m.npz").write_bytes(model.read_bytes())
     (tmp_path / "link.npz").symlink_to("m.npz")
     before = files_in(tmp_path)
+    with_report = ("calibrate", tmp_path / "m.npz", "log.csv", "-o", tmp_path / "x.npz", "--report")
     for words in (
         ("derive", tmp_path / "robot.toml", "-o", tmp_path / "robot.toml"),
         ("calibrate", tmp_path / "m.npz", tmp_path / "log.csv", "-o", tmp_path / "m.npz"),
         ("calibrate", tmp_path / "m.npz", tmp_path / "log.csv", "-o", tmp_path / "link.npz"),
-        (
-            "calibrate",
-            tmp_path / "m.npz",
-            "log.csv",
-            "-o",
-            tmp_path / "x.npz",
-            "--report",
-            tmp_path / "m.npz",
-        ),
-        (
-            "calibrate",
-            tmp_path / "m.npz",
-            "log.csv",
-            "-o",
-            tmp_path / "x.npz",
-            "--report",
-            tmp_path / "x.json",
-        ),
+        (*with_report, tmp_path / "m.npz"),
+        (*with_report, tmp_path / "x.json"),
         ("bench", tmp_path / "m.npz", "--json", tmp_path / "m.npz"),
         ("bench", tmp_path / "m.npz", "--json", tmp_path / "x", "--report", tmp_path / "x"),
     ):

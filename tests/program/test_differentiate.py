@@ -84,10 +84,7 @@ def test_products_with_tangents_and_cotangents_are_those_of_the_jacobians(some_p
     assert np.array_equal(found["tau"], whole["tau"])
 
 
-TURNED = parse("""
-    a = load q[0]
-    x = load q[1]
-    y = load qd[0]
+TURNING = """
     s = sin a
     c = cos a
     cx = mul c x
@@ -96,6 +93,14 @@ TURNED = parse("""
     sx = mul s x
     u = add cx sy
     v = sub cy sx
+"""
+"""(u, v): the vector (x, y), turned back by a."""
+
+TURNED = parse(f"""
+    a = load q[0]
+    x = load q[1]
+    y = load qd[0]
+    {TURNING}
     w = mul u u
     out tau[0] = w
     out tau[1] = v
@@ -121,20 +126,13 @@ def test_a_gradient_costs_a_few_times_the_function(some_program: Program):
 
 def test_the_slopes_of_a_turned_vector_are_there_already():
     """Six operations turn it; along a tangent each component takes a product, and backwards both take a sum too."""
-    turn = parse("""
+    turn = parse(f"""
         a = load angle[0]
         x = load v[0]
         y = load v[1]
-        s = sin a
-        c = cos a
-        cx = mul c x
-        sy = mul s y
-        cy = mul c y
-        sx = mul s x
-        u = add cx sy
-        w = sub cy sx
+        {TURNING}
         out tau[0] = u
-        out tau[1] = w
+        out tau[1] = v
     """)
     assert cost(jvp(turn, {"angle": "angle_dot"}, {"tau": "tau_dot"})).total == 6 + 2
     assert cost(vjp(turn, {"tau": "tau_bar"}, {"angle": "angle_bar"}, {"angle": 1})).total == 6 + 3

@@ -278,22 +278,15 @@ def test_nothing_is_leaked(robot: CompiledRobot) -> None:
             with pytest.raises(InputError):
                 robot.gravity(q, out=q[:1])
 
+    def counts() -> tuple[int, ...]:
+        held = (q, out, robot.gravity, theta)
+        references = [sys.getrefcount(one) for one in held]
+        return (*references, sys.getallocatedblocks())
+
     calls()
-    before = (
-        sys.getrefcount(q),
-        sys.getrefcount(out),
-        sys.getrefcount(robot.gravity),
-        sys.getrefcount(theta),
-        sys.getallocatedblocks(),
-    )
+    before = counts()
     calls()
-    after = (
-        sys.getrefcount(q),
-        sys.getrefcount(out),
-        sys.getrefcount(robot.gravity),
-        sys.getrefcount(theta),
-        sys.getallocatedblocks(),
-    )
+    after = counts()
     assert after[:4] == before[:4]
     assert after[4] - before[4] < 200
 
