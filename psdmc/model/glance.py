@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
-from typing import Any, Protocol
+from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from psdmc.model.model_parts import ModelParts
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Joint, Mechanism
@@ -20,20 +18,8 @@ MOST_JOINTS = 6
 _FRAMES = {"urdf": "URDF", "standard": "standard DH", "modified": "modified DH"}
 
 
-class Model(Protocol):
-    """The parts of a model that are shown. A protocol with the names of DynamicsModel, which imports this file."""
-
-    @property
-    def theta_b(self) -> NDArray[np.float64] | None: ...
-
-    @property
-    def mechanism(self) -> Mechanism: ...
-
-    @property
-    def certificate(self) -> NDArray[np.float64]: ...
-
-    @property
-    def provenance(self) -> Mapping[str, Any]: ...
+class Model(ModelParts, Protocol):
+    """The parts of a model that are shown."""
 
     @property
     def p(self) -> int | None: ...

@@ -22,7 +22,7 @@ from psdmc.atomic import write_whole
 from psdmc.errors import InputError
 from psdmc.model.chain_json import MOST_JOINTS, chain_to_json, is_plain_chain
 from psdmc.model.expansion import BLOCKS, Entries, Expansion
-from psdmc.robot.mechanism import Mechanism
+from psdmc.model.model_parts import ModelParts
 from psdmc.version import psdmc_version
 
 CHAIN_SCHEMA = 1
@@ -38,26 +38,14 @@ _NO_DATE = (1980, 1, 1, 0, 0, 0)
 Arrays = Mapping[str, NDArray[Any]]
 
 
-class Model(Protocol):
-    """The parts of a model that a file holds. A protocol with the names of DynamicsModel, which imports this file."""
+class Model(ModelParts, Protocol):
+    """The parts of a model that a file holds."""
 
     @property
     def expansion(self) -> Expansion | None: ...
 
     @property
-    def theta_b(self) -> NDArray[np.float64] | None: ...
-
-    @property
     def B(self) -> NDArray[np.float64]: ...
-
-    @property
-    def mechanism(self) -> Mechanism: ...
-
-    @property
-    def certificate(self) -> NDArray[np.float64]: ...
-
-    @property
-    def provenance(self) -> Mapping[str, Any]: ...
 
 
 def save(model: Model, path: str | Path) -> None:

@@ -1,0 +1,27 @@
+"""What every model has, for files that DynamicsModel imports and that cannot import it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.robot.mechanism import Mechanism
+
+
+class ModelParts(Protocol):
+    """Parts of DynamicsModel, by its names."""
+
+    @property
+    def theta_b(self) -> NDArray[np.float64] | None: ...
+
+    @property
+    def mechanism(self) -> Mechanism: ...
+
+    @property
+    def certificate(self) -> NDArray[np.float64]: ...
+
+    @property
+    def provenance(self) -> Mapping[str, Any]: ...
