@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from psdmc.calibration.verdict.joined_units import joined_units
 from psdmc.cli.one_line import one_line
 from psdmc.cli.tables import Table, print_table
 
@@ -48,15 +49,15 @@ def _verdict(verdict: Mapping[str, Any] | None) -> list[str]:
 def _joints(kept: Mapping[str, Any]) -> Table:
     """R^2 and RMSE of the whole torque, torque constant and friction, joint by joint."""
     constants = [*kept.get("motors", []), *kept.get("friction", [])]
-    names = list(dict.fromkeys((row["name"], row["unit"]) for row in constants))
+    units = joined_units((row["name"], row["unit"]) for row in constants)
     by_joint = {(row["joint"], row["name"]): row for row in constants}
     quality = kept.get("quality", {}).get("All", {})
-    heads = [f"{name.replace('_', ' ')} [{unit}]" for name, unit in names]
+    heads = [f"{name.replace('_', ' ')} [{unit}]" for name, unit in units.items()]
     rows = []
     for joint in kept.get("joints", []):
         held_out = quality.get(joint, {}).get("held_out", {})
         figures = [_number(held_out.get("r2"), ".4f"), _number(held_out.get("rmse"), ".3g")]
-        rows.append((joint, *figures, *(_row(by_joint.get((joint, name))) for name, _ in names)))
+        rows.append((joint, *figures, *(_row(by_joint.get((joint, name))) for name in units)))
     return Table(("joint", "R^2 held out", "RMSE held out", *heads), rows)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from psdmc.calibration.identify.quality import Quality
+from psdmc.calibration.verdict.joined_units import joined_units
 from psdmc.calibration.verdict.record import Calibration, NumberRow
 from psdmc.calibration.verdict.verdict import Verdict
 
@@ -88,12 +89,12 @@ def parameter_table(record: Calibration) -> str:
 
 def joint_table(record: Calibration) -> str:
     """Table 2: torque constants and friction, joint by joint."""
-    names = list(dict.fromkeys(row.name for row in (*record.motors, *record.friction)))
-    units = {row.name: row.unit for row in (*record.motors, *record.friction)}
-    by_key = {(row.joint, row.name): row for row in (*record.motors, *record.friction)}
-    head = ["Joint", *(f"{name.replace('_', ' ')} [{units[name]}]" for name in names)]
+    own = (*record.motors, *record.friction)
+    units = joined_units((row.name, row.unit) for row in own)
+    by_key = {(row.joint, row.name): row for row in own}
+    head = ["Joint", *(f"{name.replace('_', ' ')} [{unit}]" for name, unit in units.items())]
     rows = [
-        [joint, *(joint_number(by_key.get((joint, name))) for name in names)] for joint in record.joint_names
+        [joint, *(joint_number(by_key.get((joint, name))) for name in units)] for joint in record.joint_names
     ]
     return table(head, rows)
 

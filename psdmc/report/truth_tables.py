@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.plant.virtual_robot import VirtualRobot
+from psdmc.calibration.verdict.joined_units import joined_units
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.report import published_denso as published
@@ -90,7 +91,7 @@ def _joints(record: Calibration, robot: VirtualRobot) -> str:
     """Table 2: three lines a joint."""
     rows = [*record.motors, *record.friction]
     found = {(row.joint, row.name): row for row in rows}
-    units = {row.name: row.unit for row in rows}
+    units = joined_units((row.name, row.unit) for row in rows)
     names = [name for name in published.PARAMETERS if name in units]
     head = ["Joint", "", *(f"{name.replace('_', ' ')} [{units[name]}]" for name in names)]
     lines = []

@@ -11,7 +11,7 @@ from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.identify.visibility import visibility, visibility_warnings, weak_notes
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.record import Calibration, NumberRow, with_model
-from psdmc.calibration.verdict.record_rows import by_joint, kept_at, motor_rows, parameter_rows
+from psdmc.calibration.verdict.record_rows import by_joint, kept_at, motor_rows, parameter_rows, unit_of
 from psdmc.model.dynamics_model import DynamicsModel
 
 
@@ -71,10 +71,12 @@ def _lugre_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]
     """The seven per joint; the uncertainty of forces includes the torque constant's."""
     relative = dict(zip(model.joint_names, found.motors.relative_std.tolist(), strict=True))
     rows: list[NumberRow] = []
+    joints = {joint.name: joint for joint in model.mechanism.joints}
     for name, joint in found.friction.joints.items():
         values = zip(PARAMETERS, joint.friction.as_array().tolist(), joint.std.tolist(), UNITS, strict=True)
         for parameter, value, std, unit in values:
             by_constant = relative[name] * value if unit.startswith("Nm") else 0.0
             seen = parameter not in joint.unseen
-            rows.append(NumberRow(name, parameter, value, float(np.hypot(std, by_constant)), unit, seen))
+            own = unit_of(joints[name], unit)
+            rows.append(NumberRow(name, parameter, value, float(np.hypot(std, by_constant)), own, seen))
     return tuple(rows)

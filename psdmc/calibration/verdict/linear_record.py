@@ -20,7 +20,7 @@ from psdmc.calibration.identify.visibility import (
 )
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.record import Calibration, NumberRow, with_model
-from psdmc.calibration.verdict.record_rows import by_joint, kept_at, motor_rows, parameter_rows
+from psdmc.calibration.verdict.record_rows import by_joint, kept_at, motor_rows, parameter_rows, unit_of
 from psdmc.model.dynamics_model import DynamicsModel
 
 
@@ -47,7 +47,11 @@ def linear_record(
         word = seen.words[k]
         return NumberRow(owner, name, float(values[k]), float(std[k]), unit, word == IDENTIFIED, word)
 
-    friction = [row(k, *own, _friction_unit(own[1])) for k, own in enumerate(problem.plain, start=model.l)]
+    joints = {joint.name: joint for joint in model.mechanism.joints}
+    friction = [
+        row(k, owner, name, unit_of(joints[owner], _friction_unit(name)))
+        for k, (owner, name) in enumerate(problem.plain, start=model.l)
+    ]
     unknowns = enumerate(problem.columns.unknowns, start=problem.first_extra)
     extra = [row(k, unknown.owner, unknown.name, unknown.unit) for k, unknown in unknowns]
     of_springs = problem.columns.of_springs
@@ -93,6 +97,7 @@ def _chosen(rows: Sequence[NumberRow], wanted: NDArray[np.bool_]) -> tuple[Numbe
 
 
 def _friction_unit(name: str) -> str:
+    """Of a joint that turns."""
     if not name.startswith("viscous"):
         return "Nm"
     _, _, exponent = name.partition("^")

@@ -10,6 +10,7 @@ from psdmc.calibration.identify.visibility import IDENTIFIED, Visibility
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.record import NumberRow, ParameterRow
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.robot.mechanism import Joint
 
 MOVED = 1e-6
 """Distance from the prior, in units of what is believable, from which an invisible parameter counts as moved by
@@ -26,6 +27,11 @@ def kept_at(model: DynamicsModel, values: Array, scale: Array) -> list[str]:
     return [
         f"the physical value nearest to {name}" if m else name for name, m in zip(names, moved, strict=True)
     ]
+
+
+def unit_of(joint: Joint, turning: str) -> str:
+    """The unit of a joint's number, given that of one that turns: for Nms/rad Ns/m where it slides."""
+    return turning.replace("Nm", "N").replace("rad", "m") if joint.type.effort_unit == "N" else turning
 
 
 def by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:
@@ -58,7 +64,15 @@ def motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) -
     if step is None and np.all(constants == 1.0):
         return ()
     seen = relative > 0.0 if step is None else step.identified
+    own = zip(model.mechanism.joints, constants, relative, seen, strict=True)
     return tuple(
-        NumberRow(name, "torque_constant", float(value), float(abs(value) * share), "Nm/A", bool(known))
-        for name, value, share, known in zip(model.joint_names, constants, relative, seen, strict=True)
+        NumberRow(
+            joint.name,
+            "torque_constant",
+            float(value),
+            float(abs(value) * share),
+            unit_of(joint, "Nm/A"),
+            bool(known),
+        )
+        for joint, value, share, known in own
     )
