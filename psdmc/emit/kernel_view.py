@@ -20,6 +20,9 @@ from psdmc.program.products import LARGE
 from psdmc.program.program import Program
 from psdmc.program.signature import Quantity, Signature, Sizes, in_order
 
+LOOPED = 10
+"""Pivots from which on one state's are looked at in a loop: each one alone costs 85 bytes of code."""
+
 
 @dataclass(frozen=True, slots=True)
 class VectorView:
@@ -67,6 +70,11 @@ class KernelView:
     cost: Cost
     lowering: str
     limbs: LimbsView | None = None
+
+    @property
+    def pivots_in_loop(self) -> bool:
+        """Whether one state's pivots are looked at in a loop."""
+        return len(self.pivot_order) >= LOOPED and self.pivot_order == tuple(range(len(self.pivot_order)))
 
     @property
     def called(self) -> str:

@@ -155,12 +155,22 @@ def test_a_pivot_that_is_not_positive_is_reported_as_by_the_straight_line(tmp_pa
     for limb in range(4):
         state = {key: rows[0].copy() for key, rows in given.items()}
         state["q"][7 + 3 * limb + 2] = np.nan
+        pivots = interpret(kernels(LEGS)["forward_dynamics"].single, state, {"qdd": nv, "pivot": nv})["pivot"]
         statuses = []
         for compiled in builds:
             out = np.zeros(nv)
             statuses.append(compiled("forward_dynamics", state["q"], state["qd"], state["tau"], out))
             assert np.isnan(out).all()
-        assert statuses[0] == statuses[1] > 0, limb
+        assert statuses == [1 + int(np.argmin(pivots > 0.0))] * 2, limb
+
+
+def test_many_pivots_are_looked_at_in_one_loop(tmp_path: Path) -> None:
+    """One by one, each would write its own NaN into all accelerations."""
+    from psdmc.emit.package_files import package_files
+
+    text = package_files(package_of(LEGS, EmitOptions()))["src/forward_dynamics.c"]
+    (line,) = re.findall(r"return fail\(.*", text)
+    assert line == "return fail(qdd, k + 1);"
 
 
 def test_the_package_says_what_it_has(tmp_path: Path) -> None:
