@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import cached_property
 
 from psdmc.lower.carriers import CarrierSpace, carrier_space
-from psdmc.lower.reframe import Foot, Reframed, reframe
+from psdmc.lower.reframe import Foot, Reframed, reframe, unmoved
 from psdmc.robot.mechanism import Array, Mechanism
 
 LARGE = 10
@@ -37,6 +37,11 @@ class Geometry:
         if feet not in self._reframed:
             self._reframed[feet] = reframe(self.chain, feet)
         return self._reframed[feet]
+
+    @cached_property
+    def unmoved(self) -> Reframed:
+        """The robot's own frames."""
+        return unmoved(self.chain)
 
     def space(self, reframed: Reframed) -> CarrierSpace:
         """The sets of link parameters that can carry the model in these frames."""

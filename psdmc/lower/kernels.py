@@ -193,8 +193,17 @@ class _Lowered:
             arranged = RECIPES[recipe.shares] if recipe.shares else recipe
             yield from search.rearrangements(recipe, self._arrangement(arranged, theta))
             return
-        for feet in geometry.feet:
-            yield trace_geometry(recipe, geometry.reframed(feet), search.robot)
+        frames = [geometry.reframed(feet) for feet in geometry.feet]
+        traced = [trace_geometry(recipe, each, search.robot) for each in frames]
+        if recipe.times_theta and not all(search.keeps_digits(frames[k]) for k in self._cheapest(traced)):
+            kept = [each for each in frames if search.keeps_digits(each)] or [geometry.unmoved]
+            traced = [trace_geometry(recipe, each, search.robot) for each in kept]
+        yield from traced
+
+    def _cheapest(self, programs: Sequence[Program]) -> set[int]:
+        """Which of them code for one state and code for lanes take."""
+        scores = [[scoring.score(each) for each in programs] for scoring in (self.single, self.batch)]
+        return {each.index(min(each)) for each in scores}
 
     def _arrangement(self, recipe: Recipe, theta: bool) -> Arrangement:
         key = recipe.name, theta

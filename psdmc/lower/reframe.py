@@ -18,8 +18,16 @@ from typing import Literal
 
 import numpy as np
 
-from psdmc.dynamics.frames import Frame, as_matrix, as_vector, what_follows
-from psdmc.dynamics.scalar import Matrix, Vector
+from psdmc.dynamics.frames import (
+    IDENTITY,
+    Frame,
+    as_matrix,
+    as_vector,
+    base_acceleration,
+    frames_of,
+    what_follows,
+)
+from psdmc.dynamics.scalar import ZERO, Matrix, Vector
 from psdmc.robot.mechanism import BASE, Array, Mechanism, NamedFrame, Placement
 from psdmc.robot.small import cross, length, times
 
@@ -119,6 +127,20 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
     origin = as_vector((_clean_lengths(origins[0], reach) + 0.0).tolist())
     return Reframed(
         tuple(frames), as_vector(at_base.tolist()), tuple(link_frames), tip, base_axes, end, origin, named
+    )
+
+
+def unmoved(chain: Mechanism) -> Reframed:
+    """The robot's own joint frames, turned and moved nowhere: more arithmetic, and no digit but those that its file has."""
+    return Reframed(
+        frames_of(chain),
+        base_acceleration(chain),
+        tuple(joint.link_frame for joint in chain.joints),
+        chain.tip_frame.placement,
+        IDENTITY,
+        chain.tip_body,
+        ZERO,
+        chain.frames,
     )
 
 

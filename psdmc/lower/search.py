@@ -187,23 +187,28 @@ class Search:
         return self._costs[key]
 
     def _accurate(self, firsts: Sequence[Arrangement], accuracy: Accuracy) -> Arrangement:
-        """The most accurate of several arrangements; one within LIMIT where exchanges of its carriers lead to it, or where
-        nothing is carried by other parameters than its own."""
+        """The most accurate of several arrangements; one within LIMIT where exchanges of its carriers lead to it, else where
+        nothing is carried by other parameters than its own, on their frames or on the robot's."""
         best = min(firsts, key=accuracy.error)
         error = accuracy.error(best)
         while error > LIMIT:
             others = {accuracy.error(each): each for each in self._exchanges(best)}
             least = min(others, default=error)
             if least >= error:
-                return min([best, *map(self._uncarried, firsts)], key=accuracy.error)
+                frames = [*(each.reframed for each in firsts), self.geometry.unmoved]
+                return min([best, *map(self._uncarried, frames)], key=accuracy.error)
             best, error = others[least], least
         return best
 
-    def _uncarried(self, found: Arrangement) -> Arrangement:
+    def _uncarried(self, reframed: Reframed) -> Arrangement:
         """With every parameter by itself. Which of them may stand for others is found by columns of all joints' torques
         together, of which a small joint's are a small part: on robots of many scales its digits are lost there."""
-        carriers, transfer = every_parameter(found.reframed, self.robot.representative)
-        return replace(found, carriers=carriers, transfer=transfer, is_basis=False)
+        carriers, transfer = every_parameter(reframed, self.robot.representative)
+        return Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0], is_basis=False)
+
+    def keeps_digits(self, reframed: Reframed) -> bool:
+        """Whether torques computed on these frames are accurate enough; True where no base parameters are known."""
+        return self.accuracy is None or self.accuracy.error(self._uncarried(reframed)) <= LIMIT
 
     def _admits(self, accurate: Arrangement | None) -> Callable[[Arrangement], bool]:
         accuracy = self.accuracy
