@@ -16,6 +16,9 @@ MAX_BYTES = 4 * 2**20
 MAX_LINKS = 1000
 """Links of a URDF: urdfdom and Pinocchio descend the tree by recursion and crash beyond a few thousand."""
 
+MAX_COPIES = 3000
+"""Elements that an MJCF file may ask for by repetition: MuJoCo compiles so many in a second, a million in hours."""
+
 MAX_UNKNOWN = 100
 """Unknown kinds of elements in a URDF; each is compared with those that are known."""
 

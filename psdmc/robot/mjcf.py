@@ -13,6 +13,7 @@ from typing import Any
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import shown
+from psdmc.robot.mjcf_copies import refuse_many_copies
 from psdmc.robot.mjcf_faults import followers, left_out, refuse_constraints, refuse_references
 from psdmc.robot.mjcf_names import Names
 from psdmc.robot.mjcf_text import tree_text
@@ -49,6 +50,7 @@ def read_mjcf(path: Path, source: str) -> MjcfRobot:
     InputError where MuJoCo is not installed or refuses the file, and where the file has what psdmc does not model.
     """
     mujoco = _mujoco(source)
+    refuse_many_copies(path, source)
     model, warned = _compiled(mujoco, path, source)
     names = Names.of(mujoco, model)
     refuse_constraints(mujoco, model, names, source)

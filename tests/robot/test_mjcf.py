@@ -438,3 +438,38 @@ def test_options_go_before_what_the_file_says(tmp_path: Path) -> None:
     assert robot.mechanism.joint_names == ("turn", "slide", "joint3")
     assert robot.mechanism.parameters[:, 10].tolist() == [0.1, 0.2, 0.3]
     assert robot.mechanism.gravity.tolist() == [0, 0, -1.6]
+
+
+REPEATED = "<mujoco><worldbody><body><joint name='a'/><geom size='.1'/>{}</body></worldbody></mujoco>"
+INNER = "<replicate count='{}'><replicate count='{}'><geom size='.1'/></replicate></replicate>"
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "<replicate count='1000000'/>",
+        INNER.format(100, 100),
+        "<replicate count='3001'><geom size='.1'/></replicate>",
+        "<composite type='cable' count='2000 2 1'/>",
+        "<replicate count='80'><include file='more.xml'/></replicate>",
+    ],
+)
+def test_more_copies_than_a_compiler_takes_are_refused_before_it_begins(tmp_path: Path, part: str) -> None:
+    sixty = "<geom size='.1'/>" * 60
+    (tmp_path / "more.xml").write_text(f"<mujocoinclude>{sixty}</mujocoinclude>")
+    (tmp_path / "robot.xml").write_text(REPEATED.format(part))
+    with pytest.raises(InputError, match=r"robot.xml: <replicate>.* ask for .* expected 3000 at most"):
+        load_robot(tmp_path / "robot.xml")
+
+
+def test_copies_that_cannot_be_counted_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "robot.xml").write_text(REPEATED.format("<!-- -- --><replicate count='9'/>"))
+    with pytest.raises(InputError, match="cannot be counted"):
+        load_robot(tmp_path / "robot.xml")
+
+
+def test_some_copies_are_a_robot_and_loose_comments_are_mujocos_matter(tmp_path: Path) -> None:
+    (tmp_path / "robot.xml").write_text(REPEATED.format("<!-- a -- b -->"))
+    (tmp_path / "brush.xml").write_text(REPEATED.format(INNER.format(10, 20)))
+    plain, brush = (load_robot(tmp_path / name).chain for name in ("robot.xml", "brush.xml"))
+    assert brush.parameters[0, 0] == pytest.approx(201 * plain.parameters[0, 0])
