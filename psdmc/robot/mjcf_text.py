@@ -66,7 +66,7 @@ def tree_text(
     notes: Sequence[str],
 ) -> str:
     """A URDF; `follows` are the joints that follow others, `free` is the body that is to be the root, on a free joint."""
-    robot = Element("robot", name=_robot_name(mujoco, model), version="1.1")
+    robot = Element("robot", name=_robot_name(model), version="1.1")
     for note in notes:
         SubElement(robot, NOTE, text=note)
     writer = _Writer(mujoco, model, names, follows, robot, set(names.bodies), set(names.joints))
@@ -177,7 +177,7 @@ def _rotated(mujoco: Any, turn: Array, vector: Array) -> Array:
     return found
 
 
-def _robot_name(mujoco: Any, model: Any) -> str:
+def _robot_name(model: Any) -> str:
     """The model's own name: the first of its names."""
     return model.names[: model.names.index(b"\0")].decode(errors="replace") or "robot"
 

@@ -58,8 +58,9 @@ def knowledge_of(
     """
     faults: list[str] = []
     if share is not None and not SHARES[0] <= share <= SHARES[1]:
-        faults.append(
-            f"prior confidence: found {share:g}, expected a number from {SHARES[0]:g} to {SHARES[1]:g}"
+        raise InputError(
+            f"prior confidence (--prior-confidence) is {share:g}, expected {SHARES[0]:g} to {SHARES[1]:g}",
+            "0.1 says that masses and inertias of the file are right to 10 %",
         )
     stated = share if share is not None else _share(tables.get("prior"), faults)
     wanted = essential or _essential(tables.get("essential"), faults)

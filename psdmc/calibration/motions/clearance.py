@@ -169,7 +169,7 @@ def clearance_of(model: DynamicsModel, folders: Sequence[Path] = (), floor: floa
             f"{source}: its collision shapes cannot be read: {' '.join(str(error).split())}",
             "correct the file",
         ) from None
-    held, place = _coordinates(whole, model, text, source)
+    held, place = _coordinates(whole, model, source)
     _add_pairs(whole, shapes)
     if floor is not None:
         _add_floor(whole, shapes, chain, held, floor)
@@ -177,7 +177,8 @@ def clearance_of(model: DynamicsModel, folders: Sequence[Path] = (), floor: floa
     return _without_constant_pairs(found, chain)
 
 
-def _coordinates(whole: Any, model: DynamicsModel, text: str, source: str) -> tuple[Array, tuple[int, ...]]:
+def _coordinates(whole: Any, model: DynamicsModel, source: str) -> tuple[Array, tuple[int, ...]]:
+    """q of Pinocchio's whole robot with locked joints where they are held, and the places in it of the model's joints."""
     held = np.array(pin.neutral(whole), dtype=np.float64)
     locked = (model.provenance.get("options") or {}).get("lock") or {}
     original = read_urdf(model.provenance["source_text"], source)

@@ -214,4 +214,6 @@ def test_the_command_takes_both(arm, log: Log, tmp_path: Path, capsys: pytest.Ca
     with pytest.raises(SystemExit) as left:
         run([*words, "--prior-confidence", "0"])
     assert left.value.code == 2
-    assert "prior confidence: found 0" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.startswith("error: prior confidence (--prior-confidence) is 0, expected 0.0001 to 100\n")
+    assert "right to 10 %" in said
