@@ -12,8 +12,16 @@ from psdmc.derivation.derive import derive_model
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import PackageView, package_view
+from psdmc.functions import RECIPES
+from psdmc.lower.factored import trace_dynamics
+from psdmc.lower.limb_frames import possible_groups
+from psdmc.lower.limbs import trace_limbs
+from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
+from psdmc.program.limb_program import LimbProgram
+from psdmc.program.limb_stages import staged
+from psdmc.program.pipeline import shortened
 from psdmc.robot.mechanism import BASE
 
 FUNCTIONS = ("inverse_dynamics", "mass_matrix", "forward_dynamics")
@@ -39,10 +47,16 @@ SHAPES = {
     "arms on a trunk, legs on its root": ("FR", [(1, "RRR", 2), (0, "RR", 3)]),
 }
 
+EIGHT_LIMBS = {
+    "eight arms on the base": ("", [(BASE, "RRR", 8)]),
+    "eight fingers of two joints": ("R", [(0, "RR", 8)]),
+}
+"""As many as the widest vectors have lanes: lowering takes seconds."""
+
 
 @cache
 def shape(name: str, seed: int = 1) -> tuple[RandomTree, DynamicsModel]:
-    tree = limbed(seed, *SHAPES[name])
+    tree = limbed(seed, *(SHAPES | EIGHT_LIMBS)[name])
     return tree, derive_model(tree.mechanism(), expand=False)
 
 
@@ -54,3 +68,15 @@ def kernels(name: str, seed: int = 1) -> dict[str, Kernel]:
 def package_of(name: str, options: EmitOptions, functions: Sequence[str] = FUNCTIONS) -> PackageView:
     own = {function: kernels(name)[function] for function in functions}
     return package_view(package_info(shape(name)[1]), own, options)
+
+
+@cache
+def forced(name: str, function: str, seed: int = 1) -> Kernel:
+    """Limbs in lanes at every width, whether it pays or not, as the first arrangement has them."""
+    model, recipe = shape(name, seed)[1], RECIPES[function]
+    search = Search(model.mechanism, model.representative, model.theta_b)
+    start = next(search.starts(search.geometry.feet[0]))
+    straight = trace_dynamics(recipe, start, search.robot)
+    traced = trace_limbs(recipe, start, search.robot, possible_groups(start.reframed.frames)[0])
+    limbs = LimbProgram(traced.groups, staged(shortened(traced.program), traced.groups))
+    return Kernel(recipe.signature, False, straight, straight, "factored", limbs=limbs)

@@ -41,7 +41,7 @@ class VectorWidth:
     def stages(self) -> tuple[TransposeStage, ...]:
         """The steps that transpose `lanes` vectors of `lanes` reals."""
         distances = [1 << k for k in range(self.lanes.bit_length() - 1)]
-        return tuple(_stage(self.lanes, distance) for distance in distances)
+        return tuple(transpose_stage(self.lanes, distance) for distance in distances)
 
     @property
     def piece(self) -> int:
@@ -62,7 +62,8 @@ def vector_widths(options: EmitOptions) -> tuple[VectorWidth, ...]:
     )
 
 
-def _stage(width: int, distance: int) -> TransposeStage:
+def transpose_stage(width: int, distance: int) -> TransposeStage:
+    """The step that exchanges blocks of `distance` lanes, in vectors of `width`."""
     first = [k - distance + width if k & distance else k for k in range(width)]
     second = [k + width if k & distance else k + distance for k in range(width)]
     return TransposeStage(distance, ", ".join(map(str, first)), ", ".join(map(str, second)))

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 from psdmc.emit.body import make_body
 from psdmc.emit.c_expr import literal
+from psdmc.emit.lanes import TransposeStage, transpose_stage
+from psdmc.emit.limb_rows import FOUR
+from psdmc.emit.limb_stores import StoreView, store_views
 from psdmc.emit.lines import Body
 from psdmc.emit.options import EmitOptions
 from psdmc.program.cost import Cost, cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage
-from psdmc.program.program import Slot
 from psdmc.target.vectors import VectorUnit
-
-FOUR = 4
-"""Outputs that are stored at once."""
 
 NARROWEST = 16
 """Bytes of the narrowest vector."""
@@ -52,6 +51,16 @@ class LimbWidth:
         return tuple(", ".join(str(lane ^ distance) for lane in range(self.lanes)) for distance in distances)
 
     @property
+    def piece(self) -> int:
+        """Neighbours of a limb that a vector of four is made of."""
+        return min(self.lanes, FOUR)
+
+    @property
+    def stages(self) -> tuple[TransposeStage, ...]:
+        """The steps that transpose each square of `piece` vectors and lanes."""
+        return tuple(transpose_stage(self.lanes, distance) for distance in (1, 2) if distance < self.piece)
+
+    @property
     def beyond(self) -> tuple[int, ...]:
         """Lanes of the last part that are limbs', where it is not whole."""
         return tuple(range(self.count % self.lanes))
@@ -82,6 +91,11 @@ class LimbVector(NamedByCount):
     count: int
     widths: tuple[LimbWidth, ...]
     integer: str
+
+    @property
+    def in_fours(self) -> bool:
+        """Whether reals of all limbs fill vectors of four."""
+        return self.count % FOUR == 0
 
     @property
     def arguments(self) -> str:
@@ -171,7 +185,7 @@ class LimbsView:
     least   lanes from which on it is taken
     unused  inputs that it never reads
     core    reals of the core that other stages read
-    stores  statements that put out what limbs have computed, and zeros
+    stores  what puts out what limbs have computed, and zeros
     """
 
     file: str
@@ -180,7 +194,7 @@ class LimbsView:
     core: int
     groups: tuple[GroupView, ...]
     stages: tuple[StageView, ...]
-    stores: tuple[str, ...]
+    stores: tuple[StoreView, ...]
     cost: Cost
 
     @property
@@ -211,7 +225,7 @@ def limbs_view(
         core=_length(limbs.stages, CORE),
         groups=tuple(_group(group, limbs.stages, suffix) for group in limbs.groups),
         stages=stages,
-        stores=tuple(_stores(limbs, sizes)),
+        stores=store_views(limbs, sizes),
         cost=_whole_cost(limbs),
     )
 
@@ -251,33 +265,6 @@ def _after(stage: Stage, group: LimbGroup) -> Iterator[str]:
     for slot, _ in stage.program.outputs:
         if slot.vector == group.partial:
             yield f"{group.sum}[{slot.index}] = limbs{group.count}_sum({slot})"
-
-
-def _stores(limbs: LimbProgram, sizes: dict[str, int]) -> Iterator[str]:
-    """Outputs in their order, four neighbours at a time: some hundred entries of a mass matrix wait for each other."""
-    texts = _texts(limbs)
-    own = {slot for stage in limbs.stages for slot, _ in stage.program.outputs if slot not in texts}
-    for vector, size in sizes.items():
-        k = 0
-        while k < size:
-            four = [Slot(vector, i) for i in range(k, k + FOUR)]
-            if all(slot.index < size and slot not in own for slot in four):
-                yield f"STORE_FOUR({vector} + {k}, {', '.join(texts.get(slot, '0') for slot in four)})"
-                k += FOUR
-                continue
-            if four[0] not in own:
-                yield f"{four[0]} = {texts.get(four[0], '0')}"
-            k += 1
-
-
-def _texts(limbs: LimbProgram) -> dict[Slot, str]:
-    """C texts of outputs that limbs compute."""
-    return {
-        target: f"LIMBS{group.count}_AT({slot}, {limb})"
-        for group in limbs.groups
-        for slot, own in group.outputs
-        for limb, target in enumerate(own)
-    }
 
 
 def _whole_cost(limbs: LimbProgram) -> Cost:

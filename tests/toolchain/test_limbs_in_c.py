@@ -11,13 +11,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from direct import Direct, shared_library
-from limbed import FUNCTIONS, kernels, limbed, package_of, shape
+from limbed import FUNCTIONS, forced, kernels, limbed, package_of, shape
 from slow_cases import slow_but_for
 
 from psdmc.derivation.derive import derive_model
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import package_view
+from psdmc.emit.package import PackageView, package_view
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower
 from psdmc.model.random_states import states_of
@@ -74,9 +74,12 @@ def runs_here(build: str) -> bool:
 
 
 def built(name: str, build: str, folder: Path, real: str = "float64", trig: str = "inline") -> Direct:
+    return built_from(package_of(name, EmitOptions(real=real, trig=trig)), build, folder)  # type: ignore[arg-type]
+
+
+def built_from(package: PackageView, build: str, folder: Path) -> Direct:
     if not runs_here(build):
         pytest.skip(f"no processor for {build}")
-    package = package_of(name, EmitOptions(real=real, trig=trig))  # type: ignore[arg-type]
     strict = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]
     return Direct(package, shared_library(package, folder, ["-O0", *strict, *BUILDS[build]]))
 
@@ -113,6 +116,37 @@ def test_one_state_is_the_straight_lines(name: str, build: str, real: str, trig:
             found = called(compiled, function, state, wanted.shape[1])
             assert np.abs(found - wanted[k]).max() <= EXACT[real] * np.abs(wanted[k]).max(), (function, k)
     assert in_lanes
+
+
+EIGHT, PAIRS = "eight arms on the base", "eight fingers of two joints"
+STORED = [
+    *((name, build, "float64") for name in (LEGS, FIVE, FINGERS) for build in BUILDS),
+    (EIGHT, "8 lanes", "float64"),
+    (EIGHT, "4 lanes", "float64"),
+    (EIGHT, "4 lanes", "float32"),
+    (PAIRS, "8 lanes", "float64"),
+    (PAIRS, "2 lanes", "float64"),
+    (LEGS, "2 lanes", "float32"),
+]
+
+
+@pytest.mark.parametrize(("name", "build", "real"), STORED)
+def test_vectors_and_matrices_are_stored_at_every_width(
+    name: str, build: str, real: str, tmp_path: Path
+) -> None:
+    """Whether lanes pay or not, as rows, woven or alone: what the same function's straight line stores."""
+    functions = ("inverse_dynamics", "mass_matrix")
+    own, model, given = {f: forced(name, f) for f in functions}, shape(name)[1], given_states(name, real)
+    package = package_view(package_info(model), own, EmitOptions(real=real))  # type: ignore[arg-type]
+    compiled = built_from(package, build, tmp_path)
+    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    for function in functions:
+        wanted = interpret(own[function].single, given, RECIPES[function].signature.sizes(sizes))
+        (values,) = wanted.values()
+        for k in range(COUNT):
+            state = {key: rows[k].copy() for key, rows in given.items()}
+            found = called(compiled, function, state, values.shape[1])
+            assert np.abs(found - values[k]).max() <= EXACT[real] * np.abs(values[k]).max(), (function, k)
 
 
 @pytest.mark.parametrize("build", ["2 lanes", "4 lanes"])
