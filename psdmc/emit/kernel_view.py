@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from psdmc.emit.body import make_body
 from psdmc.emit.limbs import LimbsView, limbs_view
@@ -201,7 +201,7 @@ class KernelView:
 
 @dataclass(frozen=True, slots=True)
 class FunctionView:
-    """A function with its kernels, baked first: one C file.
+    """A function with its kernels, baked first.
 
     shape  of its outputs, and of inputs that are no vectors of all joints, in words
     """
@@ -227,6 +227,13 @@ class FunctionView:
         return tuple(
             sorted({count for kernel in self.kernels if kernel.limbs for count in kernel.limbs.counts})
         )
+
+    @property
+    def units(self) -> tuple[FunctionView, ...]:
+        """One for each C file, which has its name: the whole function, or a kernel each where bodies are in parts."""
+        if not any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels):
+            return (self,)
+        return tuple(replace(self, name=kernel.name, kernels=(kernel,)) for kernel in self.kernels)
 
     @property
     def needs_parameters(self) -> bool:

@@ -184,7 +184,7 @@ class PackageView:
         """C files of the library, relative to the package."""
         payload = ("src/payload.c",) if self.info.payload else ()
         friction = ("src/friction.c",) if self.info.friction else ()
-        functions = (f"src/{function.name}.c" for function in self.functions)
+        functions = (f"src/{unit.name}.c" for function in self.functions for unit in function.units)
         return ("src/tables.c", *functions, *payload, *friction)
 
     @property

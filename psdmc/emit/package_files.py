@@ -67,9 +67,8 @@ def library_files(package: PackageView) -> dict[str, str]:
     for vector in package.limb_vectors:
         files[f"src/{vector.name}.h"] = render("limbs.h.jinja", package=package, limbs=vector)
     for function in package.functions:
-        files[f"src/{function.name}.c"] = render(
-            _template(package, function), package=package, function=function
-        )
+        for unit in function.units:
+            files[f"src/{unit.name}.c"] = render(_template(package, unit), package=package, function=unit)
         for kernel in function.kernels:
             if kernel.called:
                 continue

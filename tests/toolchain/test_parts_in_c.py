@@ -69,3 +69,20 @@ def test_no_function_of_a_cut_body_is_long(compiled: Direct) -> None:
 
 def test_bodies_of_arms_stay_whole() -> None:
     assert not arm_package().has_parts
+
+
+def test_a_cut_function_has_a_file_for_each_kernel(compiled: Direct) -> None:
+    """A file with both variants of a humanoid's Coriolis matrix took gcc twice as long as either."""
+    files = library_files(compiled.package)
+    for function in compiled.package.functions:
+        names = [kernel.name for kernel in function.kernels]
+        cut = any(kernel.single_body.parts for kernel in function.kernels)
+        for name in names:
+            assert (f"src/{name}.c" in files) is (cut or name == function.name)
+            assert f"src/{name}.c" in compiled.package.sources or not cut
+    assert "src/inverse_dynamics_theta.c" in files
+
+
+def test_arms_functions_are_one_file_each() -> None:
+    files = library_files(arm_package())
+    assert not [path for path in files if path.endswith("_theta.c")]
