@@ -80,7 +80,7 @@ def summed(frames: Sequence[Frame], values: Sequence[Scalar]) -> tuple[Scalar, .
     """Of each coordinate, from one value per joint's rate."""
     found: dict[int, list[Scalar]] = {}
     rest = list(values)
-    followers: list[tuple[tuple[int, float, float], Scalar]] = []
+    followers: list[tuple[tuple[int, Scalar, Scalar], Scalar]] = []
     for i, frame in enumerate(frames):
         own, rest = rest[: frame.joint.nv], rest[frame.joint.nv :]
         if frame.follows is None:
@@ -125,7 +125,7 @@ def sparse_rows_summed(
     return found
 
 
-def _times(ratio: float, value: Scalar) -> Scalar:
+def _times(ratio: Scalar, value: Scalar) -> Scalar:
     if isinstance(value, float) and value == 0.0:
         return 0.0
     return value if ratio == 1.0 else value * ratio

@@ -55,7 +55,7 @@ class Frame:
     translation: Vector
     offset: Scalar = 0.0
     quarters: int = 0
-    follows: tuple[int, float, float] | None = None
+    follows: tuple[int, Scalar, Scalar] | None = None
     limbs: Callable[[Scalar], Scalar] | None = None
     is_parallel: bool = field(init=False, compare=False)
     inward_rows: Fixed = field(init=False, compare=False)

@@ -4,11 +4,10 @@ differ."""
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.program.lanes import lanes
@@ -22,29 +21,44 @@ LARGEST = 8
 
 def possible_groups(frames: Sequence[Frame]) -> tuple[tuple[Limbs, ...], ...]:
     """Ways to see limbs in a robot, none twice: all branches with joints of equal types, or only those whose frames have
-    the same zeros. None where joints follow others."""
-    if any_follows(frames):
-        return ()
+    the same zeros. A joint of a limb may follow one of its own limb, at the same place in all of them."""
     parents = [frame.parent for frame in frames]
     ways: list[tuple[Limbs, ...]] = []
     for label in (_type_of, _pattern_of):
         found = limb_groups(parents, [label(frame) for frame in frames])
-        usable = tuple(limbs for limbs in found if len(limbs) <= LARGEST)
+        usable = tuple(limbs for limbs in found if len(limbs) <= LARGEST and _follow_alike(frames, limbs))
         if usable and usable not in ways:
             ways.append(usable)
     return tuple(ways)
 
 
+def _follow_alike(frames: Sequence[Frame], limbs: Limbs) -> bool:
+    """Whether joints of these limbs are followed from within their limb alone, and follow there what is at one place."""
+    place = {joint: (number, k) for number, limb in enumerate(limbs) for k, joint in enumerate(limb)}
+    alike: dict[int, set[int]] = {}
+    for joint, frame in enumerate(frames):
+        if frame.follows is None:
+            continue
+        own, leader = place.get(joint), place.get(frame.follows[0])
+        if own is None and leader is None:
+            continue
+        if own is None or leader is None or own[0] != leader[0]:
+            return False
+        alike.setdefault(own[1], set()).add(leader[1])
+    return all(len(leaders) == 1 for leaders in alike.values())
+
+
 def _type_of(frame: Frame) -> Hashable:
-    return frame.joint.word
+    return frame.joint.word, frame.follows is None
 
 
 def _pattern_of(frame: Frame) -> Hashable:
     """What decides which operations a frame costs. Those on the base turn constants alone."""
     if frame.parent == BASE:
-        return frame.joint.word, frame.quarters
+        return frame.joint.word, frame.follows is None, frame.quarters
     zeros = tuple(x == 0.0 for row in (*frame.rotation, frame.translation) for x in row)
-    return frame.joint.word, frame.is_parallel, zeros, frame.offset == 0.0, frame.quarters
+    is_own = frame.follows is None
+    return frame.joint.word, is_own, frame.is_parallel, zeros, frame.offset == 0.0, frame.quarters
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +104,21 @@ def one_limb(frames: Sequence[Frame], among: Sequence[Place]) -> tuple[Frame, ..
         replace(
             _merged([frames[joint] for joint in place.joints], place.group),
             parent=new[frames[place.joints[0]].parent],
+            follows=_followed([frames[joint] for joint in place.joints], place, new),
         )
         for place in among
     )
+
+
+def _followed(
+    frames: Sequence[Frame], place: Place, new: Mapping[int, int]
+) -> tuple[int, Scalar, Scalar] | None:
+    """What the joint of a place follows: a place, with a constant per limb where ratios or offsets differ."""
+    follows = [frame.follows for frame in frames if frame.follows is not None]
+    if not follows:
+        return None
+    leaders, ratios, offsets = zip(*follows, strict=True)
+    return new[leaders[0]], place.constant(ratios), place.constant(offsets)
 
 
 def _merged(frames: Sequence[Frame], group: int | None) -> Frame:

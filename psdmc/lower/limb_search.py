@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE
 from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.solve import SingularMassMatrix
@@ -85,7 +86,7 @@ class LimbSearch:
 
     def best(self, start: Arrangement, straight: Program) -> LimbProgram | None:
         """The function with limbs in lanes; None where no width makes it worth while against the straight line."""
-        if not self.costs.has_vectors:
+        if not self.costs.has_vectors or self._is_eliminated(start):
             return None
         found = [self._descended(start, groups) for groups in possible_groups(start.reframed.frames)]
         if not found:
@@ -95,6 +96,10 @@ class LimbSearch:
         limit = for_one_state(self.costs).score(straight) / self.costs.worth_limbs
         paying = [lanes for lanes in WIDTHS if weight(limbs, lanes, self.costs) < limit]
         return limbs.with_least(paying[0]) if paying else None
+
+    def _is_eliminated(self, start: Arrangement) -> bool:
+        """Whether accelerations cannot go by articulated bodies: joints follow others."""
+        return self.recipe.accelerates and any_follows(start.reframed.frames)
 
     def _descended(self, start: Arrangement, groups: tuple[Limbs, ...]) -> _Candidate:
         best = self._weighed(self._admissible(start, groups), groups)

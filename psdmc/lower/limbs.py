@@ -86,7 +86,10 @@ class _Trace:
         frames = zip(one_limb(whole.frames, self.places), self.places, strict=True)
         self.reframed = replace(whole, frames=tuple(self._with_sums(*each) for each in frames))
         self.first = {
-            axis: [0, *accumulate(getattr(frame.joint, axis) for frame in whole.frames)]
+            axis: [
+                0,
+                *accumulate(0 if frame.follows else getattr(frame.joint, axis) for frame in whole.frames),
+            ]
             for axis in ("nq", "nv")
         }
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from mimic_trees import as_urdf
 from random_trees import TREES, RandomTree
 
 from psdmc.derivation.derive import derive_model
@@ -23,41 +24,10 @@ FINGERS = (Coordinate(0), Coordinate(1), Coordinate(1, -0.7, 0.2), Coordinate(3)
 PARENTS = (-1, 0, 0, 1, 2)
 
 
-def as_urdf(tree: RandomTree) -> str:
-    """The tree with FINGERS as mimic joints, numbers to all their digits."""
-
-    def words(values) -> str:
-        return " ".join(repr(float(value)) for value in values)
-
-    parts = ['<robot name="tree"><link name="base"/>']
-    for i, (joint, parent, place) in enumerate(zip(tree.types, tree.parents, tree.places, strict=True)):
-        body, coordinate = pin.Inertia.FromDynamicParameters(tree.parameters[i].copy()), FINGERS[i]
-        names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-        six = " ".join(
-            f'{name}="{float(value)!r}"'
-            for name, value in zip(names, body.inertia[np.triu_indices(3)], strict=True)
-        )
-        above = "base" if parent < 0 else f"link{parent}"
-        mimic = (
-            f'<mimic joint="joint{coordinate.leader}" multiplier="{coordinate.ratio!r}" offset="{coordinate.offset!r}"/>'
-            if coordinate != Coordinate(i)
-            else ""
-        )
-        parts.append(
-            f'<link name="link{i}"><inertial><origin xyz="{words(body.lever)}"/><mass value="{body.mass!r}"/>'
-            f"<inertia {six}/></inertial></link>"
-            f'<joint name="joint{i}" type="{joint.word}"><axis xyz="0 0 1"/>{mimic}'
-            f'<parent link="{above}"/><child link="link{i}"/>'
-            f'<origin xyz="{words(place.translation)}" rpy="{words(pin.rpy.matrixToRpy(place.rotation))}"/>'
-            '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>'
-        )
-    return "".join([*parts, "</robot>"])
-
-
 @pytest.mark.parametrize("kinds", ["RRRRR", "RPPRP", "PRRPR"])
 def test_followers_are_pinocchios_mimic_joints(kinds: str) -> None:
     tree = RandomTree(21, PARENTS, kinds)
-    model = pin.buildModelFromXML(as_urdf(tree), mimic=True)
+    model = pin.buildModelFromXML(as_urdf(tree, FINGERS), mimic=True)
     model.gravity.linear = tree.gravity.copy()
     data = model.createData()
     assert (model.nq, model.nv) == (3, 3)
@@ -100,7 +70,7 @@ def test_models_of_followers_are_pinocchios_mimic_joints(kinds: str) -> None:
     tree.places = [Placement(place.rotation, 8.0 * place.translation) for place in tree.places]
     robot = replace(tree.mechanism(), coordinates=FINGERS)
     robot = replace(robot, parameters=robot.parameters * ([1.0] * 10 + [0.0]))
-    oracle = pin.buildModelFromXML(as_urdf(tree), mimic=True)
+    oracle = pin.buildModelFromXML(as_urdf(tree, FINGERS), mimic=True)
     oracle.gravity.linear = tree.gravity.copy()
     model, data = derive_model(robot), oracle.createData()
     q, qd, qdd = np.random.default_rng(3).uniform(-2.0, 2.0, (3, 20, 3))

@@ -11,6 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from limbed import FUNCTIONS, SHAPES, kernels, limbed, shape
+from mimic_trees import as_urdf
+from random_trees import RandomTree
 from slow_cases import slow_but_for
 from whole_robots import ROBOTS, derived, lowered
 
@@ -34,6 +36,7 @@ from psdmc.program.limb_stages import staged
 from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Recipe
+from psdmc.robot.coordinates import Coordinate, leaders
 from psdmc.robot.limbs import Limbs
 from psdmc.target.native import COSTS
 from psdmc.target.presets import SCALAR
@@ -186,13 +189,61 @@ def test_no_lanes_for_theta_for_batches_and_for_machines_without_vectors() -> No
     assert made["inverse_dynamics"].limbs is not None
 
 
-def test_joints_that_follow_others_are_no_limbs() -> None:
+FOLLOWING = (
+    *(Coordinate(0), Coordinate(1)),
+    *(Coordinate(2), Coordinate(3), Coordinate(3, -0.7, 0.2)),
+    *(Coordinate(5), Coordinate(6), Coordinate(6, 1.3, -0.4)),
+    *(Coordinate(8), Coordinate(9), Coordinate(9, 0.5)),
+)
+"""A wrist of two joints with three fingers, whose last joints follow the ones before, by other ratios on each."""
+
+
+@pytest.mark.parametrize("kinds", ["RRRRRRRRRRR", "RPRPPRPPRPP"])
+@pytest.mark.parametrize("function", ["inverse_dynamics", "mass_matrix"])
+def test_fingers_that_bend_by_themselves_are_limbs(function: str, kinds: str) -> None:
+    """Written out, against Pinocchio's mimic joints."""
+    tree = RandomTree(5, (BASE, 0, 1, 2, 3, 1, 5, 6, 1, 8, 9), kinds)
+    robot = replace(tree.mechanism(), coordinates=FOLLOWING)
+    model = derive_model(replace(robot, parameters=robot.parameters * ([1.0] * 10 + [0.0])), expand=False)
+    search = Search(model.mechanism, model.representative, model.theta_b)
+    start = next(search.starts(search.geometry.feet[0]))
+    (groups, *_) = possible_groups(start.reframed.frames)
+    assert groups == (((2, 3, 4), (5, 6, 7), (8, 9, 10)),)
+
+    traced = trace_limbs(RECIPES[function], start, search.robot, groups)
+    program = unpacked(LimbProgram(traced.groups, staged(traced.program, traced.groups)))
+
+    oracle = pin.buildModelFromXML(as_urdf(tree, FOLLOWING), mimic=True)
+    oracle.gravity.linear = tree.gravity.copy()
+    data, given = oracle.createData(), given_states(model)
+    order = [oracle.joints[oracle.getJointId(f"joint{i}")].idx_v for i in leaders(FOLLOWING)]
+
+    def theirs(k: int) -> np.ndarray:
+        states = np.zeros((3, model.nv))
+        states[:, order] = [given[name][k] for name in ("q", "qd", "qdd")]
+        if function == "inverse_dynamics":
+            return pin.rnea(oracle, data, *states)[order]
+        upper = np.triu(pin.crba(oracle, data, states[0]))
+        return (upper + np.triu(upper, 1).T)[np.ix_(order, order)].ravel()
+
+    (name,) = values(program, function, model)
+    assert_same(values(program, function, model), {name: np.array([theirs(k) for k in range(COUNT)])}, 1e-12)
+
+
+def test_limbs_whose_joints_follow_beyond_them_are_none() -> None:
     frames = list(
         Search(model := shape("two arms on the base")[1].mechanism, np.eye(11 * len(model)), None)
         .geometry.reframed(("previous",) * 6)
         .frames
     )
     assert possible_groups(frames)
-    frames[5] = replace(frames[5], follows=(2, 1.0, 0.0))
-    assert possible_groups(frames) == ()
+    one = frames.copy()
+    one[5] = replace(one[5], follows=(4, 1.0, 0.0))
+    assert possible_groups(one) == ()
+    across = frames.copy()
+    across[2], across[5] = (replace(frames[i], follows=(leader, 1.0, 0.0)) for i, leader in ((2, 4), (5, 1)))
+    assert possible_groups(across) == ()
+    unlike = frames.copy()
+    unlike[2], unlike[5] = (replace(frames[i], follows=(leader, 1.0, 0.0)) for i, leader in ((2, 0), (5, 4)))
+    assert possible_groups(unlike) == ()
     assert frames[0].parent == BASE
