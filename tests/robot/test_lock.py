@@ -94,6 +94,7 @@ def test_what_is_locked_moves_with_a_chain_and_carries_named_frames() -> None:
     np.testing.assert_allclose(there.translation, (own.inverse() * place.placement).translation, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_real_robots_with_locked_joints_are_checked_by_both_readers() -> None:
     pytest.importorskip("mujoco")
     path = robot_data("talos_reduced.urdf")
