@@ -14,6 +14,7 @@ from functools import lru_cache
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.lower.factored import Arrangement, RobotConstants
+from psdmc.lower.geometry import LARGE
 from psdmc.lower.reframe import Reframed
 from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Recipe
@@ -21,8 +22,8 @@ from psdmc.robot.limbs import Limbs
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 MANY = 20
-"""Joints of a robot from which on branches are traced first. Where a sum lies is not told by them alone: now and then an
-exchange that saves an operation or two is missed (one in 500 on talos), for half of the time."""
+"""Joints of a robot with parameters at run time from which on branches are traced first. What an exchange changes in how all
+carriers follow from theta_b is not told by branches: on quadrupeds that is what decides."""
 
 WORTH = 0.7
 """Share of a robot's joints up to which its part is traced first."""
@@ -43,7 +44,8 @@ class Branches:
         groups   limbs that are kept together
         """
         frames = before.reframed.frames
-        if len(frames) < MANY or not recipe.in_limbs or any_follows(frames):
+        is_told = self.robot.theta_b is not None or len(frames) >= MANY
+        if len(frames) <= LARGE or not is_told or not recipe.in_limbs or any_follows(frames):
             return None
         carriers = set(before.carriers) ^ set(behind.carriers)
         found = around(frames, {carrier // PARAMETERS_PER_LINK for carrier in carriers})

@@ -5,7 +5,7 @@ A part is a PROGRAM of its own. What later parts read of it, it stores into vect
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 
@@ -58,6 +58,7 @@ class _Cut:
         self.outputs = self._outputs()
         self.read_in = self._read_in()
         self.first_store = min((p for p, outputs in enumerate(self.outputs) if outputs), default=0)
+        self.leaving, self.computed = self._leaving(), self._computed()
 
     def _stored_at(self, groups: Sequence[Collection[Slot]], late: bool) -> dict[Slot, int]:
         """Of each output the position in the order behind which it is stored."""
@@ -170,7 +171,7 @@ class _Cut:
             for last, slot in until:
                 if last == p - 1:
                     free.setdefault(slot.vector, []).append(slot.index)
-            for i in self._leaving(p):
+            for i in self.leaving[p]:
                 vector = self.kept_in[i]
                 places = free.get(vector, [])
                 if not places:
@@ -180,11 +181,22 @@ class _Cut:
                 until.append((max(self.read_in[i]), slots[i]))
         return slots, lengths
 
-    def _leaving(self, part: int) -> Iterator[int]:
-        """Values that a part stores for later ones."""
+    def _leaving(self) -> list[list[int]]:
+        """Of each part the values that it stores for later ones."""
+        leaving: list[list[int]] = [[] for _ in self.outputs]
         for i in self.order:
-            if self._home(i) == part and any(p > part and not self._is_free(i, p) for p in self.read_in[i]):
-                yield i
+            home = self._home(i)
+            if any(p > home and not self._is_free(i, p) for p in self.read_in[i]):
+                leaving[home].append(i)
+        return leaving
+
+    def _computed(self) -> list[list[int]]:
+        """Of each part the values that it computes."""
+        computed: list[list[int]] = [[] for _ in self.outputs]
+        for i in self.order:
+            if self.program.body[i].op is not Op.LOAD:
+                computed[self.part[i]].append(i)
+        return computed
 
     def _program(self, part: int, slots: Mapping[int, Slot]) -> Program:
         body: list[Instr] = []
@@ -197,13 +209,11 @@ class _Cut:
                 body.append(self.program.body[i] if is_own else Instr(Op.LOAD, slot=slots[i]))
             return here[i]
 
-        for i in self.order:
+        for i in self.computed[part]:
             instr = self.program.body[i]
-            if instr.op is Op.LOAD or self.part[i] != part:
-                continue
             moved = {a: local(a) for a in instr.args}
             here[i] = len(body)
             body.append(instr.renumbered(moved))
         outputs = [(slot, local(i)) for slot, i in self.outputs[part]]
-        outputs += [(slots[i], local(i)) for i in self._leaving(part)]
+        outputs += [(slots[i], local(i)) for i in self.leaving[part]]
         return check(Program(tuple(body), tuple(outputs)), after="cutting into parts")
