@@ -12,7 +12,7 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from psdmc.errors import InputError
-from psdmc.robot.limits import MAX_COPIES, shown
+from psdmc.robot.limits import MAX_BYTES, MAX_COPIES, shown
 
 REPEATING = ("replicate", "composite", "flexcomp")
 """Elements whose `count` says how many copies there are; of the last two, along up to three axes."""
@@ -44,10 +44,7 @@ def _of_file(path: Path, folder: Path, source: str, known: set[Path]) -> _Count:
     if path in known:
         return _Count(1.0, 0.0)
     known.add(path)
-    try:
-        text = path.read_bytes()
-    except OSError:
-        return _Count(1.0, 0.0)
+    text = _text(path, source)
     try:
         root = defusedxml.ElementTree.fromstring(text)
     except (ParseError, DefusedXmlException, ValueError, LookupError) as error:
@@ -58,6 +55,23 @@ def _of_file(path: Path, folder: Path, source: str, known: set[Path]) -> _Count:
             "correct it, or write the copies out",
         ) from None
     return _of_element(root, folder, source, known)
+
+
+def _text(path: Path, source: str) -> bytes:
+    """A file's bytes; none of what is no file, or cannot be read. InputError where it is longer than robot files are."""
+    try:
+        if not path.is_file():
+            return b""
+        with path.open("rb") as file:
+            text = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError):
+        return b""
+    if len(text) > MAX_BYTES:
+        raise InputError(
+            f"{source}: it includes {shown(path.name)}, which has more than {MAX_BYTES // 2**20} MiB",
+            "include less",
+        )
+    return text
 
 
 def _of_element(element: Element, folder: Path, source: str, known: set[Path]) -> _Count:

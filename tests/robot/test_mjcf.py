@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -16,7 +17,9 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.model.random_states import on_joints
+from psdmc.robot.limits import MAX_BYTES
 from psdmc.robot.load import load_robot, load_robot_text
+from psdmc.robot.mjcf_copies import refuse_many_copies
 from psdmc.robot.mujoco_reading import force_from_mujoco, to_mujoco
 from psdmc.verification.check import check_model
 
@@ -459,6 +462,20 @@ def test_more_copies_than_a_compiler_takes_are_refused_before_it_begins(tmp_path
     (tmp_path / "more.xml").write_text(f"<mujocoinclude>{sixty}</mujocoinclude>")
     (tmp_path / "robot.xml").write_text(REPEATED.format(part))
     with pytest.raises(InputError, match=r"robot.xml: <replicate>.* ask for .* expected 3000 at most"):
+        load_robot(tmp_path / "robot.xml")
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "..", "missing.xml", "a&#0;b", "fifo"])
+def test_what_is_included_and_is_no_file_is_mujocos_matter(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "robot.xml").write_text(REPEATED.format(f"<include file='{name}'/>"))
+    refuse_many_copies(tmp_path / "robot.xml", "robot.xml")
+
+
+def test_an_included_file_is_not_longer_than_a_robot_s(tmp_path: Path) -> None:
+    (tmp_path / "more.xml").write_text(" " * (MAX_BYTES + 1))
+    (tmp_path / "robot.xml").write_text(REPEATED.format("<include file='more.xml'/>"))
+    with pytest.raises(InputError, match=r"robot.xml: it includes 'more.xml', which has more than 4 MiB"):
         load_robot(tmp_path / "robot.xml")
 
 
