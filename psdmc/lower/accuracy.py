@@ -22,12 +22,16 @@ LIMIT = 2e-12
 """Error of an arrangement, or of an expanded PROGRAM, that may be taken: a fifth of what is promised, as these states are
 few. Robots of one scale have 1e-16 to 1e-13."""
 
+LEAST_INERTIA = 1e-20
+"""Share of the mass matrix's largest entry below which a row is rounding of a joint that moves nothing."""
+
 WRONG = 1e-8
 """Error that no rounding makes: an arrangement of another robot. The largest seen of robots that are admitted is 1e-10."""
 
 
 class Accuracy:
-    """Errors of a model's arrangements, by inverse dynamics: it runs the arithmetic of all other functions; and of PROGRAMs.
+    """Errors of a model's arrangements, most by inverse dynamics, which runs the arithmetic of other functions; and of
+    PROGRAMs.
 
     robot    constants of the traces, with theta_b or with theta_b as an input
     theta_b  (l,)
@@ -38,9 +42,11 @@ class Accuracy:
         vectors = states_of(robot.chain, np.random.default_rng(SEED), STATES)
         self._states = dict(zip(("q", "qd", "qdd"), vectors, strict=True))
 
-    def error(self, arrangement: Arrangement) -> float:
-        """That of inverse dynamics in an arrangement."""
-        recipe = inverse_dynamics.RECIPE
+    def error(self, arrangement: Arrangement, recipe: Recipe = inverse_dynamics.RECIPE) -> float:
+        """That of a function in an arrangement: of the mass matrix by itself, whose entries may be small beside the torques
+        that gravity asks for; of others by inverse dynamics."""
+        if recipe.polynomials is not Polynomials.MASS:
+            recipe = inverse_dynamics.RECIPE
         return self.error_of(recipe, trace_dynamics(recipe, arrangement, self.robot))
 
     def error_of(self, recipe: Recipe, program: Program) -> float:
@@ -53,7 +59,8 @@ class Accuracy:
             found = interpret(program, given, signature.sizes(self.robot.sizes))[signature.outputs[0].name]
         count, nv = self._torques.shape
         if part is Polynomials.MASS:
-            return _relative(found.reshape(count, nv, nv) - self._mass, self._mass)
+            least = LEAST_INERTIA * float(self._mass.max(initial=0.0))
+            return _relative(found.reshape(count, nv, nv) - self._mass, self._mass, least)
         if part is Polynomials.SOLVED:
             lacking = np.einsum("sij,sj->si", self._mass, found - self._states["qdd"])
         elif part is Polynomials.REGRESSOR:
@@ -85,8 +92,9 @@ class Accuracy:
         return recursive.mass_matrix(self.robot.chain, self._parameters, self._states["q"])
 
 
-def _relative(difference: Array, whole: Array) -> float:
-    """Largest difference of a joint's or a row's entries, relative to the largest of them; absolute where that is zero."""
+def _relative(difference: Array, whole: Array, least: float = 0.0) -> float:
+    """Largest difference of a joint's or a row's entries, relative to the largest of them, or to `least` where they are
+    smaller; absolute where both are zero."""
     others = tuple(axis for axis in range(whole.ndim) if axis != 1)
-    largest = np.abs(whole).max(axis=others)
+    largest = np.maximum(np.abs(whole).max(axis=others), least)
     return float(np.max(np.abs(difference).max(axis=others) / np.where(largest > 0, largest, 1.0)))

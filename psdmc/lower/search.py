@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -122,10 +123,11 @@ class Search:
         all are beyond what rounding does."""
         found = self._descended(recipe, scoring, start)
         accuracy = self.accuracy
-        if accuracy is None or accuracy.error(found) <= LIMIT:
+        if accuracy is None or accuracy.error(found, recipe) <= LIMIT:
             return found
         firsts = [start] if start else [next(self.starts(feet)) for feet in self.geometry.feet]
-        found = self._descended(recipe, scoring, start, self._accurate(firsts, accuracy))
+        accurate = self._accurate(firsts, partial(accuracy.error, recipe=recipe))
+        found = self._descended(recipe, scoring, start, accurate)
         error = accuracy.error(found)
         if error > WRONG:
             raise InternalError(f"{recipe.name}: the torques of its arrangement are off by {error:.1e}")
@@ -142,7 +144,7 @@ class Search:
         descent = _Descent(
             lambda a: scoring.weight(self.cost(recipe, a)),
             self.budget,
-            self._admits(accurate),
+            self._admits(accurate, recipe),
         )
         if accurate is not None:
             descent.consider(iter([accurate]))
@@ -186,17 +188,19 @@ class Search:
             self._costs[key] = cost_of_dynamics(recipe, part, robot)
         return self._costs[key]
 
-    def _accurate(self, firsts: Sequence[Arrangement], accuracy: Accuracy) -> Arrangement:
+    def _accurate(
+        self, firsts: Sequence[Arrangement], error_of: Callable[[Arrangement], float]
+    ) -> Arrangement:
         """The most accurate of several arrangements; one within LIMIT where exchanges of its carriers lead to it, else where
         nothing is carried by other parameters than its own, on their frames or on the robot's."""
-        best = min(firsts, key=accuracy.error)
-        error = accuracy.error(best)
+        best = min(firsts, key=error_of)
+        error = error_of(best)
         while error > LIMIT:
-            others = {accuracy.error(each): each for each in self._exchanges(best)}
+            others = {error_of(each): each for each in self._exchanges(best)}
             least = min(others, default=error)
             if least >= error:
                 frames = [*(each.reframed for each in firsts), self.geometry.unmoved]
-                return min([best, *map(self._uncarried, frames)], key=accuracy.error)
+                return min([best, *map(self._uncarried, frames)], key=error_of)
             best, error = others[least], least
         return best
 
@@ -210,12 +214,12 @@ class Search:
         """Whether torques computed on these frames are accurate enough; True where no base parameters are known."""
         return self.accuracy is None or self.accuracy.error(self._uncarried(reframed)) <= LIMIT
 
-    def _admits(self, accurate: Arrangement | None) -> Callable[[Arrangement], bool]:
+    def _admits(self, accurate: Arrangement | None, recipe: Recipe) -> Callable[[Arrangement], bool]:
         accuracy = self.accuracy
         if accuracy is None or accurate is None:
             return lambda arrangement: True
-        limit = max(LIMIT, accuracy.error(accurate))
-        return lambda arrangement: accuracy.error(arrangement) <= limit
+        limit = max(LIMIT, accuracy.error(accurate, recipe))
+        return lambda arrangement: accuracy.error(arrangement, recipe) <= limit
 
     def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
         """What a function's PROGRAM costs in an arrangement; traced once."""
