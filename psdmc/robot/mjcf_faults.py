@@ -45,6 +45,16 @@ def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> Non
         raise InputError(f"{source}: {joined(found)}", "write an angle within a few turns")
 
 
+def refuse_armatures(model: Any, names: Names, source: str) -> None:
+    """InputError that names joints with negative armatures, which MuJoCo takes."""
+    armatures = [(j, float(model.dof_armature[model.jnt_dofadr[j]])) for j in range(model.njnt)]
+    found = [f"joint {shown(names.joint(j))}: armature {value:g}" for j, value in armatures if value < 0.0]
+    if found:
+        raise InputError(
+            f"{source}: {joined(found)}, expected 0 or more", "give the inertia of the joint's drive"
+        )
+
+
 def _loops(mujoco: Any, model: Any) -> Iterator[str]:
     for k in range(model.neq):
         if model.eq_active0[k] and not _is_linear(mujoco, model, k):

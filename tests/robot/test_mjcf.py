@@ -443,6 +443,12 @@ def test_options_go_before_what_the_file_says(tmp_path: Path) -> None:
     assert robot.mechanism.gravity.tolist() == [0, 0, -1.6]
 
 
+def test_a_negative_armature_is_refused_and_not_left_out(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text(ARM.replace('name="elbow"', 'name="elbow" armature="-0.9"'))
+    with pytest.raises(InputError, match=r"arm.xml: joint 'elbow': armature -0.9, expected 0 or more"):
+        load_robot(tmp_path / "arm.xml")
+
+
 REPEATED = "<mujoco><worldbody><body><joint name='a'/><geom size='.1'/>{}</body></worldbody></mujoco>"
 INNER = "<replicate count='{}'><replicate count='{}'><geom size='.1'/></replicate></replicate>"
 
