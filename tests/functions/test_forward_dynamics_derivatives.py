@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
+from direct import Direct
 from robots_at_hand import drawn
 from unoptimised import without_optimisation
 
@@ -61,3 +62,31 @@ def test_they_are_the_slopes_of_forward_dynamics(robot: str) -> None:
             )
             slope = (forward(*ahead) - forward(*behind)) / (2 * step)
             np.testing.assert_allclose(block[:, :, j], slope, atol=1e-5 * np.abs(block).max())
+
+
+@pytest.mark.parametrize("layout", ["batch", "batch_soa"])
+def test_of_many_states_only_those_become_nan_that_have_no_accelerations(layout: str) -> None:
+    """One in a whole block of lanes, one in the last, which is not; the call says which was the first."""
+    own, count, n = bench("kr6"), 11, 6
+    lanes = layout == "batch_soa"
+    inputs = [own.given[name][:count].copy() for name in ("q", "qd", "tau")]
+    inputs[0][[3, 9], 2] = np.nan
+    outputs = [np.zeros((16, size)) for size in (n, n * n, n * n, n * n)]
+    given = [_in_lanes(values) if lanes else values for values in inputs]
+    assert (
+        Direct(own.package, own.robot.library)(
+            f"forward_dynamics_derivatives_{layout}", count, *given, *outputs
+        )
+        == 4
+    )
+    for values in outputs:
+        rows = values.reshape(2, -1, 8).transpose(0, 2, 1).reshape(16, -1) if lanes else values
+        assert np.isnan(rows[[3, 9]]).all()
+        assert np.isfinite(np.delete(rows[:count], [3, 9], axis=0)).all()
+        assert (np.delete(rows[:count], [3, 9], axis=0) != 0.0).any(axis=1).all()
+
+
+def _in_lanes(rows: np.ndarray) -> np.ndarray:
+    """Blocks of eight states, [variable][lane]; lanes without a state repeat the first."""
+    filled = np.concatenate([rows, np.repeat(rows[:1], -len(rows) % 8, axis=0)])
+    return np.ascontiguousarray(filled.reshape(-1, 8, rows.shape[1]).transpose(0, 2, 1))
