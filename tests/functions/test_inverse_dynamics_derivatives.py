@@ -9,6 +9,7 @@ from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from psdmc.lower.kernels import lower
 from psdmc.program.differentiate import Block, jacobians
 from psdmc.program.interpret import interpret
+from psdmc.program.program import Op
 
 NAMES = ("dtau_dq", "dtau_dqd", "dtau_dqdd")
 
@@ -41,3 +42,13 @@ def test_the_derivative_by_accelerations_is_the_mass_matrix() -> None:
     q, qd, qdd = (own.given[name] for name in ("q", "qd", "qdd"))
     found = own.robot.inverse_dynamics_derivatives(q, qd, qdd).dtau_dqdd
     np.testing.assert_allclose(found, own.model.mass_matrix(q), atol=1e-13 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("name", ["inverse_dynamics_derivatives", "forward_dynamics_derivatives"])
+def test_an_upright_arm_takes_no_sine_of_its_first_angle(name: str) -> None:
+    """It turns about gravity: its second moment about its own axis is added and subtracted again, turned."""
+    kernel = lower(bench("kr6").model, "factored", [name], theta_variants=False)[name]
+    for program in (kernel.single, kernel.batch):
+        turned = [program.body[i.args[0]].slot for i in program.body if i.op in (Op.SIN, Op.COS)]
+        assert ("q", 0) not in turned
+        assert ("q", 5) in turned

@@ -241,6 +241,32 @@ def test_products_that_are_subtracted_keep_their_sign(outputs: Outputs):
     np.testing.assert_allclose(outputs(after), outputs(before), rtol=1e-14, atol=1e-15)
 
 
+def test_what_a_sum_adds_and_subtracts_is_left_out():
+    before = parse(
+        LOADS
+        + """
+        x = mul a b
+        y = sub c d
+        z = sub y x
+        s = add x z
+        out tau[0] = s
+    """
+    )
+
+    assert lines(factor_common(before)) == [
+        "t0 = load q[2]",
+        "t1 = load qd[0]",
+        "t2 = sub t0 t1",
+        "out tau[0] = t2",
+    ]
+
+
+def test_a_sum_that_is_left_with_a_minus_alone_stays_as_it_is(outputs: Outputs):
+    before = parse(LOADS + "x = sub a b\ny = sub x a\nz = sub y c\nout tau[0] = y\nout tau[1] = z")
+
+    np.testing.assert_array_equal(outputs(factor_common(before)), outputs(before))
+
+
 def test_factoring_keeps_outputs_up_to_rounding_and_saves(some_program: Program, outputs: Outputs):
     after = check(factor_common(some_program), after="factor_common")
 

@@ -36,7 +36,7 @@ int two_link_forward_dynamics_theta(const double *q, const double *qd, const dou
 
 static void forward_dynamics_lanes(const real *q, const real *qd, const real *tau, real *qdd, real *pivot)
 {
-#include "forward_dynamics.inc"
+#include "forward_dynamics_lanes.inc"
 }
 
 size_t two_link_forward_dynamics_batch(size_t count, const double *q, const double *qd, const double *tau, double *qdd)

@@ -1,4 +1,4 @@
-"""Take common factors out of sums."""
+"""Take common factors out of sums, and leave out what cancels."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def factor_common(program: Program) -> Program:
     """Write a*b + a*c as a*(b + c), over chains of sums and of products of which nothing else uses a part.
 
     The factor that most terms of a sum share goes first, then again among the others and within the bracket.
-    A sum in which no two terms share a factor stays as it is.
+    A term that is added and subtracted is left out. A sum in which no two terms share a factor or cancel stays as it is.
 
     Needs:  every argument precedes its use.
     Keeps:  outputs up to rounding (it reorders floating point); output names and order.
-    Gives:  fewer multiplications, as many additions; every instruction is needed.
+    Gives:  fewer multiplications, no more additions; every instruction is needed.
     """
     grouped = _grouped_sums(program)
     if not grouped:
@@ -63,8 +63,9 @@ def _grouped_sums(program: Program) -> dict[int, tuple[_Term, ...]]:
         if inside[i] or instr.op not in _SIGNED_SUM:
             continue
         signed = _signed_factors(program.body, uses, i)
-        if _shares_a_factor(signed):
-            grouped = _grouped(tuple(_Term(sign, tuple(factors)) for sign, factors in signed))
+        kept = _without_what_cancels(signed)
+        if len(kept) < len(signed) or _shares_a_factor(kept):
+            grouped = _grouped(tuple(_Term(sign, tuple(factors)) for sign, factors in kept))
             if len(grouped) < len(signed):
                 found[i] = grouped
     return found
@@ -93,6 +94,23 @@ def _signed_factors(body: tuple[Instr, ...], uses: list[int], index: int) -> lis
         else:
             terms.append((own, [i] if op is not Op.MUL or uses[i] != 1 else _factors(body, uses, i)))
     return terms
+
+
+def _without_what_cancels(terms: list[tuple[int, list[int]]]) -> list[tuple[int, list[int]]]:
+    """The terms but for pairs that differ in their signs alone; a term with a plus comes first. All of them where nothing
+    with a plus would be left."""
+    found: dict[tuple[int, ...], list[int]] = {}
+    for at, (sign, factors) in enumerate(terms):
+        alike = found.setdefault(tuple(sorted(factors)), [])
+        if alike and terms[alike[-1]][0] != sign:
+            alike.pop()
+        else:
+            alike.append(at)
+    left = sorted(at for alike in found.values() for at in alike)
+    plus = next((at for at in left if terms[at][0] > 0), None)
+    if len(left) == len(terms) or plus is None:
+        return terms
+    return [terms[at] for at in (plus, *(at for at in left if at != plus))]
 
 
 def _shares_a_factor(terms: list[tuple[int, list[int]]]) -> bool:

@@ -66,11 +66,11 @@ void two_link_inverse_dynamics_theta(const double *q, const double *qd, const do
 void two_link_inverse_dynamics_theta_batch(size_t count, const double *q, const double *qd, const double *qdd, const double *theta_b, double *tau);
 
 /* qdd = M(q)^-1 (tau - h(q, qd)); qdd is 2 */
-/* forward_dynamics: 21 mul + 13 add + 1 div + 2 sincos, expanded */
+/* forward_dynamics: 17 mul + 13 add + 1 div + 2 sincos, factored */
 int two_link_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd);
 size_t two_link_forward_dynamics_batch(size_t count, const double *q, const double *qd, const double *tau, double *qdd);
 size_t two_link_forward_dynamics_batch_soa(size_t count, const double *q, const double *qd, const double *tau, double *qdd);
-/* forward_dynamics_theta: 21 mul + 21 add + 2 div + 2 sincos, factored */
+/* forward_dynamics_theta: 19 mul + 19 add + 2 div + 2 sincos, factored */
 int two_link_forward_dynamics_theta(const double *q, const double *qd, const double *tau, const double *theta_b, double *qdd);
 size_t two_link_forward_dynamics_theta_batch(size_t count, const double *q, const double *qd, const double *tau, const double *theta_b, double *qdd);
 
@@ -79,7 +79,7 @@ size_t two_link_forward_dynamics_theta_batch(size_t count, const double *q, cons
 void two_link_mass_matrix(const double *q, double *M);
 void two_link_mass_matrix_batch(size_t count, const double *q, double *M);
 void two_link_mass_matrix_batch_soa(size_t count, const double *q, double *M);
-/* mass_matrix_theta: 10 mul + 6 add + 1 sincos, expanded */
+/* mass_matrix_theta: 4 mul + 7 add + 1 sincos, factored */
 void two_link_mass_matrix_theta(const double *q, const double *theta_b, double *M);
 void two_link_mass_matrix_theta_batch(size_t count, const double *q, const double *theta_b, double *M);
 
