@@ -151,6 +151,8 @@ class _Lowered:
         if self.lowering != "expanded" or not candidates:
             single = self._factored(recipe, theta, self.single)
             batch = self._factored(recipe, theta, self.batch)
+            if batch != single and self._serves_both(single, batch):
+                single = batch
             candidates.append(_kernel(recipe, theta, single, batch, "factored", self.costs, n))
         kernel = min(candidates, key=lambda kernel: self.single.score(kernel.single))
         return kernel if theta or not recipe.in_limbs else self._in_limbs(recipe, kernel)
@@ -180,6 +182,15 @@ class _Lowered:
 
     def _factored(self, recipe: Recipe, theta: bool, scoring: Scoring) -> Program:
         return min(self._candidates(recipe, theta), key=scoring.score)
+
+    def _serves_both(self, single: Program, batch: Program) -> bool:
+        """Whether one state takes the lanes' arithmetic: sums of angles by the addition theorems save lanes a sincos each
+        and cost one state of a long function next to nothing."""
+        own, costs = self.single.score(single), self.costs
+        if not costs.has_vectors or own < costs.shared_from:
+            return False
+        one, lanes = (self.single.score(shortened(each)) for each in (single, batch))
+        return lanes <= costs.worth_sharing * one
 
     def _candidates(self, recipe: Recipe, theta: bool) -> tuple[Program, ...]:
         """The PROGRAMs that code for one state and code for lanes choose from, traced once for both."""

@@ -36,6 +36,9 @@ class Costs:
     spills_wait         whether a spilled value delays the code (one instruction after the other); other machines hide it
     crowded             lanes take the order for one state unless it keeps this many times more values alive
     worth_two_bodies    lanes get a body of their own where it saves this factor
+    worth_sharing       one state takes the lanes' arithmetic where that costs it no more than this factor: one body, and
+                        the lanes' sines saved
+    shared_from         additions from which that is considered
     loops_from          rows from which products of square matrices behind a PROGRAM are loops in code for one state
     worth_limbs         limbs run in lanes where this saves that factor
     limb_real           weight of bringing one of a limb's inputs into its lane, or an output out of it
@@ -55,6 +58,8 @@ class Costs:
     spills_wait: bool
     crowded: float
     worth_two_bodies: float
+    worth_sharing: float
+    shared_from: float
     longest_of_two: float
     worth_limbs: float
     limb_real: float

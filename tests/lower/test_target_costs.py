@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -37,6 +38,23 @@ def test_without_vectors_lanes_have_no_body_of_their_own() -> None:
     for name in ("scalar", "cortex-m4f", "cortex-m7"):
         kernel = lowered(name)["inverse_dynamics"]
         assert kernel.batch == kernel.single
+
+
+def test_one_state_takes_the_lanes_fewer_sines_where_that_costs_it_next_to_nothing() -> None:
+    own, shared = (
+        lower(
+            bundled_model("kr6"),
+            "factored",
+            ["inverse_dynamics_derivatives"],
+            theta_variants=False,
+            costs=replace(COSTS, worth_sharing=factor),
+        )["inverse_dynamics_derivatives"]
+        for factor in (0.0, COSTS.worth_sharing)
+    )
+
+    assert cost(shared.single).sincos < cost(own.single).sincos
+    assert shared.batch == shared.single
+    assert cost(shared.single).total < COSTS.worth_sharing * cost(own.single).total
 
 
 def test_equal_costs_are_equal_programs() -> None:
