@@ -67,10 +67,11 @@ def test_they_are_the_slopes_of_forward_dynamics(robot: str) -> None:
 @pytest.mark.parametrize("layout", ["batch", "batch_soa"])
 def test_of_many_states_only_those_become_nan_that_have_no_accelerations(layout: str) -> None:
     """One in a whole block of lanes, one in the last, which is not; the call says which was the first."""
-    own, count, n = bench("kr6"), 11, 6
+    own, count = bench(ARM), 11
+    n = own.model.n
     lanes = layout == "batch_soa"
     inputs = [own.given[name][:count].copy() for name in ("q", "qd", "tau")]
-    inputs[0][[3, 9], 2] = np.nan
+    inputs[0][[3, 9]] = np.nan
     outputs = [np.zeros((16, size)) for size in (n, n * n, n * n, n * n)]
     given = [_in_lanes(values) if lanes else values for values in inputs]
     assert (
