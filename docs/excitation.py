@@ -1,10 +1,11 @@
 """Condition numbers of exciting motions of the virtual Denso: the table of docs/calibration.md.
 
-python docs/excitation.py [--seeds N]
+python docs/excitation.py [--seeds N] [--condition]
 
-The same limits, period and criterion for all: condition number of the scaled columns of the fit along one period. Last
-column: that of the rows which the linear fit makes of such a motion's log, six periods at 250 Hz with the plant's position
-sensors, filtered and differentiated.
+The same limits and period for all, and the criterion of `psdmc excite`, or the condition number alone. Condition numbers
+are those of the scaled columns of the fit along one period; "std" says how many times the bound on standard deviations is
+below that of the best random motion. Last column: the condition number of the rows which the linear fit makes of such a
+motion's log, six periods at 250 Hz with the plant's position sensors, filtered and differentiated.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.motions.allowed import Allowed
 from psdmc.calibration.motions.criterion import scaled
 from psdmc.calibration.motions.excite import Excitation, ExciteOptions, excite
+from psdmc.calibration.motions.excite_options import chosen_objective
 from psdmc.calibration.motions.fit_columns import FitColumns, all_columns, inertial_columns
 from psdmc.calibration.motions.lead_in import from_rest_to_rest
 from psdmc.calibration.motions.limited_sines import LimitedSines
@@ -57,19 +59,23 @@ def drawn_conditions(model: DynamicsModel, columns: FitColumns, options: ExciteO
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=1)
-    seeds = parser.parse_args().seeds
+    parser.add_argument("--condition", action="store_true")
+    given = parser.parse_args()
+    objective = chosen_objective(given.condition, False)
     model = derive(EXAMPLES / "robots" / "denso_wall.toml", drive_inertia=True)
     robot = compile_model(model, functions=["regressor"])
     fits = {
         "one log: all columns": all_columns(robot, model.l, LinearOptions()),
         "four steps: inertial columns": inertial_columns(model.mechanism, robot, model.l),
     }
-    print("| columns | harmonics | seed | found | best of 300 | best of 1000 | times | CPU s | in the fit |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    print(
+        "| columns | harmonics | seed | found | best of 300 | best of 1000 | times | std | CPU s | in the fit |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
     for what, columns in fits.items():
         for harmonics in HARMONICS:
-            for seed in range(1, seeds + 1):
-                options = ExciteOptions(harmonics=harmonics, seed=seed)
+            for seed in range(1, given.seeds + 1):
+                options = ExciteOptions(harmonics=harmonics, seed=seed, objective=objective)
                 begin = time.process_time()
                 found = excite(model.mechanism, columns, options)
                 spent = time.process_time() - begin
@@ -77,7 +83,8 @@ def main() -> None:
                 rows = f"{in_the_fit(model, robot, found):.2f}" if columns.terms is not None else ""
                 print(
                     f"| {what} | {len(harmonics)} | {seed} | {found.condition:.2f} | {few:.1f} |"
-                    f" {found.random_conditions[0]:.1f} | {found.gain:.2f} | {spent:.0f} | {rows} |",
+                    f" {found.random_conditions[0]:.1f} | {found.gain:.2f} | {found.deviation_gain:.2f} |"
+                    f" {spent:.0f} | {rows} |",
                     flush=True,
                 )
 

@@ -135,6 +135,7 @@ def excitation_json(found: Excitation) -> dict[str, Any]:
         "condition": found.condition,
         "best_random_condition": _finite(found.random_conditions[0]),
         "median_random_condition": _finite(np.median(found.random_conditions)),
+        "deviation_times_below_random": _finite(found.deviation_gain),
         "random_trajectories": len(found.random_conditions),
         "evaluations": found.evaluations,
         "ended_by_clock": found.ended_by_clock,

@@ -64,8 +64,8 @@ def _found(plan: Plan) -> str:
     if not math.isfinite(found.gain):
         return f"{start}; none of {len(found.random_conditions)} random motions keeps the torque limits"
     best, count = found.random_conditions[0], len(found.random_conditions)
-    if plan.is_cleared:
-        return (
-            f"{start}; {best:.3g} is the best of {count} random motions, which were not asked to hit nothing"
-        )
-    return f"{start}, {found.gain:.2f} times below {best:.3g}, the best of {count} random motions"
+    of_random = "" if not plan.is_cleared else ", which were not asked to hit nothing"
+    return (
+        f"{start}, {best:.3g} for the best of {count} random motions{of_random}; its bound on standard deviations is"
+        f" {found.deviation_gain:.2f} times below that of the best of these"
+    )

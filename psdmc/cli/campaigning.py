@@ -13,6 +13,7 @@ from psdmc.calibration.motions.excite_options import (
     MOST_HARMONICS,
     SMALLEST_MARGIN,
     ExciteOptions,
+    chosen_objective,
 )
 from psdmc.cli import interrupt
 from psdmc.cli.joint_values import acceleration_limits, joint_numbers, joint_ranges, load_numbers
@@ -84,8 +85,11 @@ def excite(
     seconds: Annotated[
         float, typer.Option(min=1.0, help="s, longest search; it ends by its count where that is sooner")
     ] = ExciteOptions().seconds,
+    condition: Annotated[
+        bool, typer.Option("--condition", help="smallest condition number alone, however slow the motion")
+    ] = False,
     log_det: Annotated[
-        bool, typer.Option("--log-det", help="maximise log det instead of the condition")
+        bool, typer.Option("--log-det", help="largest log det instead of the smallest standard deviations")
     ] = False,
     seed: Annotated[int, typer.Option(min=1, help="of the search")] = 1,
     force: Annotated[
@@ -111,7 +115,7 @@ def excite(
     search = ExciteOptions(
         duration=duration,
         harmonics=tuple(range(1, harmonics + 1)),
-        objective="log_det" if log_det else "condition",
+        objective=chosen_objective(condition, log_det),
         margin=margin,
         torque_margin=torque_margin,
         seconds=seconds,

@@ -56,7 +56,8 @@ def run_demo(
     planned = plan_campaign(model, robot, WHOLE)
     runs, found = planned.runs, planned.found
     step(
-        f"condition {found.condition:.2f}, best random one {found.random_conditions[0]:.2f}: {found.gain:.2f} times"
+        f"condition {found.condition:.2f}, best random one {found.random_conditions[0]:.2f}: {found.gain:.2f} times; "
+        f"bound on standard deviations {found.deviation_gain:.2f} times below"
     )
     results: dict[str, Comparison] = {}
     for name, ideal, harness in VARIANTS:

@@ -76,7 +76,7 @@ VALUES: dict[str, tuple[str, ...]] = {
 """Never a place outside the folder that the target makes; --seconds, --workers and --rounds stay small."""
 
 FLAGS = ("--debug", "--version", "--help", "--no-expand", "--expand", "--terms", "--cost", "--force", "--counts",
-         "--log-det", "--ideal", "--harness", "--physical",
+         "--log-det", "--condition", "--ideal", "--harness", "--physical",
          "--floating", "--payload", "--edited", "--keep", "--describe", "--", "-o", "-h", "-x")  # fmt: skip
 SLOW = ("--seconds", "--workers", "--rounds")
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.motions.excite_options import Objective
 
 SMALLEST_EIGENVALUE = 1e-14
 """Of a Gram matrix of unit columns: rounding is as large."""
@@ -32,9 +33,23 @@ class Scaled:
         return float(np.sqrt(self.values[-1] / self.values[0]))
 
     @property
+    def deviation(self) -> float:
+        """A bound on the parameters' standard deviations where each row's error is one, as a geometric mean over them: the
+        condition number over the columns' lengths.
+
+        Parameter j has the standard deviation sqrt((C^-1)_jj) / L_j, C the matrix and L_j its column's length; the first
+        factor is at most the condition number, as the largest eigenvalue of a matrix with a unit diagonal is at least one.
+        """
+        return self.condition / float(np.exp(np.mean(np.log(self.lengths))))
+
+    @property
     def log_det(self) -> float:
         """Minus the log determinant of the columns' own Gram matrix."""
         return -float(np.sum(np.log(self.values)) + 2.0 * np.sum(np.log(self.lengths)))
+
+    def score(self, objective: Objective) -> float:
+        """What the objective minimises."""
+        return {"deviation": self.deviation, "condition": self.condition, "log_det": self.log_det}[objective]
 
 
 def scaled(columns: Array) -> Scaled:
@@ -45,6 +60,17 @@ def scaled(columns: Array) -> Scaled:
     matrix = gram / np.outer(lengths, lengths)
     values, vectors = np.linalg.eigh(matrix)
     return Scaled(matrix, lengths, np.maximum(values, SMALLEST_EIGENVALUE), vectors)
+
+
+def smooth_score(of: Scaled, objective: Objective, power: float) -> tuple[float, Array]:
+    """The objective's smooth form, logarithmic, and its derivatives by the unscaled Gram matrix (m, m)."""
+    if objective == "log_det":
+        return negative_log_det(of)
+    value, by_gram = smooth_condition(of, power)
+    if objective == "condition":
+        return value, by_gram
+    share = 1.0 / len(of.lengths)
+    return value - share * float(np.log(of.lengths).sum()), by_gram - np.diag(0.5 * share / of.lengths**2)
 
 
 def smooth_condition(of: Scaled, power: float) -> tuple[float, Array]:

@@ -1,4 +1,4 @@
-"""Exciting trajectories: sums of sines per joint (22), optimised for the condition of the fit's columns (23), within
+"""Exciting trajectories: sums of sines per joint (22), optimised for the fit's columns (23), within
 limits that every candidate keeps."""
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ class Excitation:
     condition         of the scaled columns along it
     random_conditions (random,) of random motions within the same limits, ascending; infinite where a motion asks too
                       much torque at any amplitude
-    history           (k, 2) evaluations and best score so far: the condition, or minus the log determinant
+    history           (k, 2) evaluations and best score so far: the objective
     ended_by_clock    whether the clock ended the search: another machine, or another day, finds another motion
+    deviation         bound on standard deviations along it (criterion.Scaled);  random_deviation of the best random motion
     """
 
     motion: SineSum
@@ -51,11 +52,18 @@ class Excitation:
     evaluations: int
     seconds: float
     ended_by_clock: bool = False
+    deviation: float = np.nan
+    random_deviation: float = np.inf
 
     @property
     def gain(self) -> float:
         """Best condition of the random motions over the one reached."""
         return float(self.random_conditions[0] / self.condition)
+
+    @property
+    def deviation_gain(self) -> float:
+        """Best bound on standard deviations of the random motions over the one reached."""
+        return self.random_deviation / self.deviation
 
 
 def excite(
@@ -82,7 +90,8 @@ def excite(
     torques_alone = Allowed(chain, allowed.torques, allowed.torque_margin)
     random = [_within(space.motion(point), space, columns, torques_alone) for point in drawn]
     conditions = np.array([np.inf if seen is None else seen[1].condition for seen in random])
-    scores = [np.inf if seen is None else _score(seen[1], options) for seen in random]
+    deviations = [np.inf if seen is None else seen[1].deviation for seen in random]
+    scores = [np.inf if seen is None else seen[1].score(options.objective) for seen in random]
     starts = drawn[np.argsort(scores, kind="stable")]
     criterion = Criterion(space, columns, options, allowed.torques)
     is_free = None if allowed.clearance is None else _free(space, allowed)
@@ -95,7 +104,8 @@ def excite(
         _within(space.motion(point), space, columns, allowed) for point in (*found.points, *starts[:1])
     ]
     usable = [
-        (_score(seen, options), k, motion, seen) for k, (motion, seen) in enumerate(filter(None, reached))
+        (seen.score(options.objective), k, motion, seen)
+        for k, (motion, seen) in enumerate(filter(None, reached))
     ]
     if not usable:
         raise InputError(
@@ -111,6 +121,8 @@ def excite(
         found.evaluations,
         time.monotonic() - begin,
         found.ended_by_clock,
+        seen.deviation,
+        min(deviations),
     )
 
 
@@ -137,10 +149,6 @@ def require_limits(joints: Sequence[Joint]) -> None:
 def _all_of(model: Regressor, n: int) -> FitColumns:
     still = np.zeros((1, n))
     return FitColumns(model, np.eye(model.regressor(still, still, still).shape[-1]))
-
-
-def _score(seen: Scaled, options: ExciteOptions) -> float:
-    return seen.log_det if options.objective == "log_det" else seen.condition
 
 
 def _seen(motion: SineSum, space: LimitedSines, columns: FitColumns) -> Scaled:

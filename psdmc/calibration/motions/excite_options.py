@@ -19,7 +19,14 @@ SMALLEST_MARGIN, LARGEST_MARGIN = 0.05, 0.99
 LARGEST_EVALUATIONS = 10_000_000
 FEWEST_SAMPLES, MOST_SAMPLES = 10, 100_000
 
-Objective = Literal["condition", "log_det"]
+Objective = Literal["deviation", "condition", "log_det"]
+
+
+def chosen_objective(condition: bool, log_det: bool) -> Objective:
+    """By the flags --condition and --log-det, of which one at most may be given (InputError)."""
+    if condition and log_det:
+        raise InputError("--condition and --log-det are two objectives", "give one of them, or neither")
+    return "condition" if condition else "log_det" if log_det else "deviation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +36,8 @@ class ExciteOptions:
     duration       s, the period of the motion
     harmonics      multiples of 1/duration that each joint's sines have
     samples        times per period at which the columns are stacked
-    objective      condition: smallest condition number of the scaled columns; log_det: largest log determinant
+    objective      deviation: smallest condition number of the scaled columns over their mean length, a bound on standard
+                   deviations; condition: smallest condition number, whatever the lengths; log_det: largest log determinant
     margin         share of the limits of position, speed and acceleration that is used
     torque_margin  share of the torque limits; friction that the model does not know and the controller need the rest
     seconds        s, wall-clock limit of the search
@@ -41,7 +49,7 @@ class ExciteOptions:
     duration: float = 10.0
     harmonics: tuple[int, ...] = (1, 2, 3, 4, 5)
     samples: int = 100
-    objective: Objective = "condition"
+    objective: Objective = "deviation"
     margin: float = 0.98
     torque_margin: float = 0.8
     seconds: float = 600.0

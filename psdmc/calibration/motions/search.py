@@ -1,6 +1,6 @@
 """The search for an exciting motion: quasi-Newton descents from the best of many random motions.
 
-The condition number has corners where its smallest eigenvalue is double. A descent therefore goes from a mean over all
+A condition number has corners where its smallest eigenvalue is double. A descent therefore goes from a mean over all
 directions to the worst one in steps.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.motions.criterion import negative_log_det, scaled, smooth_condition
+from psdmc.calibration.motions.criterion import scaled, smooth_score
 from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.fit_columns import FitColumns
 from psdmc.calibration.motions.limited_sines import LimitedSines
@@ -42,7 +42,7 @@ class OutOfTime(Exception):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """Best points of each descent, best first; evaluations, and (k, 2) of these and the best condition so far."""
+    """Best points of each descent, best first; evaluations, and (k, 2) of these and the best score so far."""
 
     points: tuple[Array, ...]
     evaluations: int
@@ -51,7 +51,7 @@ class Found:
 
 
 class Criterion:
-    """What is minimised at a point of the space: the condition number or the log determinant, and excess of torque."""
+    """What is minimised at a point of the space: the options' objective, and excess of torque."""
 
     def __init__(
         self, space: LimitedSines, columns: FitColumns, options: ExciteOptions, torques: TorqueLimits | None
@@ -59,9 +59,9 @@ class Criterion:
         self.space, self.columns, self.options, self.torques = space, columns, options, torques
 
     def score(self, point: Array) -> float:
-        """The condition number, or minus the log determinant."""
+        """The objective."""
         found = scaled(self.columns.at(*(part.T for part in self.space.placed(point).states)))
-        return found.log_det if self.options.objective == "log_det" else found.condition
+        return found.score(self.options.objective)
 
     def smooth(self, point: Array, power: float) -> tuple[float, Array, float]:
         """The smooth criterion with excess of torque, its derivatives, and the score."""
@@ -70,8 +70,7 @@ class Criterion:
         regressor = self.columns.model.regressor(q, qd, qdd)
         columns = self.columns.of(regressor, qd)
         seen = scaled(columns)
-        by_log_det = self.options.objective == "log_det"
-        value, by_gram = negative_log_det(seen) if by_log_det else smooth_condition(seen, power)
+        value, by_gram = smooth_score(seen, self.options.objective, power)
         weights = (2.0 * columns.reshape(-1, columns.shape[-1]) @ by_gram).reshape(columns.shape)
         on_regressor, on_speed = None, None
         if self.torques is not None:
@@ -80,7 +79,7 @@ class Criterion:
         by_states = self.columns.slopes(at.states, weights, on_regressor)
         if on_speed is not None:
             by_states[1] += TORQUE_COST * on_speed.T
-        return value, self.space.slope(at, by_states), seen.log_det if by_log_det else seen.condition
+        return value, self.space.slope(at, by_states), seen.score(self.options.objective)
 
 
 def search(
