@@ -20,6 +20,7 @@ from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.fit_columns import FitColumns
 from psdmc.calibration.motions.limited_sines import LimitedSines
 from psdmc.calibration.motions.torque_limits import TorqueLimits
+from psdmc.calibration.motions.walk import walked
 
 POWERS = (1.0, 3.0, 10.0, 30.0)
 """Of the means of eigenvalues that stand for the extreme ones, descent after descent."""
@@ -29,6 +30,9 @@ TORQUE_COST = 1e4
 """Of the mean square excess of torque; 1 % of excess in each sample costs as much as a condition number e times larger."""
 WALL = 0.5
 """By how much a motion that hits something counts as worse than the best: the line search then comes back by about half."""
+STEPS_PER_EVALUATION = 5
+"""Of the walk, for each evaluation with derivatives that descents left over when they came to something in the way: one
+takes ten times as long."""
 REMEMBERED = 20
 """Steps that L-BFGS keeps."""
 
@@ -63,6 +67,16 @@ class Criterion:
         found = scaled(self.columns.at(*(part.T for part in self.space.placed(point).states)))
         return found.score(self.options.objective)
 
+    def cost(self, point: Array) -> float:
+        """The smooth criterion of the last descent with excess of torque, without derivatives."""
+        q, qd, qdd = (np.ascontiguousarray(part.T) for part in self.space.placed(point).states)
+        regressor = self.columns.model.regressor(q, qd, qdd)
+        seen = scaled(self.columns.of(regressor, qd))
+        value, _ = smooth_score(seen, self.options.objective, POWERS[-1])
+        if self.torques is None:
+            return value
+        return value + TORQUE_COST * self.torques.excess(regressor, qd, self.options.torque_margin)[0]
+
     def smooth(self, point: Array, power: float) -> tuple[float, Array, float]:
         """The smooth criterion with excess of torque, its derivatives, and the score."""
         at = self.space.placed(point)
@@ -90,7 +104,8 @@ def search(
 ) -> Found:
     """Descents from the first of the starts (k, size), best first; as many as the options' evaluations allow.
 
-    is_free   whether the motion at a point meets nothing; descents keep to such points
+    is_free   whether the motion at a point meets nothing; descents keep to such points, and where they end early, as
+              the slope leads into what is in the way, a walk by random steps goes on
     """
     options = criterion.options
     begin, budget = time.monotonic(), options.evaluations
@@ -110,6 +125,11 @@ def search(
         best.append((criterion.score(point), point))
         if counted.is_late:
             break
+    if is_free is not None and not counted.is_late:
+        nearest = min(best, key=lambda each: each[0])[1]
+        steps = STEPS_PER_EVALUATION * max(budget - counted.count, 0)
+        point = walked(criterion.cost, nearest, is_free, steps, np.random.default_rng(options.seed))
+        best.append((criterion.score(point), point))
     order = sorted(range(len(best)), key=lambda k: best[k][0])
     history = np.array(counted.history).reshape(-1, 2)
     return Found(tuple(best[k][1] for k in order), counted.count, history, counted.is_late)

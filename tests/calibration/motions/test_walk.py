@@ -1,0 +1,62 @@
+"""The walk along what is in the way: to a known optimum on a boundary, and better motions of an arm in a narrow place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arms import urdf
+
+from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.motions import search
+from psdmc.calibration.motions.excite import ExciteOptions, excite
+from psdmc.calibration.motions.fit_columns import all_columns
+from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.looked_at import allowed_of
+from psdmc.calibration.motions.walk import walked
+from psdmc.compiler import derive
+
+
+def test_it_goes_along_a_wall_to_the_nearest_point_of_it():
+    """The distance from (3, 2, 0, 0) outside the unit ball, of points inside: least at that point over its length. A
+    descent by slopes ends where it meets the sphere."""
+    target = np.array([3.0, 2.0, 0.0, 0.0])
+    asked = []
+
+    def is_free(point: np.ndarray) -> bool:
+        asked.append(point)
+        return bool(np.linalg.norm(point) <= 1.0)
+
+    found = walked(
+        lambda point: float(np.linalg.norm(point - target)),
+        np.array([0.0, 0.0, 0.9, 0.0]),
+        is_free,
+        2000,
+        np.random.default_rng(1),
+    )
+
+    assert found == pytest.approx(target / np.sqrt(13.0), abs=0.05)
+    assert np.linalg.norm(found) <= 1.0
+    assert len(asked) < 1500, "what is worse is not asked for"
+
+
+def test_a_motion_between_shapes_gets_better_by_it(tmp_path: Path, monkeypatch):
+    """A crane above a floor: its descents end after a few evaluations, as slopes lead into the foot."""
+    file = tmp_path / "crane.urdf"
+    file.write_text(urdf(), encoding="utf-8")
+    model = derive(file)
+    regressor = ChainRegressor(model)
+    chain = bounded(model.mechanism, GivenLimits(acceleration=12.0))
+    allowed = allowed_of(model, chain, regressor, 0.8, (), 0.2)
+    columns = all_columns(regressor, model.l, LinearOptions())
+    options = ExciteOptions(duration=5.0, samples=50, evaluations=400, random=50)
+
+    first, again = (excite(chain, columns, options, None, allowed) for _ in range(2))
+    monkeypatch.setattr(search, "STEPS_PER_EVALUATION", 0)
+    without = excite(chain, columns, options, None, allowed)
+
+    assert first.deviation < 0.95 * without.deviation
+    assert np.array_equal(first.motion.sine, again.motion.sine)
+    assert allowed.faults(first.motion.sampled(model.joint_names, 0.01)) == []
