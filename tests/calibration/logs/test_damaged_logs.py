@@ -278,8 +278,9 @@ def test_what_is_expected_is_said_in_names_that_exist():
     with pytest.raises(InputError) as raised:
         log_from_columns("run", columns)
 
-    assert (
-        raised.value.hint == "expected current_a.<joint>, motor_torque_nm.<joint> or joint_torque_nm.<joint>"
+    assert raised.value.hint == (
+        "expected current_a.<joint>, motor_torque_nm.<joint> or joint_torque_nm.<joint>; "
+        "psdmc calibrate --describe MODEL.npz LOG drafts a description of columns by other names"
     )
 
 
