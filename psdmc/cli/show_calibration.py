@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from psdmc.calibration.verdict.joined_units import joined_units
 from psdmc.cli.one_line import one_line
 from psdmc.cli.tables import Table, print_table
+from psdmc.model.joined_units import joined_units
 
 MOST_LOGS = 8
 """Logs that are listed; a campaign has thirty."""

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.verdict.joined_units import joined_units
 from psdmc.calibration.verdict.record import Calibration, NumberRow
 from psdmc.calibration.verdict.verdict import Verdict
+from psdmc.model.joined_units import joined_units
 
 NOTHING = "–"
 """A cell without a number."""

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.plant.virtual_robot import VirtualRobot
-from psdmc.calibration.verdict.joined_units import joined_units
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.joined_units import joined_units
 from psdmc.report import published_denso as published
 from psdmc.report.calibrate_tables import NOTHING, joint_number, number, r_squared, table
 
