@@ -1,5 +1,6 @@
 # What both loops by hand need; sourced, not run. Sets `made`, the folder for everything written.
 set -eu
+command -v psdmc > /dev/null || { echo "error: psdmc is not on PATH"; echo "hint: PATH=.venv/bin:\$PATH sh $0"; exit 2; }
 made=generated/by_hand
 mkdir -p "$made"
 

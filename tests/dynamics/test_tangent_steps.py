@@ -49,6 +49,8 @@ def exact(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         for k in range(1, 160):
             start, way = start + term, way + term / k
             term = -(term * ad) / k
+            if mpmath.mnorm(term, 1) < mpmath.eps:
+                break
         return np.array(start.tolist(), float), np.array(way.tolist(), float)
 
 
