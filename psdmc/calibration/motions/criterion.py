@@ -49,7 +49,13 @@ class Scaled:
 
     def score(self, objective: Objective) -> float:
         """What the objective minimises."""
-        return {"deviation": self.deviation, "condition": self.condition, "log_det": self.log_det}[objective]
+        match objective:
+            case "deviation":
+                return self.deviation
+            case "condition":
+                return self.condition
+            case "log_det":
+                return self.log_det
 
 
 def scaled(columns: Array) -> Scaled:

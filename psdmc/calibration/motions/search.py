@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,8 +127,8 @@ def search(
             break
     if is_free is not None and not counted.is_late:
         nearest = min(best, key=lambda each: each[0])[1]
-        steps = STEPS_PER_EVALUATION * max(budget - counted.count, 0)
-        point = walked(criterion.cost, nearest, is_free, steps, np.random.default_rng(options.seed))
+        rng = np.random.default_rng(options.seed)
+        point = walked(criterion.cost, nearest, is_free, counted.steps_left(), rng)
         best.append((criterion.score(point), point))
     order = sorted(range(len(best)), key=lambda k: best[k][0])
     history = np.array(counted.history).reshape(-1, 2)
@@ -182,6 +182,17 @@ class _Counted:
         if score < self.best_score:
             self.best_score = score
             self.history.append((float(self.count), score))
-        if self.progress is not None:
-            self.progress(self.count / self.budget, time.monotonic() - self.started, self.best_score)
+        self._tell(self.count)
         return value, slope
+
+    def steps_left(self) -> Iterator[int]:
+        """Steps of the walk, until its evaluations or the time are over."""
+        for step in range(STEPS_PER_EVALUATION * max(self.budget - self.count, 0)):
+            if self.is_late:
+                return
+            self._tell(self.count + step / STEPS_PER_EVALUATION)
+            yield step
+
+    def _tell(self, evaluations: float) -> None:
+        if self.progress is not None:
+            self.progress(evaluations / self.budget, time.monotonic() - self.started, self.best_score)

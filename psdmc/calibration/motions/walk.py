@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -21,12 +21,12 @@ def walked(
     cost: Callable[[Array], float],
     point: Array,
     is_free: Callable[[Array], bool],
-    steps: int,
+    steps: Iterable[object],
     rng: np.random.Generator,
 ) -> Array:
-    """The cheapest point found, one of those that are free; `point` is."""
+    """The cheapest point found in as many steps, one of those that are free; `point` is."""
     lowest, step = cost(point), FIRST_STEP
-    for _ in range(steps):
+    for _ in steps:
         tried = point + step * rng.standard_normal(len(point))
         value = cost(tried)
         # whether it is free takes longer to find out, and is asked of what is better alone

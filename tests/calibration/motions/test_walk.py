@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -33,13 +35,48 @@ def test_it_goes_along_a_wall_to_the_nearest_point_of_it():
         lambda point: float(np.linalg.norm(point - target)),
         np.array([0.0, 0.0, 0.9, 0.0]),
         is_free,
-        2000,
+        range(2000),
         np.random.default_rng(1),
     )
 
     assert found == pytest.approx(target / np.sqrt(13.0), abs=0.05)
     assert np.linalg.norm(found) <= 1.0
     assert len(asked) < 1500, "what is worse is not asked for"
+
+
+class Bowl:
+    """The square of the distance from the origin; `cost`, without derivatives, takes a second of a clock."""
+
+    options = ExciteOptions(evaluations=400, seconds=20.0)
+
+    def __init__(self) -> None:
+        self.now, self.told = 0.0, []
+
+    def score(self, point: np.ndarray) -> float:
+        return float(point @ point)
+
+    def smooth(self, point: np.ndarray, power: float) -> tuple[float, np.ndarray, float]:
+        return self.score(point), 2.0 * point, self.score(point)
+
+    def cost(self, point: np.ndarray) -> float:
+        self.now += 1.0
+        return self.score(point)
+
+    def progress(self, share: float, seconds: float, best: float) -> None:
+        self.told.append((share, seconds))
+
+
+def test_it_ends_by_the_clock_and_tells_how_far_it_is(monkeypatch):
+    """`--seconds` is the longest search, the walk included."""
+    bowl = Bowl()
+    monkeypatch.setattr(search, "time", SimpleNamespace(monotonic=lambda: bowl.now))
+
+    found = search.search(bowl, np.ones((1, 3)), lambda point: True, bowl.progress)
+
+    assert found.ended_by_clock
+    assert 20.0 < bowl.now < 23.0
+    assert bowl.told[-1][1] == pytest.approx(20.0, abs=1.5)
+    assert all(earlier <= later for (earlier, _), (later, _) in pairwise(bowl.told))
 
 
 def test_a_motion_between_shapes_gets_better_by_it(tmp_path: Path, monkeypatch):
