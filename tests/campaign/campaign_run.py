@@ -22,9 +22,11 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from campaign_draw import FIRST_TREE, described, robot_of
-from campaign_journal import Outcome, append, read, report, summary
-from campaign_measure import failures, limit_of, measured
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+
+from campaign_draw import FIRST_TREE, described, robot_of  # noqa: E402
+from campaign_journal import Outcome, append, read, report, summary  # noqa: E402
+from campaign_measure import failures, limit_of, measured  # noqa: E402
 
 ROBOTS, TREES, STATES, LOWERED_EVERY = 10_000, 1_000, 1_000, 50
 
