@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import partial
+from typing import TypeVar
 from unittest import mock
 
 import numpy as np
@@ -14,12 +15,16 @@ from unoptimised import without_optimisation
 from psdmc.compiler import compile
 from psdmc.functions import RECIPES
 from psdmc.lower import kernels, search
-from psdmc.lower.kernels import lower
+from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import Signature, Sizes
+from psdmc.target.costs import Costs
 
 Array = np.ndarray
+Made = TypeVar("Made")
+
+_LOWERED = kernels._Lowered
 
 BUDGET = 6
 """Programs that the search for cheap arrangements may trace: whichever it takes must be right."""
@@ -51,10 +56,45 @@ def lowered_errors(model: DynamicsModel, reference: Reference, turn: int) -> Ite
     if second[0] == "expanded" and not _is_small(model):
         second = (*ALWAYS[:2], "freestanding")
     built = nullcontext() if turn // len(IN_TURN) % OPTIMISED_EVERY == 0 else without_optimisation()
-    with mock.patch.object(kernels, "Search", partial(search.Search, budget=BUDGET)), built:
+    with mock.patch.object(kernels, "Search", partial(search.Search, budget=BUDGET)), _lowered_once(), built:
         yield from _interpreted(model, reference)
         yield from _compiled(model, reference, ALWAYS, FUNCTIONS)
         yield from _compiled(model, reference, second, SOLVED)
+
+
+@contextmanager
+def _lowered_once() -> Iterator[None]:
+    """Lowerings inside share what they find of a model: searches, traces, and what passes made of them. Each by itself would
+    do it anew, three times a robot."""
+    first: dict[int, kernels._Lowered] = {}
+
+    def lowered(model: DynamicsModel, lowering: Lowering, costs: Costs) -> kernels._Lowered:
+        one = _LOWERED(model, lowering, costs)
+        known = first.setdefault(id(model), one)
+        if known.costs == costs:
+            for part in ("geometry", "_searches", "_arrangements", "_traced"):
+                setattr(one, part, getattr(known, part))
+        return one
+
+    with (
+        mock.patch.object(kernels, "_Lowered", lowered),
+        mock.patch.object(kernels, "lower_expanded", _once(kernels.lower_expanded)),
+        mock.patch.object(kernels, "_kernel", _once(kernels._kernel)),
+    ):
+        yield
+
+
+def _once(function: Callable[..., Made]) -> Callable[..., Made]:
+    """The function, called once with the same objects."""
+    made: dict[tuple[int, ...], tuple[tuple[object, ...], Made]] = {}
+
+    def remembered(*arguments: object) -> Made:
+        key = tuple(map(id, arguments))
+        if key not in made:
+            made[key] = arguments, function(*arguments)
+        return made[key][1]
+
+    return remembered
 
 
 def _is_small(model: DynamicsModel) -> bool:
