@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from psdmc.emit.kernel_view import FunctionView, KernelView
+from psdmc.emit.function_view import FunctionView
+from psdmc.emit.kernel_view import KernelView
 from psdmc.emit.prototypes import Prototype
 
 

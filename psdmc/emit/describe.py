@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
+from psdmc.emit.function_view import FunctionView
 from psdmc.emit.info import JointInfo, PackageInfo
-from psdmc.emit.kernel_view import FunctionView
 from psdmc.emit.options import EmitOptions
 from psdmc.program.signature import Signature
 from psdmc.target.native import NATIVE

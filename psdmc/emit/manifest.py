@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from psdmc.emit.describe import option_items
+from psdmc.emit.function_view import FunctionView
 from psdmc.emit.info import JointInfo, PackageInfo
-from psdmc.emit.kernel_view import FunctionView
 from psdmc.emit.options import EmitOptions
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target

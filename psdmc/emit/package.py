@@ -10,8 +10,9 @@ from psdmc.emit.adapters import chosen
 from psdmc.emit.cpp import CppClass, cpp_classes
 from psdmc.emit.describe import description, uses_frames
 from psdmc.emit.friction import FrictionView
+from psdmc.emit.function_view import FunctionView, function_views
 from psdmc.emit.info import PackageInfo
-from psdmc.emit.kernel_view import FunctionView, KernelView, function_views
+from psdmc.emit.kernel_view import KernelView
 from psdmc.emit.lanes import VectorWidth, vector_widths
 from psdmc.emit.limbs import LimbVector, limb_units, limb_vectors
 from psdmc.emit.names import identifier

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from psdmc.emit.adapters import ADAPTERS
-from psdmc.emit.kernel_view import FunctionView
+from psdmc.emit.function_view import FunctionView
 from psdmc.emit.manifest import manifest
 from psdmc.emit.package import PackageView
 from psdmc.emit.render import render

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from psdmc.emit.kernel_view import FunctionView
+from psdmc.emit.function_view import FunctionView
 from psdmc.emit.tables import Table
 
 
