@@ -13,8 +13,6 @@ from psdmc.emit.friction import FrictionView
 from psdmc.emit.function_view import FunctionView, function_views
 from psdmc.emit.info import PackageInfo
 from psdmc.emit.kernel_view import KernelView
-from psdmc.emit.lanes import VectorWidth, vector_widths
-from psdmc.emit.limbs import LimbVector, limb_units, limb_vectors
 from psdmc.emit.names import identifier
 from psdmc.emit.options import CReal, EmitOptions
 from psdmc.emit.patterns import Pattern, patterns
@@ -27,20 +25,12 @@ from psdmc.emit.references import ReferenceView, reference_view
 from psdmc.emit.self_test import given_vectors, labels
 from psdmc.emit.self_test_view import SelfTestView
 from psdmc.emit.tables import Table, tables
-from psdmc.emit.trig import (
-    ScalarTrig,
-    TrigPreamble,
-    VectorTrig,
-    scalar_trig,
-    trig_preamble,
-    vector_trig,
-)
+from psdmc.emit.vectors_view import VectorsView
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.program.kernel import Kernel
 from psdmc.target.flags import ARITHMETIC, GCC_ONLY
 from psdmc.target.target import Target
-from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES
 
 ON_MANIFOLD = tuple(name for name, recipe in RECIPES.items() if recipe.default_where_wide)
 """Functions that lead from one q to another."""
@@ -101,11 +91,6 @@ class PackageView:
         return self.options.target
 
     @property
-    def block_bytes(self) -> int:
-        """Bytes of one variable in a block of lanes."""
-        return LANE_BLOCK_BYTES
-
-    @property
     def arithmetic_flags(self) -> str:
         """Compiler flags that suit the C on every machine."""
         return " ".join(ARITHMETIC)
@@ -121,40 +106,9 @@ class PackageView:
         return "" if self.real == "double" else "f"
 
     @property
-    def trig_preamble(self) -> TrigPreamble:
-        return trig_preamble(self.robot, self.real, self.options.far)
-
-    @property
-    def trig_vectors(self) -> tuple[VectorTrig, ...]:
-        """The inline sincos for each vector width that vectors.h may choose, for lanes or for one state's angles."""
-        units = dict.fromkeys(width.unit for width in self.widths)
-        units |= dict.fromkeys(width.angles.unit for width in self.widths)
-        units |= dict.fromkeys(limb_units(self.limb_vectors, self.options))
-        return tuple(vector_trig(self.robot, self.real, unit, self.options.far) for unit in units)
-
-    @property
-    def limb_vectors(self) -> tuple[LimbVector, ...]:
-        """Vectors with one real per limb."""
-        return limb_vectors([count for function in self.functions for count in function.limbs], self.options)
-
-    @property
-    def sincos_types(self) -> tuple[tuple[str, str], ...]:
-        """Vectors whose sines are taken: the macro of their width, and the type."""
-        limbs = ((f"{vector.macro}_WIDTH", vector.name) for vector in self.limb_vectors)
-        return (("WIDTH", "lanes"), ("ANGLE_WIDTH", "angles"), *limbs)
-
-    @property
-    def widths(self) -> tuple[VectorWidth, ...]:
-        return vector_widths(self.options)
-
-    @property
-    def has_vectors(self) -> str:
-        """Preprocessor condition: the compiler has GCC's vector extension, and rounds as the sincos needs."""
-        return HAS_VECTORS if self.real == "double" else f"{HAS_VECTORS} && {FLOATS_STAY}"
-
-    @property
-    def trig_scalar(self) -> ScalarTrig:
-        return scalar_trig(self.robot, self.real, self.options.far, short=not self.widths)
+    def vectors(self) -> VectorsView:
+        counts = tuple(count for function in self.functions for count in function.limbs)
+        return VectorsView(self.robot, self.options, counts)
 
     @property
     def description(self) -> tuple[str, ...]:

@@ -64,7 +64,7 @@ def library_files(package: PackageView) -> dict[str, str]:
     if package.has_roots:
         named["src/roots.h"] = "roots.h.jinja"
     files = {path: render(template, package=package) for path, template in named.items()}
-    for vector in package.limb_vectors:
+    for vector in package.vectors.of_limbs:
         files[f"src/{vector.name}.h"] = render("limbs.h.jinja", package=package, limbs=vector)
     for function in package.functions:
         for unit in function.units:
