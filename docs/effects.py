@@ -22,8 +22,8 @@ from unittest.mock import patch
 from psdmc.bench.cases import standard_chains
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.body import body_from_parameters
+from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
-from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, joint_frame_map
 from psdmc.functions import RECIPES
@@ -32,7 +32,8 @@ from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import all_feet
 from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe
-from psdmc.lower.search import SINGLE, Search
+from psdmc.lower.scoring import SINGLE
+from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.program.differentiate import Block, jacobians

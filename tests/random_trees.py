@@ -14,8 +14,8 @@ from helical import HELICAL, PITCH
 from random_chains import _body, _rotation, _tidy
 
 from psdmc.dynamics.body import Body, body_from_parameters
+from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.frames import BASE, Frame, frame_at
-from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.parameters import moved
 from psdmc.dynamics.slices import first_rates
 from psdmc.robot.joints import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TRANSLATION

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from psdmc.dynamics.body import Body, handed_body, in_previous, joined, shifted, turned
+from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates
 from psdmc.dynamics.frames import (
     BASE,
@@ -18,7 +19,6 @@ from psdmc.dynamics.frames import (
     joint_turn,
     to_previous,
 )
-from psdmc.dynamics.motion import PLAIN, Choices
 from psdmc.dynamics.scalar import Scalar, Vector, add, cross
 from psdmc.dynamics.slices import first_rates, positions
 from psdmc.dynamics.twist import efforts, momentum

@@ -25,11 +25,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, spun, turned
+from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
 from psdmc.dynamics.frames import BASE, Frame, Turn, about_z, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.joint_wrenches import torque_rows, wrenches_of_motions
-from psdmc.dynamics.motion import PLAIN, Choices, Forward, sweep_outward
+from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
     Composite,
     along_parent,

@@ -23,9 +23,10 @@ from psdmc.dynamics.articulated import (
     rows_of,
 )
 from psdmc.dynamics.body import Body
+from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE, Frame, from_previous, outward
-from psdmc.dynamics.motion import PLAIN, Choices, Forward, sweep_outward
+from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, seen_bodies, sweep_inward
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross
 from psdmc.dynamics.slices import first_rates, flat, rates

@@ -18,8 +18,9 @@ from psdmc.dynamics.frames import (
     outward,
     to_previous,
 )
-from psdmc.dynamics.motion import Forward, Rates, Spin, spin_of
+from psdmc.dynamics.motion import Forward
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, scale, transform, transpose
+from psdmc.dynamics.spin import Rates, Spin, spin_of
 from psdmc.dynamics.twist import combined
 
 Wrench = tuple[Vector, Vector]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from psdmc.dynamics.body import Body, in_previous, joined, shifted, spun, turned
 from psdmc.dynamics.frames import Frame, Rotation, Turn, to_previous
-from psdmc.dynamics.motion import LinkMotion, Rates, spin_of
+from psdmc.dynamics.motion import LinkMotion
 from psdmc.dynamics.newton_euler import wrench
 from psdmc.dynamics.scalar import (
     ZERO,
@@ -26,6 +26,7 @@ from psdmc.dynamics.scalar import (
     transform,
     transpose,
 )
+from psdmc.dynamics.spin import Rates, spin_of
 from psdmc.dynamics.twist import combined, own_rates
 from psdmc.robot.joints import JointType
 

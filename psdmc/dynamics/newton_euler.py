@@ -6,18 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from psdmc.dynamics.body import Body, turned
+from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import on_coordinates, summed
-from psdmc.dynamics.frames import (
-    BASE,
-    Frame,
-    Rotation,
-    Turn,
-    handed_vector,
-    inward,
-    joint_angle,
-    to_previous,
-)
-from psdmc.dynamics.motion import PLAIN, Choices, Forward, LinkMotion, sweep_outward
+from psdmc.dynamics.frames import BASE, Frame, Rotation, Turn, handed_vector, inward, joint_angle, to_previous
+from psdmc.dynamics.motion import Forward, LinkMotion, sweep_outward
 from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross, transform
 from psdmc.dynamics.slices import flat, positions, rates
 from psdmc.dynamics.twist import efforts

@@ -11,20 +11,13 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
+from psdmc.dynamics.choices import PLAIN
 from psdmc.dynamics.following import on_coordinates, sparse_rows_summed
 from psdmc.dynamics.frames import BASE, Frame, from_previous, outward
-from psdmc.dynamics.motion import PLAIN, JointState, LinkMotion, Rates, spin_of, sweep_outward
-from psdmc.dynamics.scalar import (
-    ZERO,
-    Matrix,
-    Scalar,
-    Vector,
-    add,
-    cross,
-    transform,
-    transpose,
-)
+from psdmc.dynamics.motion import JointState, LinkMotion, sweep_outward
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, transform, transpose
 from psdmc.dynamics.slices import first_rates, rates
+from psdmc.dynamics.spin import Rates, spin_of
 from psdmc.dynamics.twist import axis_twist
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
 

@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.dynamics.choices import PLAIN
 from psdmc.dynamics.frames import BASE, Frame
-from psdmc.dynamics.motion import PLAIN, LinkMotion, sweep_outward
+from psdmc.dynamics.motion import LinkMotion, sweep_outward
 from psdmc.dynamics.parameters import moving_map
 from psdmc.dynamics.regressor import Placed, unit_wrench
 from psdmc.dynamics.scalar import Scalar, Vector

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from psdmc.dynamics.body import Body
-from psdmc.dynamics.motion import PLAIN, Choices
+from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.errors import InternalError
-from psdmc.lower.carriers import bodies_from_carriers
+from psdmc.lower.link_parameters import bodies_from_carriers
 from psdmc.lower.reframe import Reframed
 from psdmc.program.cost import Cost
 from psdmc.program.passes.drop_unused import drop_unused

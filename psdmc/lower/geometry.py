@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 
-from psdmc.lower.carriers import CarrierSpace, carrier_space
+from psdmc.lower.carrier_columns import carrier_space
+from psdmc.lower.carriers import CarrierSpace
 from psdmc.lower.reframe import Foot, Reframed, reframe, unmoved
 from psdmc.robot.mechanism import Array, Mechanism
 

@@ -17,7 +17,8 @@ from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
 from psdmc.lower.limb_search import LimbSearch
 from psdmc.lower.loops import in_loops
-from psdmc.lower.search import Scoring, Search, for_lanes, for_one_state
+from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
+from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.program.pipeline import ordered, shortened

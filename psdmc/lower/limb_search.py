@@ -13,17 +13,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.frames import BASE
-from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.branches import limbs_in
+from psdmc.lower.descent import ROUNDING
 from psdmc.lower.factored import Arrangement
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limbs import TracedLimbs, cost_of_limbs, trace_limbs
 from psdmc.lower.reframe import Reframed
-from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, ROUNDING, Search, distinct, for_lanes, for_one_state
+from psdmc.lower.scoring import for_lanes, for_one_state
+from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, Search, distinct
 from psdmc.program.limb_cost import StageCost, stage_costs
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.limb_stages import staged

@@ -10,9 +10,9 @@ from itertools import accumulate, islice, product
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Scalar
 from psdmc.errors import InternalError
-from psdmc.lower.carriers import bodies_from_carriers
 from psdmc.lower.factored import Arrangement, RobotConstants, carrier_values, in_unit, traced
 from psdmc.lower.limb_frames import Place, one_limb, places
+from psdmc.lower.link_parameters import bodies_from_carriers
 from psdmc.program.lanes import Lanes
 from psdmc.program.limb_cost import StageCost, traced_stage_costs
 from psdmc.program.limb_program import LimbGroup, Spread

@@ -28,28 +28,26 @@ from psdmc.dynamics.frames import (
     what_follows,
 )
 from psdmc.dynamics.scalar import ZERO, Matrix, Vector
+from psdmc.lower.common_normals import (
+    across,
+    common_normal,
+    foot_towards,
+    nearly_parallel,
+    normal_on_side_of,
+    perpendicular,
+)
+from psdmc.lower.without_rounding import (
+    EXACT,
+    clean_direction,
+    clean_lengths,
+    constant_rotation,
+    exact_rotation,
+    without_rounding,
+)
 from psdmc.robot.mechanism import BASE, Array, Mechanism, NamedFrame, Placement
 from psdmc.robot.small import cross, length, times
 
 Foot = Literal["previous", "next"]
-
-EXACT = 1e-12
-"""Lengths (relative to the chain's reach) and direction cosines below this are rounding of an exact zero."""
-
-NEARLY_PARALLEL = 2e-2
-"""Sine of the angle below which two axes are treated as parallel but for the rotation between them: their common
-normal may lie kilometres away, and torques would be differences of huge numbers."""
-
-LITTLE = 1e-2
-"""Part of a vector across an axis below which rounding has changed its direction: it is made perpendicular once more."""
-
-DECIMALS = 12
-"""A length that differs by rounding from one of so many decimals is replaced by that one, so that equal lengths stay
-equal. See ROUNDING."""
-
-ROUNDING = 1e-15
-"""What composing placements can move a length by, relative to the chain's reach. Rounded to decimals beyond this, lengths of
-centimetres would lose digits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,7 +90,7 @@ def _is_same(a: Placement, b: Placement) -> bool:
 def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
     """The robot in modified DH; `feet[i]` says which common normal's foot frame i's origin is put on."""
     placed, reach = _placed_at_zero(chain), _reach(chain)
-    axes = [_clean(place.rotation[:, 2]) for place in placed]
+    axes = [clean_direction(place.rotation[:, 2]) for place in placed]
     origins = _origins(chain, placed, axes, feet)
     before, after = _orientations(chain, placed, axes, origins)
     frames, link_frames = [], []
@@ -108,23 +106,23 @@ def reframe(chain: Mechanism, feet: Sequence[Foot]) -> Reframed:
                 joint.type,
                 parent,
                 as_matrix(rotation.tolist()),
-                as_vector(_clean_lengths(offset, reach).tolist()),
+                as_vector(clean_lengths(offset, reach).tolist()),
                 0.0 if abs(rest) < EXACT else float(rest),
                 quarters % 4,
                 what_follows(chain, i),
             )
         )
         mine = Placement(after[i], origins[i])
-        link_frames.append(_rounded(mine.inverse() @ placed[i] @ joint.link_frame, reach))
-    at_base = _clean_lengths(times(before[0].T, -chain.gravity), length(chain.gravity))
+        link_frames.append(without_rounding(mine.inverse() @ placed[i] @ joint.link_frame, reach))
+    at_base = clean_lengths(times(before[0].T, -chain.gravity), length(chain.gravity))
     end = chain.tip_body
-    tip = _rounded(_moved(after, origins, placed, chain.tip_frame), reach)
+    tip = without_rounding(_moved(after, origins, placed, chain.tip_frame), reach)
     named = tuple(
-        replace(frame, placement=_rounded(_moved(after, origins, placed, frame), reach))
+        replace(frame, placement=without_rounding(_moved(after, origins, placed, frame), reach))
         for frame in chain.frames
     )
     base_axes = as_matrix(np.where(np.abs(before[0]) < EXACT, 0.0, before[0]).tolist())
-    origin = as_vector((_clean_lengths(origins[0], reach) + 0.0).tolist())
+    origin = as_vector((clean_lengths(origins[0], reach) + 0.0).tolist())
     return Reframed(
         tuple(frames), as_vector(at_base.tolist()), tuple(link_frames), tip, base_axes, end, origin, named
     )
@@ -150,11 +148,6 @@ def _moved(
     """Where a named frame sits in the new frame of its joint."""
     k = frame.joint
     return Placement(axes[k], origins[k]).inverse() @ placed[k] @ frame.placement
-
-
-def _rounded(place: Placement, reach: float) -> Placement:
-    """A placement with the rounding of exact zeros and ones removed."""
-    return Placement(_exact(place.rotation), _clean_lengths(place.translation, reach) + 0.0)
 
 
 def _placed_at_zero(chain: Mechanism) -> list[Placement]:
@@ -190,25 +183,6 @@ def _reach(chain: Mechanism) -> float:
     return sum(length(joint.placement.translation) for joint in chain.joints) or 1.0
 
 
-def _clean(direction: Array) -> Array:
-    cleaned = np.where(np.abs(direction) < EXACT, 0.0, direction)
-    return np.asarray(cleaned / length(cleaned))
-
-
-def _clean_lengths(lengths: Array, scale: float) -> Array:
-    """Lengths without rounding: zeros made exact, decimal lengths made decimal, so that equal lengths stay equal."""
-    return _decimal(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), scale)
-
-
-def _decimal(lengths: Array, scale: float) -> Array:
-    nearest = np.round(lengths, DECIMALS)
-    return np.asarray(np.where(np.abs(nearest - lengths) <= ROUNDING * scale, nearest, lengths), np.float64)
-
-
-def _parallel(a: Array, b: Array) -> bool:
-    return float(np.linalg.norm(cross(a, b))) < NEARLY_PARALLEL
-
-
 def _origins(
     chain: Mechanism, placed: Sequence[Placement], axes: Sequence[Array], feet: Sequence[Foot]
 ) -> list[Array]:
@@ -229,25 +203,15 @@ def _origins(
             points[i] = origins[parent]
         foot = None
         if feet[i] == "next" and child is not None:
-            foot = _foot(points[i], axes[i], points[child], axes[child])
+            foot = foot_towards(points[i], axes[i], points[child], axes[child])
         if foot is None and parent != BASE and not _is_wide(chain, parent):
-            foot = _foot(points[i], axes[i], origins[parent], axes[parent])
+            foot = foot_towards(points[i], axes[i], origins[parent], axes[parent])
         if foot is None:
-            is_level = parent != BASE and (_is_wide(chain, parent) or _parallel(axes[i], axes[parent]))
+            is_level = parent != BASE and (_is_wide(chain, parent) or nearly_parallel(axes[i], axes[parent]))
             reference = origins[parent] if is_level else points[i]
             foot = points[i] + axes[i] * times(axes[i], reference - points[i])
         origins.append(foot)
     return origins
-
-
-def _foot(point: Array, axis: Array, other_point: Array, other_axis: Array) -> Array | None:
-    """Point of the line (point, axis) nearest to the other line; None where they are nearly parallel."""
-    if _parallel(axis, other_axis):
-        return None
-    normal = cross(axis, other_axis)
-    square = times(normal, normal)
-    along = times(cross(other_point - point, other_axis), normal) / square
-    return np.asarray(point + along * axis)
 
 
 def _orientations(
@@ -259,7 +223,7 @@ def _orientations(
     after: list[Array] = []
     for i, (parent, child) in enumerate(zip(chain.parents, children, strict=True)):
         if _is_wide(chain, i):
-            before.append(_exact(placed[i].rotation))
+            before.append(exact_rotation(placed[i].rotation))
             after.append(before[i])
             continue
         x_before = first
@@ -268,15 +232,15 @@ def _orientations(
         elif parent != BASE:
             x_before = after[parent][:, 0]
             if children[parent] != i:
-                x_before = _own_normal(axes[parent], axes[i], origins[i] - origins[parent], x_before)
+                x_before = normal_on_side_of(axes[parent], axes[i], origins[i] - origins[parent], x_before)
         elif i:
             x_before = min(before[0].T, key=lambda x: abs(float(times(x, axes[i]))))
         if i:
-            x_before = _across(x_before, axes[i])
+            x_before = across(x_before, axes[i])
         before.append(np.column_stack([x_before, cross(axes[i], x_before), axes[i]]))
         x_after = None
         if child is not None:
-            x_after = _normal(axes[i], axes[child], origins[child] - origins[i])
+            x_after = common_normal(axes[i], axes[child], origins[child] - origins[i])
         if x_after is None:
             x_after = x_before if _has_direction_only(chain, i) else placed[i].rotation[:, 0]
         elif times(x_after, x_before) < -EXACT:
@@ -285,78 +249,23 @@ def _orientations(
     return before, after
 
 
-def _own_normal(axis: Array, following: Array, step: Array, x: Array) -> Array:
-    """The common normal of a body's axis and a further child's, on the side of x; x where every perpendicular would do: the
-    body's own x looks along the normal to its first child."""
-    own = _normal(axis, following, step)
-    if own is None:
-        return x
-    return -own if times(own, x) < -EXACT else own
-
-
-def _across(direction: Array, axis: Array) -> Array:
-    """The part of a unit direction across an axis; the direction itself where nearly all of it is across."""
-    along = times(axis, direction)
-    return direction if abs(along) < EXACT else _clean(direction - along * axis)
-
-
-def _perpendicular(vector: Array, axis: Array) -> Array:
-    """The part of a vector across a unit axis, at right angles to it even where little is left."""
-    part = vector - axis * times(axis, vector)
-    if length(part) < LITTLE * length(vector):
-        part = part - axis * times(axis, part)
-    return np.asarray(part)
-
-
-def _normal(axis: Array, following: Array, step: Array) -> Array | None:
-    """Direction of the common normal of two axes; None where every perpendicular would do. For nearly parallel axes the
-    step from one origin to the next takes its place."""
-    normal = cross(axis, following)
-    if _parallel(axis, following):
-        normal = _perpendicular(step, axis)
-        if np.linalg.norm(normal) < EXACT:
-            return None
-    return _clean(normal / length(normal))
-
-
 def _first_x(chain: Mechanism, first: Placement, axis: Array) -> Array:
     """The x direction of the first frame. The base may be turned about the first axis: with gravity across that axis, x
     points along gravity's part across it."""
-    across = _perpendicular(chain.gravity, axis)
-    if np.linalg.norm(across) < EXACT * (1.0 + float(np.linalg.norm(chain.gravity))):
+    level = perpendicular(chain.gravity, axis)
+    if np.linalg.norm(level) < EXACT * (1.0 + float(np.linalg.norm(chain.gravity))):
         return np.asarray(first.rotation[:, 0])
-    local = times(first.rotation.T, across)
-    if np.count_nonzero(np.abs(local) > EXACT * np.linalg.norm(across)) == 1:
+    local = times(first.rotation.T, level)
+    if np.count_nonzero(np.abs(local) > EXACT * np.linalg.norm(level)) == 1:
         return np.asarray(first.rotation[:, 0])
-    return _clean(across / length(across))
+    return clean_direction(level / length(level))
 
 
 def _constant(chain: Mechanism, i: int, rotation: Array) -> Array:
     """The rotation between body i's frame and its parent's."""
     if _is_wide(chain, i) or _is_wide(chain, chain.parents[i]):
-        return _exact(rotation)
-    return _between(rotation)
-
-
-def _exact(rotation: Array) -> Array:
-    """A rotation with the rounding of exact zeros and ones removed."""
-    near = np.round(rotation)
-    return np.asarray(np.where(np.abs(rotation - near) < EXACT, near, rotation) + 0.0)
-
-
-def _between(rotation: Array) -> Array:
-    """The constant rotation between two frames: about x, except where axes are nearly parallel."""
-    turns_x = np.max(np.abs([*rotation[0, 1:], *rotation[1:, 0]])) > EXACT
-    return rotation if turns_x else _about_x(rotation)
-
-
-def _about_x(rotation: Array) -> Array:
-    """The rotation about x nearest to this one, with exact zeros and ones."""
-    c, s = float(rotation[1, 1]), float(rotation[2, 1])
-    c, s = (0.0 if abs(v) < EXACT else v for v in (c, s))
-    length = np.hypot(c, s)
-    c, s = c / length, s / length
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+        return exact_rotation(rotation)
+    return constant_rotation(rotation)
 
 
 def _angle_about_z(rotation: Array) -> float:

@@ -9,23 +9,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import product
 
 import numpy as np
 
+from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.following import any_follows
-from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.errors import InternalError
 from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy
 from psdmc.lower.branches import Branches
-from psdmc.lower.carriers import PSEUDO_NAMES, WEIGHTS, CarrierSpace, every_parameter
+from psdmc.lower.carrier_columns import every_parameter
+from psdmc.lower.carriers import CarrierSpace
+from psdmc.lower.descent import Descent
 from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
 from psdmc.lower.geometry import LARGE, Geometry
+from psdmc.lower.link_parameters import PSEUDO_NAMES, WEIGHTS
 from psdmc.lower.reframe import Foot, Reframed
-from psdmc.program.cost import Cost, cost
+from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
+from psdmc.program.cost import Cost
 from psdmc.program.program import Program
 from psdmc.program.signature import Sizes
 from psdmc.recipes.recipe import Recipe
@@ -39,43 +43,6 @@ BUDGET = 600
 LARGEST_TRANSFER = 1e4
 """Carriers whose values would be larger multiples of theta_b (lengths in the chain's unit) are not considered: torques
 would be small differences of large numbers."""
-
-
-ROUNDING = 1e-6
-"""Differences of scores below this are rounding: weights have few decimals."""
-
-
-@dataclass(frozen=True, slots=True)
-class Scoring:
-    """The score of PROGRAMs on a target. In code for one state, the angles share vector sincos calls; with one state
-    per lane each angle has its own."""
-
-    costs: Costs
-    angles_per_sincos: int
-
-    def score(self, program: Program) -> float:
-        """Weighted operations of the PROGRAM, see `weight`."""
-        return self.weight(cost(program))
-
-    def weight(self, c: Cost) -> float:
-        """Operations with the target's weights, plus trigonometry."""
-        calls, costs = math.ceil(c.sincos / self.angles_per_sincos), self.costs
-        operations = c.total - costs.fused * c.fused + costs.neg * c.neg + costs.div * c.div
-        return operations + costs.sincos * calls + costs.angle * c.sincos
-
-
-def for_one_state(costs: Costs) -> Scoring:
-    """The scoring of code for one state a call."""
-    return Scoring(costs, costs.angles_per_sincos)
-
-
-def for_lanes(costs: Costs) -> Scoring:
-    """The scoring of code for one state per lane."""
-    return Scoring(costs, 1)
-
-
-SINGLE, BATCH = for_one_state(COSTS), for_lanes(COSTS)
-"""The default target's."""
 
 CHOICES = tuple(
     Choices(compound, fold, double) for compound, fold, double in product((False, True), repeat=3)
@@ -141,7 +108,7 @@ class Search:
         accurate: Arrangement | None = None,
     ) -> Arrangement:
         """The end of the descent; from `accurate` on, if given, by candidates as accurate as LIMIT or as this one."""
-        descent = _Descent(
+        descent = Descent(
             lambda a: scoring.weight(self.cost(recipe, a)),
             self.budget,
             self._admits(accurate, recipe),
@@ -301,37 +268,3 @@ def _felt(arrangement: Arrangement, choices: Iterable[Choices]) -> Iterator[Choi
     """The choices that make a difference in an arrangement: without parallel neighbours there are no compound turns."""
     parallel = any(frame.is_parallel for frame in arrangement.reframed.frames[1:])
     return (each for each in choices if parallel or not each.compound)
-
-
-class _Descent:
-    """The cheapest arrangement so far, and the rest of the budget."""
-
-    arrangement: Arrangement
-
-    def __init__(
-        self,
-        score: Callable[[Arrangement], float],
-        budget: int,
-        is_admitted: Callable[[Arrangement], bool],
-    ) -> None:
-        self._score_of, self._left, self._score = score, budget, math.inf
-        self._is_admitted = is_admitted
-
-    def consider(
-        self, candidates: Iterator[Arrangement], expected: Callable[[Arrangement], float] | None = None
-    ) -> bool:
-        """Try candidates in order, moving to each that is cheaper. Returns whether any was.
-
-        expected  a score that costs less to find: candidates that are no cheaper by it are not tried
-        """
-        improved = False
-        for candidate in candidates:
-            if self._left == 0:
-                return False
-            self._left -= 1
-            if expected is not None and expected(candidate) > self._score + ROUNDING:
-                continue
-            score = self._score_of(candidate)
-            if score < self._score and self._is_admitted(candidate):
-                self.arrangement, self._score, improved = candidate, score, True
-        return improved

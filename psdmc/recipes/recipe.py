@@ -8,8 +8,8 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from psdmc.dynamics.body import Body
+from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.dynamics.slices import first_rates
 from psdmc.program.signature import Signature

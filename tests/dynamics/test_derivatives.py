@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 from random_trees import CHOICES, COUNT, EXACT, KINDS, TREES, RandomTree, columns, on_trees
 
+from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
-from psdmc.dynamics.motion import Choices
 
 trees = on_trees(KINDS)
 CHAINS = {"a chain of one": (-1,), "a chain of two": (-1, 0), "a chain of seven": (-1, 0, 1, 2, 3, 4, 5)}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from random_chains import Oracle, random_chain, relative_error, states
 
+from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.frames import base_acceleration, frames_of
-from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.robot.mechanism import Placement

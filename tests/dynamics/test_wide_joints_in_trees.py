@@ -8,11 +8,11 @@ import pytest
 from random_trees import COUNT, TREES, RandomTree, assert_near, columns, on_trees
 from test_derivatives import assert_blocks_near, found_in, pinocchios
 
+from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.energy import first_moment, kinetic_energy, potential_energy
 from psdmc.dynamics.kinematics import forward_kinematics, jacobian
 from psdmc.dynamics.momentum import total_momentum
-from psdmc.dynamics.motion import Choices
 from psdmc.dynamics.named_frames import frame_drifts
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor

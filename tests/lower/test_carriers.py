@@ -11,7 +11,8 @@ from random_chains import random_chain
 
 from psdmc.derivation.derive import derive_model
 from psdmc.derivation.units import in_unit, parameter_units
-from psdmc.lower.carriers import CarrierSpace, carrier_space
+from psdmc.lower.carrier_columns import carrier_space
+from psdmc.lower.carriers import CarrierSpace
 from psdmc.lower.reframe import reframe
 from psdmc.lower.tableau import Tableau
 from psdmc.robot.mechanism import Mechanism

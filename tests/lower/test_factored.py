@@ -14,11 +14,13 @@ from slow_cases import slow_but_for
 
 from psdmc.dynamics.solve import SingularMassMatrix, factorize
 from psdmc.functions import RECIPES
-from psdmc.lower.carriers import carrier_space, link_map
+from psdmc.lower.carrier_columns import carrier_space
 from psdmc.lower.factored import trace_dynamics, trace_geometry
 from psdmc.lower.geometry import all_feet
+from psdmc.lower.link_parameters import link_map
 from psdmc.lower.reframe import reframe
-from psdmc.lower.search import ALL_CHOICES, BATCH, SINGLE, Search
+from psdmc.lower.scoring import BATCH, SINGLE
+from psdmc.lower.search import ALL_CHOICES, Search
 from psdmc.lower.tableau import Tableau
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret

@@ -17,7 +17,8 @@ from psdmc.derivation.derive import derive_model
 from psdmc.errors import DerivationError
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics
-from psdmc.lower.search import SINGLE, Search
+from psdmc.lower.scoring import SINGLE
+from psdmc.lower.search import Search
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import Sizes

@@ -13,9 +13,10 @@ from psdmc.derivation.derive import derive_model
 from psdmc.errors import InternalError
 from psdmc.functions import RECIPES
 from psdmc.lower import search
-from psdmc.lower.carriers import SAMPLED_JOINTS
+from psdmc.lower.carrier_columns import SAMPLED_JOINTS
 from psdmc.lower.kernels import lower
-from psdmc.lower.search import SINGLE, Search
+from psdmc.lower.scoring import SINGLE
+from psdmc.lower.search import Search
 from psdmc.program.interpret import interpret
 from psdmc.robot.coordinates import Coordinate, own_coordinates
 

@@ -24,7 +24,8 @@ from psdmc.lower.kernels import lower
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limb_search import weight
 from psdmc.lower.limbs import cost_of_limbs, trace_limbs
-from psdmc.lower.search import Search, for_one_state
+from psdmc.lower.scoring import for_one_state
+from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
 from psdmc.program.cost import Cost

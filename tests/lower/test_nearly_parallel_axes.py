@@ -12,7 +12,7 @@ from random_chains import Oracle, relative_error, states
 
 from psdmc.derivation.derive import derive_model
 from psdmc.lower import kernels, search
-from psdmc.lower.carriers import carrier_space
+from psdmc.lower.carrier_columns import carrier_space
 from psdmc.lower.kernels import lower
 from psdmc.lower.reframe import reframe
 from psdmc.program.interpret import interpret

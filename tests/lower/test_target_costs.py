@@ -10,7 +10,7 @@ import pytest
 from bundled import bundled_model
 
 from psdmc.lower.kernels import lower
-from psdmc.lower.search import for_one_state
+from psdmc.lower.scoring import for_one_state
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel

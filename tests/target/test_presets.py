@@ -7,7 +7,7 @@ from dataclasses import FrozenInstanceError, replace
 import pytest
 
 from psdmc.errors import InputError
-from psdmc.lower.search import for_lanes, for_one_state
+from psdmc.lower.scoring import for_lanes, for_one_state
 from psdmc.program.cost import Cost
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program

@@ -1,0 +1,44 @@
+"""What a PROGRAM costs on a target, as one number that a search compares."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from psdmc.program.cost import Cost, cost
+from psdmc.program.program import Program
+from psdmc.target.costs import Costs
+from psdmc.target.native import COSTS
+
+
+@dataclass(frozen=True, slots=True)
+class Scoring:
+    """The score of PROGRAMs on a target. In code for one state, the angles share vector sincos calls; with one state
+    per lane each angle has its own."""
+
+    costs: Costs
+    angles_per_sincos: int
+
+    def score(self, program: Program) -> float:
+        """Weighted operations of the PROGRAM, see `weight`."""
+        return self.weight(cost(program))
+
+    def weight(self, c: Cost) -> float:
+        """Operations with the target's weights, plus trigonometry."""
+        calls, costs = math.ceil(c.sincos / self.angles_per_sincos), self.costs
+        operations = c.total - costs.fused * c.fused + costs.neg * c.neg + costs.div * c.div
+        return operations + costs.sincos * calls + costs.angle * c.sincos
+
+
+def for_one_state(costs: Costs) -> Scoring:
+    """The scoring of code for one state a call."""
+    return Scoring(costs, costs.angles_per_sincos)
+
+
+def for_lanes(costs: Costs) -> Scoring:
+    """The scoring of code for one state per lane."""
+    return Scoring(costs, 1)
+
+
+SINGLE, BATCH = for_one_state(COSTS), for_lanes(COSTS)
+"""The default target's."""

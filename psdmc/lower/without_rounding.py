@@ -1,0 +1,61 @@
+"""Directions, lengths, rotations and placements with the rounding of exact zeros, ones and decimals removed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from psdmc.robot.mechanism import Array, Placement
+from psdmc.robot.small import length
+
+EXACT = 1e-12
+"""Lengths (relative to the chain's reach) and direction cosines below this are rounding of an exact zero."""
+
+DECIMALS = 12
+"""A length that differs by rounding from one of so many decimals is replaced by that one, so that equal lengths stay
+equal. See ROUNDING."""
+
+ROUNDING = 1e-15
+"""What composing placements can move a length by, relative to the chain's reach. Rounded to decimals beyond this, lengths of
+centimetres would lose digits."""
+
+
+def without_rounding(place: Placement, reach: float) -> Placement:
+    """A placement with the rounding of exact zeros and ones removed."""
+    return Placement(exact_rotation(place.rotation), clean_lengths(place.translation, reach) + 0.0)
+
+
+def clean_direction(direction: Array) -> Array:
+    """The unit vector along a direction, its smallest entries made zero."""
+    cleaned = np.where(np.abs(direction) < EXACT, 0.0, direction)
+    return np.asarray(cleaned / length(cleaned))
+
+
+def clean_lengths(lengths: Array, scale: float) -> Array:
+    """Lengths without rounding: zeros made exact, decimal lengths made decimal, so that equal lengths stay equal."""
+    return _decimal(np.where(np.abs(lengths) < EXACT * scale, 0.0, lengths), scale)
+
+
+def _decimal(lengths: Array, scale: float) -> Array:
+    nearest = np.round(lengths, DECIMALS)
+    return np.asarray(np.where(np.abs(nearest - lengths) <= ROUNDING * scale, nearest, lengths), np.float64)
+
+
+def exact_rotation(rotation: Array) -> Array:
+    """A rotation with the rounding of exact zeros and ones removed."""
+    near = np.round(rotation)
+    return np.asarray(np.where(np.abs(rotation - near) < EXACT, near, rotation) + 0.0)
+
+
+def constant_rotation(rotation: Array) -> Array:
+    """The constant rotation between two frames: about x, except where axes are nearly parallel."""
+    turns_x = np.max(np.abs([*rotation[0, 1:], *rotation[1:, 0]])) > EXACT
+    return rotation if turns_x else _about_x(rotation)
+
+
+def _about_x(rotation: Array) -> Array:
+    """The rotation about x nearest to this one, with exact zeros and ones."""
+    c, s = float(rotation[1, 1]), float(rotation[2, 1])
+    c, s = (0.0 if abs(v) < EXACT else v for v in (c, s))
+    length = np.hypot(c, s)
+    c, s = c / length, s / length
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
