@@ -15,7 +15,7 @@ from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, Placement
 from psdmc.robot.mujoco_warnings import kept_warnings
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
-from psdmc.robot.reference import has_assumptions
+from psdmc.robot.reference_model import has_assumptions
 from psdmc.robot.rotation import from_quaternion
 from psdmc.robot.urdf import read_urdf
 from psdmc.robot.urdf_chain import STANDARD_GRAVITY

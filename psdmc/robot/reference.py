@@ -1,14 +1,4 @@
-"""Pinocchio's own reading of a robot's source, as the reference for everything else.
-
-It shares the file's text with the chain and as little code as possible: a URDF is read, merged and locked by Pinocchio,
-a DH table is read by dh_textbook. Only names come from the chain: of its joints, links, base and tip. For the snapped
-robot the joints' placements come from the chain too, because the file does not have them; the bodies are still
-Pinocchio's.
-
-The models have one coordinate per joint (a continuous joint is an angle), the chain's joints in the chain's order, the
-chain's base as their universe, and a frame for the tip: they work with any function of Pinocchio and plain q, qd, qdd
-(n,).
-"""
+"""Pinocchio's dynamics of a robot's source on arrays of states, as the reference for everything else."""
 
 from __future__ import annotations
 
@@ -18,67 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio
 
-from psdmc.errors import InputError, InternalError
-from psdmc.robot.dh_textbook import dh_model
+from psdmc.errors import InternalError
 from psdmc.robot.joints import REVOLUTE, WIDE_TYPES, JointType
 from psdmc.robot.load import LoadedRobot
-from psdmc.robot.lock import held_positions
-from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
-from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model, reduced
-from psdmc.robot.tool import TOOL
-from psdmc.robot.urdf import read_urdf
-from psdmc.robot.urdf_floating import ROOT_JOINT
+from psdmc.robot.mechanism import Array
+from psdmc.robot.reference_model import reference_model
 
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Weights of a central difference of eighth order."""
 
 DIFFERENCE = 0.02
 """rad or m: its step. The ninth derivative leaves 1e-16, rounding 1e-14."""
-
-
-def reference_model(
-    loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | None = None
-) -> pinocchio.Model:
-    """Pinocchio's model of the robot.
-
-    snapped      joints placed as the chain's are; False: as in the file, rounding included
-    parameters   (n, 11) standard parameters about the link frames instead of the source's own
-
-    Bodies with parameters assumed zero get the chain's values, which the source does not have. ValueError where
-    parameters are needed and unknown.
-    """
-    chain = loaded.mechanism
-    model = as_written(loaded)
-    if parameters is None:
-        values, replaced = chain.parameters, _assumed(chain)
-    else:
-        values, replaced = (
-            frozen_array(parameters, chain.parameters.shape, "parameters"),
-            list(range(len(chain))),
-        )
-    if np.isnan(values).any():
-        raise ValueError("inertial parameters are unknown: give `parameters`")
-    _set_bodies(model, chain, values, replaced)
-    model.armature = np.repeat(values[:, DRIVE], [kind.nv for kind in chain.types])
-    return _placed_as(chain, model) if snapped else model
-
-
-def as_written(loaded: LoadedRobot) -> pinocchio.Model:
-    """Pinocchio's own model of the file, with nothing of the chain but names; bodies as far as the file gives them."""
-    is_urdf = loaded.source_format == "urdf"
-    model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
-    if loaded.options.tool is not None:
-        _add_tool(model, loaded.mechanism.tip_name, loaded.options.tool)
-    return model
-
-
-def _add_tool(model: pinocchio.Model, tip: str, tool: tuple[float, ...]) -> None:
-    """The tool frame in the tip's, by Pinocchio's own reading of the angles."""
-    number = model.getFrameId(tip)
-    place = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*tool[3:]), np.array(tool[:3]))
-    above = model.frames[number]
-    kind = pinocchio.FrameType.OP_FRAME
-    model.addFrame(pinocchio.Frame(TOOL, above.parentJoint, number, above.placement * place, kind))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -257,98 +197,5 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
     return Reference(model, loaded.mechanism.tip_name, names)
 
 
-def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
-    """The file as Pinocchio reads it, all but the chain's joints locked at neutral, seen from the base."""
-    chain = loaded.mechanism
-    free = ROOT_JOINT if loaded.options.floating else None
-    whole = pinocchio_model(loaded.source_text, loaded.source_name, free_root=free)
-    held = held_positions(
-        read_urdf(loaded.source_text, loaded.source_name), loaded.options.lock, loaded.source_name
-    )
-    whole = locked_at(whole, held)
-    wanted = [JOINT_PREFIX + name for name in chain.joint_names]
-    others = [k for k in range(1, whole.njoints) if whole.names[k] not in wanted]
-    model = reduced(whole, others, pinocchio.neutral(whole)) if others else whole
-    if list(model.names)[1:] != wanted:
-        raise InputError(
-            f"{loaded.source_name}: Pinocchio finds joints {list(model.names)[1:]}",
-            "give the joints names that differ from those of the links",
-        )
-    for k, name in enumerate(chain.joint_names, start=1):
-        model.names[k] = name
-    root_gravity = loaded.options.gravity
-    if root_gravity is not None:
-        model.gravity.linear = np.array(root_gravity)
-    if free is not None:
-        return model
-    base = model.frames[model.getFrameId(chain.base_name, pinocchio.FrameType.BODY)].placement
-    for k in range(1, model.njoints):
-        if model.parents[k] == 0:
-            model.jointPlacements[k] = base.inverse() * model.jointPlacements[k]
-    model.gravity.linear = base.rotation.T @ model.gravity.linear
-    return model
-
-
-def body_of(parameters: Array) -> pinocchio.Inertia:
-    """Pinocchio's body with ten standard parameters, physical or not.
-
-    Pinocchio divides by the mass. A body without mass gets the smallest one, and loses its first moments.
-    """
-    if not parameters[:DRIVE].any():
-        return pinocchio.Inertia.Zero()
-    if parameters[0] == 0.0 and parameters[1:4].any():
-        raise ValueError("Pinocchio has no body with a first moment but no mass")
-    mass = parameters[0] or float(np.finfo(float).tiny)
-    return pinocchio.Inertia.FromDynamicParameters(np.array([mass, *parameters[1:DRIVE]]))
-
-
-def _set_bodies(model: pinocchio.Model, chain: Mechanism, parameters: Array, which: list[int]) -> None:
-    """Give the joints `which` bodies by their standard parameters (n, 11) about the link frames."""
-    for k in which:
-        link = model.frames[model.getFrameId(chain.joints[k].link_name, pinocchio.FrameType.BODY)]
-        model.inertias[k + 1] = link.placement.act(body_of(parameters[k]))
-
-
 def pinocchio_version() -> str:
     return str(pinocchio.__version__)
-
-
-def has_assumptions(loaded: LoadedRobot) -> bool:
-    """Whether some bodies are not determined by the file alone: assumed zeros and unknown values."""
-    return bool(_assumed(loaded.mechanism))
-
-
-def _assumed(chain: Mechanism) -> list[int]:
-    """Joints whose bodies have zeros that only the span has; and joints whose bodies have unknown values."""
-    span = chain.parameter_span.reshape(len(chain), PARAMETERS_PER_LINK, -1)[:, :DRIVE]
-    return [
-        k
-        for k, values in enumerate(chain.parameters)
-        if np.isnan(values).any() or np.linalg.matrix_rank(span[k]) < DRIVE
-    ]
-
-
-def _placed_as(chain: Mechanism, model: pinocchio.Model) -> pinocchio.Model:
-    """The model's bodies on joints that are placed as the chain's are, about their z."""
-    placed = pinocchio.Model()
-    placed.name = model.name
-    numbers = [0]
-    for k, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True)):
-        about = getattr(pinocchio, f"JointModel{joint.type.pinocchio}")()
-        placed.addJoint(parent + 1, about, _se3(joint.placement), joint.name)
-        own = model.frames[model.getFrameId(joint.link_name, pinocchio.FrameType.BODY)].placement
-        place = _se3(joint.link_frame)
-        placed.inertias[k + 1] = (place * own.inverse()).act(model.inertias[k + 1])
-        kind, above = pinocchio.FrameType.BODY, numbers[parent + 1]
-        numbers.append(placed.addFrame(pinocchio.Frame(joint.link_name, k + 1, above, place, kind)))
-    for frame in (chain.tip_frame, *chain.frames):
-        if not placed.existFrame(frame.name):
-            place, kind, above = _se3(frame.placement), pinocchio.FrameType.OP_FRAME, numbers[frame.joint + 1]
-            placed.addFrame(pinocchio.Frame(frame.name, frame.joint + 1, above, place, kind))
-    placed.gravity.linear = np.array(chain.gravity)
-    placed.armature = model.armature.copy()
-    return placed
-
-
-def _se3(placement: Placement) -> pinocchio.SE3:
-    return pinocchio.SE3(np.array(placement.rotation), np.array(placement.translation))

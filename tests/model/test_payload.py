@@ -13,7 +13,7 @@ from random_chains import Oracle, random_chain, relative_error, states
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Placement
-from psdmc.robot.reference import reference_model
+from psdmc.robot.reference_model import reference_model
 
 MASS, COM = 2.5, np.array([0.03, -0.02, 0.09])
 INERTIA = np.array([[0.03, 0.002, -0.001], [0.002, 0.02, 0.003], [-0.001, 0.003, 0.025]])

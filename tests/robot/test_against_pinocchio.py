@@ -13,7 +13,8 @@ from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.parameters import bodies_of
 from psdmc.errors import InternalError
 from psdmc.robot.load import load_robot
-from psdmc.robot.reference import Reference, reference, reference_model
+from psdmc.robot.reference import Reference, reference
+from psdmc.robot.reference_model import reference_model
 
 TOLERANCE = 1e-12
 

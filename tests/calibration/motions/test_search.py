@@ -23,7 +23,7 @@ from psdmc.compiler import compile as compile_model
 from psdmc.compiler import derive
 from psdmc.derivation.derive import derive_model
 from psdmc.robot.load import load_robot, load_robot_text
-from psdmc.robot.reference import reference_model
+from psdmc.robot.reference_model import reference_model
 
 DENSO = Path(__file__).resolve().parents[3] / "examples" / "robots" / "denso_wall.toml"
 
