@@ -63,7 +63,7 @@ class LogFit:
 
     def _essential(self, found: LinearResult, whole: Calibration, options: EssentialOptions) -> Calibration:
         self.progress("essential parameters")
-        lesser = essential(found.estimate, found.prior.values, found.samples, options)
+        lesser = essential(found.estimate, found.prior.values, found.samples, options, self.linear.fit)
         fewer = self._consistent(replace(found, estimate=lesser.estimate, dropped=lesser.dropped))
         return with_price(fewer, whole, lesser, found.problem.names)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.least_squares import Estimate
+from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import friction_names
 from psdmc.calibration.identify.load_fit import LOAD, LOAD_NAMES, LoadFit, fit_load

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from psdmc.calibration.identify.least_squares import ROUNDING, Estimate
+from psdmc.calibration.identify.estimate import Estimate, FitOptions
+from psdmc.calibration.identify.least_squares import ROUNDING
 from psdmc.calibration.identify.physical import whitening_of
 from psdmc.calibration.logs.log import Array
 
@@ -44,11 +45,14 @@ class Essential:
     limit: float
 
 
-def essential(solved: Estimate, start: Array, samples: int, options: EssentialOptions) -> Essential:
+def essential(
+    solved: Estimate, start: Array, samples: int, options: EssentialOptions, fit: FitOptions | None = None
+) -> Essential:
     """The estimate without what it does not need.
 
     start    (m,)  the prior's values, which dropped entries take
     samples  independent ones that were fitted, all joints together
+    fit      the options of the fit that found `solved`; None: the default ones
     """
     problem = _Problem(solved, start, max(samples - solved.rank, 1))
     dropped, needed = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
@@ -66,7 +70,8 @@ def essential(solved: Estimate, start: Array, samples: int, options: EssentialOp
         else:
             needed[worst] = True
     f, limit = problem.f(dropped), problem.limit(dropped, options.significance)
-    return Essential(_reduced(solved, problem, dropped), dropped, f, limit)
+    unseen_share = (fit or FitOptions()).unseen_share
+    return Essential(_reduced(solved, problem, dropped, unseen_share), dropped, f, limit)
 
 
 class _Problem:
@@ -107,7 +112,9 @@ class _Problem:
         return float(stats.f.isf(significance, count, self.freedom)) if count else float("nan")
 
 
-def _reduced(solved: Estimate, problem: _Problem, dropped: NDArray[np.bool_]) -> Estimate:
+def _reduced(
+    solved: Estimate, problem: _Problem, dropped: NDArray[np.bool_], unseen_share: float
+) -> Estimate:
     """The estimate of the free entries; hidden directions are those that are left with the dropped ones known.
 
     What is kept stands for what was dropped beside it. Its standard deviation is that of itself: the whole fit's, and how
@@ -127,13 +134,9 @@ def _reduced(solved: Estimate, problem: _Problem, dropped: NDArray[np.bool_]) ->
         total_covariance=whole + np.outer(moved, moved),
         unseen=hidden,
         prior_std=0.0,  # what hidden directions leave open is in the covariance
-        identifiable=(share < HIDDEN) & ~dropped,
+        identifiable=(share < unseen_share) & ~dropped,
         rank=int((~dropped).sum()) - hidden.shape[1],
     )
-
-
-HIDDEN = 1e-2
-"""Share (squared) of a parameter in hidden directions from which it is not identifiable, as in FitOptions."""
 
 
 def _within(unseen: Array, dropped: NDArray[np.bool_]) -> Array:

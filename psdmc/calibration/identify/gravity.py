@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.least_squares import Consider, Estimate, Prior, estimate
+from psdmc.calibration.identify.estimate import Consider, Estimate, Prior
+from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
 from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes

@@ -12,10 +12,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibration.identify.estimate import Consider, Estimate, Prior
 from psdmc.calibration.identify.friction import FrictionResult
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import GravityResult, gravity_split
-from psdmc.calibration.identify.least_squares import Consider, Estimate, Prior, estimate
+from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.lugre import Lugre, friction_torque
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque

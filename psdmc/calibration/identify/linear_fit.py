@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibration.identify.estimate import Estimate, FitOptions, Prior
 from psdmc.calibration.identify.extra import extra_scale
-from psdmc.calibration.identify.least_squares import Estimate, FitOptions, Prior, estimate_rows
+from psdmc.calibration.identify.least_squares import estimate_rows
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem
 from psdmc.calibration.identify.motor_model import Motors, RowsByMotors

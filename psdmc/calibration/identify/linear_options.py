@@ -8,7 +8,7 @@ from typing import Any
 
 from psdmc.calibration.columns.columns import Columns, read_columns
 from psdmc.calibration.identify.coupling import Matrix
-from psdmc.calibration.identify.least_squares import FitOptions
+from psdmc.calibration.identify.estimate import FitOptions
 from psdmc.calibration.logs.check_options import CheckOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS

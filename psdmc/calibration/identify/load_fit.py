@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.least_squares import Estimate, Prior, estimate_rows
+from psdmc.calibration.identify.estimate import Estimate, Prior
+from psdmc.calibration.identify.least_squares import estimate_rows
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem
 from psdmc.calibration.identify.linear_rows import Block

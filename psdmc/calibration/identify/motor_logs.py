@@ -23,8 +23,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibration.identify.estimate import Estimate, Prior
 from psdmc.calibration.identify.known_load import REMEDIES, KnownLoad, unreached
-from psdmc.calibration.identify.least_squares import Estimate, Prior, estimate_rows
+from psdmc.calibration.identify.least_squares import estimate_rows
 from psdmc.calibration.identify.linear_fit import linear_prior
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import LinearProblem, linear_problem

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psdmc.calibration.identify.least_squares import Estimate
+from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.physical import whitening_of
 from psdmc.calibration.logs.log import Array
 from psdmc.model.dynamics_model import DynamicsModel

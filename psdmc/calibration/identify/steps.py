@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.least_squares import FitOptions
+from psdmc.calibration.identify.estimate import FitOptions
 from psdmc.calibration.identify.quality import Quality, quality
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log import Array, Log

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.least_squares import FitOptions
+from psdmc.calibration.identify.estimate import FitOptions
 from psdmc.calibration.logs.log import Array
 
 IDENTIFIED = "identified"

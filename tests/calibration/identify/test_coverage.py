@@ -15,7 +15,8 @@ from scipy import signal
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_campaign, calibrate_logs
 from psdmc.calibration.campaign_file import read_campaign
-from psdmc.calibration.identify.least_squares import FitOptions, Method, estimate
+from psdmc.calibration.identify.estimate import FitOptions, Method
+from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.plant.virtual_robot import load_virtual_robot
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign

@@ -12,7 +12,8 @@ from scipy import stats
 import psdmc
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.essential import EssentialOptions, essential
-from psdmc.calibration.identify.least_squares import Estimate, FitOptions, Prior, estimate
+from psdmc.calibration.identify.estimate import Estimate, FitOptions, Prior
+from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.physical import nearest_physical
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
@@ -106,6 +107,22 @@ def test_nothing_is_dropped_that_is_known() -> None:
     _, _, whole = problem(0, noise=1e-4)
     found = essential(whole, np.zeros(5), COUNT, EssentialOptions())
     assert found.dropped.tolist() == [False, False, False, True, False]
+
+
+@pytest.mark.parametrize("unseen_share", [1e-2, 1e-3])
+def test_what_is_identifiable_is_decided_by_the_options_of_the_fit(unseen_share: float) -> None:
+    """A direction (1, 0.05, 0) does not show: 0.0025 of the second value is in it, which the first limit admits."""
+    rng = np.random.default_rng(5)
+    columns = rng.normal(size=(COUNT, 1, 3))
+    columns[:, :, 0] = -0.05 * columns[:, :, 1]
+    target = columns @ np.array([5.0, 1.0, 1.0]) + 1e-3 * rng.normal(size=(COUNT, 1))
+    fit = FitOptions(method="ols", unseen_share=unseen_share)
+    prior = Prior(np.array([5.0, 1.0, 1.0]), np.full(3, 100.0))
+    whole = estimate(columns, target, fit, prior=prior)
+    found = essential(whole, prior.values, COUNT, EssentialOptions(relative=1e9), fit)
+    assert not found.dropped.any()
+    assert whole.identifiable.tolist() == [False, unseen_share > 0.0025, True]
+    assert found.estimate.identifiable.tolist() == whole.identifiable.tolist()
 
 
 @pytest.fixture

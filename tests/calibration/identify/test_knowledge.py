@@ -11,8 +11,9 @@ import pytest
 from bundled import bundled_model
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
+from psdmc.calibration.identify.estimate import FitOptions, Prior
 from psdmc.calibration.identify.knowledge import knowledge_of
-from psdmc.calibration.identify.least_squares import FitOptions, Prior, estimate
+from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.stated_prior import Confidence, theta_covariance, with_prior

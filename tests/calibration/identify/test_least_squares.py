@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.calibration.identify.least_squares import Consider, FitOptions, estimate
+from psdmc.calibration.identify.estimate import Consider, FitOptions
+from psdmc.calibration.identify.least_squares import estimate
 from psdmc.calibration.identify.residuals import noise_warnings
 
 RNG_SEED = 7

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
+from psdmc.calibration.identify.estimate import Estimate, FitOptions
 from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
-from psdmc.calibration.identify.least_squares import Estimate, FitOptions
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.motor_model import Motors
