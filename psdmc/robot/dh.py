@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import math
-import sys
 import tomllib
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.dh_parents import parents_of
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import JOINT_TYPES, REVOLUTE, JointType
-from psdmc.robot.limits import Range, shown
+from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BASE, Limits
 from psdmc.robot.names import name_faults, naming_faults
-from psdmc.robot.numerals import WHITE_SPACE, decimal
+from psdmc.robot.toml_values import (
+    LENGTH,
+    CheckedTable,
+    Triple,
+    angle,
+    any_list,
+    as_it_is,
+    finite,
+    not_negative,
+    one_of,
+    plain_text,
+    range_of,
+    triple_of,
+    within,
+)
 from psdmc.robot.zeros import ZERO_NAMES
 
 Convention = Literal["standard", "modified"]
-Triple = tuple[float, float, float]
 
 ROBOT_KEYS = ("name", "convention", "gravity", "joint")
 JOINT_KEYS = ("name", "parent", "type", "a", "alpha", "d", "theta", "limits", "drive_inertia", "link")
@@ -92,65 +103,9 @@ def _parsed(text: str, source: str) -> object:
         raise InputError(f"{source}: not a TOML file: {reason}", hint) from None
 
 
-def angle(value: object, accepted: Range = limits.ANGLE) -> float:
-    """An angle in rad, from a number (rad) or a text such as "90 deg" or "1.5 rad"; ValueError on anything else."""
-    if not isinstance(value, str):
-        return within(accepted)(value)
-    plain = value.strip(WHITE_SPACE)
-    number, unit = decimal(plain[:-3].strip(WHITE_SPACE)), plain[-3:]
-    if number is None or unit not in ("deg", "rad"):
-        raise ValueError(f'{shown(value)} is no angle: write radians, or "90 deg"')
-    return within(accepted)(math.radians(number) if unit == "deg" else number)
-
-
-def finite(value: object) -> float:
-    """A finite number within the range of 64 bits; ValueError on anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"found {shown(value)}, expected a finite number")
-    if not abs(value) <= sys.float_info.max:
-        raise ValueError(f"found {shown(value)}, expected a finite number")
-    return float(value)
-
-
-def within(accepted: Range) -> Callable[[object], float]:
-    """A reader of finite numbers whose magnitude is in the range; its ValueError names the range."""
-
-    def convert(value: object) -> float:
-        number = finite(value)
-        fault = accepted.fault(number)
-        if fault:
-            raise ValueError(f"{number:g} {fault}")
-        return number
-
-    return convert
-
-
-class _Table:
-    """One TOML table, read key by key; faults go to `problems`, under the table's name."""
-
-    def __init__(self, value: object, where: str, keys: tuple[str, ...], problems: list[str]) -> None:
-        self.where, self.problems = where, problems
-        self.table: Mapping[str, Any] = value if isinstance(value, dict) else {}
-        if not isinstance(value, dict):
-            problems.append(f"{where}: found {shown(value)}, expected a table")
-        for key in self.table:
-            if key not in keys:
-                problems.append(f"{where}: unknown key {shown(key)} (known: {', '.join(keys)})")
-
-    def read(self, key: str, convert: Callable[[Any], Any], default: Any) -> Any:
-        """The converted value, or `default` where it is missing or wrong."""
-        if key not in self.table:
-            return default
-        try:
-            return convert(self.table[key])
-        except ValueError as error:
-            self.problems.append(f"{self.where}: {key}: {error}")
-            return default
-
-
 def _robot(value: object, problems: list[str]) -> DhRobot | None:
-    table = _Table(value, "robot", ROBOT_KEYS, problems)
-    rows = table.read("joint", _list, [])
+    table = CheckedTable(value, "robot", ROBOT_KEYS, problems)
+    rows = table.read("joint", any_list, [])
     if not rows:
         problems.append("no [[joint]] in it")
         return None
@@ -158,7 +113,7 @@ def _robot(value: object, problems: list[str]) -> DhRobot | None:
         problems.append(f"{len(rows)} joints, psdmc reads at most {limits.MAX_JOINTS}")
         return None
     joints = tuple(_joint(row, number, problems) for number, row in enumerate(rows, start=1))
-    name = table.read("name", _text, "robot")
+    name = table.read("name", plain_text, "robot")
     names = [joint.name for joint in joints]
     problems += name_faults(name, "robot") + naming_faults(names, "joint")
     parents, faults = parents_of(
@@ -170,14 +125,14 @@ def _robot(value: object, problems: list[str]) -> DhRobot | None:
     problems += [fault] if fault else []
     return DhRobot(
         name=name,
-        convention=table.read("convention", _one_of("standard", "modified"), "standard"),
+        convention=table.read("convention", one_of("standard", "modified"), "standard"),
         gravity=table.read("gravity", _gravity, (0.0, 0.0, -9.81)),
         joints=tuple(replace(joint, parent=k) for joint, k in zip(joints, parents, strict=True)),
     )
 
 
 def _gravity(value: object) -> Triple:
-    gravity = _triple_of(finite)(value)
+    gravity = triple_of(finite)(value)
     fault = limits.gravity_fault(gravity)
     if fault:
         raise ValueError(f"{list(gravity)} {fault}")
@@ -187,9 +142,9 @@ def _gravity(value: object) -> Triple:
 def _joint(value: object, number: int, problems: list[str]) -> DhJoint:
     given = value.get("name") if isinstance(value, dict) else None
     name = given if isinstance(given, str) and given else f"joint{number}"
-    table = _Table(value, f"joint {shown(name)}", JOINT_KEYS, problems)
-    table.read("name", _text, "")
-    joint_type = JOINT_TYPES[table.read("type", _one_of(*JOINT_TYPES), REVOLUTE.word)]
+    table = CheckedTable(value, f"joint {shown(name)}", JOINT_KEYS, problems)
+    table.read("name", plain_text, "")
+    joint_type = JOINT_TYPES[table.read("type", one_of(*JOINT_TYPES), REVOLUTE.word)]
     return DhJoint(
         name=name,
         type=joint_type,
@@ -197,35 +152,34 @@ def _joint(value: object, number: int, problems: list[str]) -> DhJoint:
         alpha=table.read("alpha", angle, 0.0),
         d=table.read("d", LENGTH, 0.0),
         theta=table.read("theta", angle, 0.0),
-        limits=_limits(table.read("limits", _same, {}), joint_type, f"{table.where} limits", problems),
+        limits=_limits(table.read("limits", as_it_is, {}), joint_type, f"{table.where} limits", problems),
         drive_inertia=table.read("drive_inertia", _drive_inertia, None),
-        link=_link(table.read("link", _same, {}), f"{table.where} link", problems),
+        link=_link(table.read("link", as_it_is, {}), f"{table.where} link", problems),
     )
 
 
 def _limits(value: object, joint: JointType, where: str, problems: list[str]) -> Limits:
-    table = _Table(value, where, LIMIT_KEYS, problems)
+    table = CheckedTable(value, where, LIMIT_KEYS, problems)
     convert = partial(angle, accepted=limits.ANY) if joint.position_unit == "rad" else finite
-    lower, upper = table.read("position", _range_of(convert), (-math.inf, math.inf))
+    lower, upper = table.read("position", range_of(convert), (-math.inf, math.inf))
     speed, acceleration, effort = (
-        table.read(key, _not_negative(reader), math.inf)
+        table.read(key, not_negative(reader), math.inf)
         for key, reader in (("speed", convert), ("acceleration", convert), ("effort", finite))
     )
     return Limits(lower, upper, speed, acceleration, effort)
 
 
 def _link(value: object, where: str, problems: list[str]) -> DhLink:
-    table = _Table(value, where, LINK_KEYS, problems)
-    inertia = _Table(table.read("inertia_com", _same, {}), f"{where} inertia_com", INERTIA_NAMES, problems)
+    table = CheckedTable(value, where, LINK_KEYS, problems)
+    inertia = CheckedTable(
+        table.read("inertia_com", as_it_is, {}), f"{where} inertia_com", INERTIA_NAMES, problems
+    )
     return DhLink(
-        mass=table.read("mass", _not_negative(within(limits.MASS)), UNKNOWN),
-        com=table.read("com", _triple_of(LENGTH), (UNKNOWN,) * 3),
+        mass=table.read("mass", not_negative(within(limits.MASS)), UNKNOWN),
+        com=table.read("com", triple_of(LENGTH), (UNKNOWN,) * 3),
         inertia_com=tuple(inertia.read(name, within(limits.INERTIA), UNKNOWN) for name in INERTIA_NAMES),
         zero=table.read("zero", _zero_names, ()),
     )
-
-
-LENGTH = within(limits.LENGTH)
 
 
 def _plain(name: str) -> str:
@@ -233,69 +187,13 @@ def _plain(name: str) -> str:
     return name if name.isidentifier() and len(name) < limits.SHOWN else shown(name)
 
 
-def _same(value: object) -> object:
-    return value
-
-
-def _text(value: object) -> str:
-    if not isinstance(value, str) or not value:
-        raise ValueError(f"found {shown(value)}, expected a text")
-    return value
-
-
-def _list(value: object) -> list[object]:
-    if not isinstance(value, list):
-        raise ValueError(f"found {shown(value)}, expected a list")
-    return value
-
-
-def _triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
-    def read(value: object) -> Triple:
-        values = _list(value)
-        if len(values) != 3:
-            raise ValueError(f"found {shown(value)}, expected three numbers")
-        x, y, z = (convert(v) for v in values)
-        return (x, y, z)
-
-    return read
-
-
-def _not_negative(convert: Callable[[object], float]) -> Callable[[object], float]:
-    def read(value: object) -> float:
-        number = convert(value)
-        if number < 0.0:
-            raise ValueError(f"found {number:g}, expected no less than zero")
-        return number
-
-    return read
-
-
 def _drive_inertia(value: object) -> float:
-    return UNKNOWN if value == "unknown" else _not_negative(within(limits.DRIVE_INERTIA))(value)
+    return UNKNOWN if value == "unknown" else not_negative(within(limits.DRIVE_INERTIA))(value)
 
 
 def _zero_names(value: object) -> tuple[str, ...]:
-    names = tuple(_text(name) for name in _list(value))
+    names = tuple(plain_text(name) for name in any_list(value))
     unknown = [name for name in names if name not in ZERO_NAMES]
     if unknown:
         raise ValueError(f"unknown {', '.join(map(_plain, unknown))} (known: {', '.join(ZERO_NAMES)})")
     return names
-
-
-def _one_of(*words: str) -> Callable[[object], str]:
-    def convert(value: object) -> str:
-        if not isinstance(value, str) or value not in words:
-            raise ValueError(f"found {shown(value)}, expected one of {', '.join(words)}")
-        return str(value)
-
-    return convert
-
-
-def _range_of(convert: Callable[[Any], float]) -> Callable[[object], tuple[float, float]]:
-    def read(value: object) -> tuple[float, float]:
-        values = _list(value)
-        if len(values) != 2 or convert(values[0]) > convert(values[1]):
-            raise ValueError(f"found {shown(value)}, expected [lower, upper]")
-        return convert(values[0]), convert(values[1])
-
-    return read

@@ -1,0 +1,143 @@
+"""Readers of values in a TOML file: each takes what the parser gives and returns it typed, or raises ValueError that says
+what was found and what expected.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from psdmc.robot import limits
+from psdmc.robot.limits import Range, shown
+from psdmc.robot.numerals import WHITE_SPACE, decimal
+
+Triple = tuple[float, float, float]
+
+
+def angle(value: object, accepted: Range = limits.ANGLE) -> float:
+    """An angle in rad, from a number (rad) or a text such as "90 deg" or "1.5 rad"; ValueError on anything else."""
+    if not isinstance(value, str):
+        return within(accepted)(value)
+    plain = value.strip(WHITE_SPACE)
+    number, unit = decimal(plain[:-3].strip(WHITE_SPACE)), plain[-3:]
+    if number is None or unit not in ("deg", "rad"):
+        raise ValueError(f'{shown(value)} is no angle: write radians, or "90 deg"')
+    return within(accepted)(math.radians(number) if unit == "deg" else number)
+
+
+def finite(value: object) -> float:
+    """A finite number within the range of 64 bits; ValueError on anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"found {shown(value)}, expected a finite number")
+    if not abs(value) <= sys.float_info.max:
+        raise ValueError(f"found {shown(value)}, expected a finite number")
+    return float(value)
+
+
+def within(accepted: Range) -> Callable[[object], float]:
+    """A reader of finite numbers whose magnitude is in the range; its ValueError names the range."""
+
+    def convert(value: object) -> float:
+        number = finite(value)
+        fault = accepted.fault(number)
+        if fault:
+            raise ValueError(f"{number:g} {fault}")
+        return number
+
+    return convert
+
+
+class CheckedTable:
+    """One TOML table, read key by key; faults go to `problems`, under the table's name."""
+
+    def __init__(self, value: object, where: str, keys: tuple[str, ...], problems: list[str]) -> None:
+        self.where, self.problems = where, problems
+        self.table: Mapping[str, Any] = value if isinstance(value, dict) else {}
+        if not isinstance(value, dict):
+            problems.append(f"{where}: found {shown(value)}, expected a table")
+        for key in self.table:
+            if key not in keys:
+                problems.append(f"{where}: unknown key {shown(key)} (known: {', '.join(keys)})")
+
+    def read(self, key: str, convert: Callable[[Any], Any], default: Any) -> Any:
+        """The converted value, or `default` where it is missing or wrong."""
+        if key not in self.table:
+            return default
+        try:
+            return convert(self.table[key])
+        except ValueError as error:
+            self.problems.append(f"{self.where}: {key}: {error}")
+            return default
+
+
+LENGTH = within(limits.LENGTH)
+"""A reader of lengths, m."""
+
+
+def as_it_is(value: object) -> object:
+    """The value itself, whatever it is: its parts are read one by one."""
+    return value
+
+
+def plain_text(value: object) -> str:
+    """A text that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"found {shown(value)}, expected a text")
+    return value
+
+
+def any_list(value: object) -> list[object]:
+    """A list of anything."""
+    if not isinstance(value, list):
+        raise ValueError(f"found {shown(value)}, expected a list")
+    return value
+
+
+def triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
+    """A reader of three values that `convert` reads."""
+
+    def read(value: object) -> Triple:
+        values = any_list(value)
+        if len(values) != 3:
+            raise ValueError(f"found {shown(value)}, expected three numbers")
+        x, y, z = (convert(v) for v in values)
+        return (x, y, z)
+
+    return read
+
+
+def not_negative(convert: Callable[[object], float]) -> Callable[[object], float]:
+    """A reader of zero and what is above it."""
+
+    def read(value: object) -> float:
+        number = convert(value)
+        if number < 0.0:
+            raise ValueError(f"found {number:g}, expected no less than zero")
+        return number
+
+    return read
+
+
+def one_of(*words: str) -> Callable[[object], str]:
+    """A reader of one of these words."""
+
+    def read(value: object) -> str:
+        if not isinstance(value, str) or value not in words:
+            raise ValueError(f"found {shown(value)}, expected one of {', '.join(words)}")
+        return str(value)
+
+    return read
+
+
+def range_of(convert: Callable[[Any], float]) -> Callable[[object], tuple[float, float]]:
+    """A reader of [lower, upper]."""
+
+    def read(value: object) -> tuple[float, float]:
+        values = any_list(value)
+        if len(values) != 2 or convert(values[0]) > convert(values[1]):
+            raise ValueError(f"found {shown(value)}, expected [lower, upper]")
+        return convert(values[0]), convert(values[1])
+
+    return read
