@@ -44,8 +44,6 @@ from psdmc.toolchain.origin import Origin
 if TYPE_CHECKING:
     import numpy as np
 
-    from psdmc.robot.load import LoadedRobot
-
 
 def derive(
     robot: str | Path,
@@ -82,6 +80,7 @@ def derive(
     """
     # Imported here: Pinocchio and SciPy load slowly, and emission needs neither.
     from psdmc.derivation.derive import derive_model
+    from psdmc.derivation.provenance import provenance
     from psdmc.robot.load import load_robot
 
     if not isinstance(robot, str | Path):
@@ -104,22 +103,6 @@ def derive(
         floating=floating,
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
-
-
-def provenance(loaded: LoadedRobot) -> dict[str, Any]:
-    """The model's origin as plain JSON values: enough to read the source again."""
-    from psdmc.derivation.snap_effect import snap_effect
-
-    effect = snap_effect(loaded.mechanism, loaded.unsnapped().chain) if loaded.snap_report else None
-    return {
-        "source_text": loaded.source_text,
-        "source_sha256": hashlib.sha256(loaded.source_text.encode()).hexdigest(),
-        "source_format": loaded.source_format,
-        "source_name": loaded.source_name,
-        "options": loaded.options.as_json(),
-        "snapped": [{"where": snap.where, "angle_rad": snap.angle} for snap in loaded.snap_report],
-        "snap_torque_change": None if effect is None else effect.tolist(),
-    }
 
 
 def emit_c(

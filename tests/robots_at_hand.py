@@ -11,8 +11,8 @@ import pytest
 from bundled import ROBOTS, robot_path
 from random_chains import Oracle, random_chain
 
-from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
+from psdmc.derivation.provenance import provenance
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import LoadedRobot, load_robot
 from psdmc.robot.reference import Reference, reference

@@ -16,7 +16,7 @@ from lowered import lowered
 from robots_at_hand import BUNDLED, FOREIGN, GENERIC, NAMES, loaded, subject
 from unoptimised import compiled as library
 
-from psdmc.compiler import provenance
+from psdmc.derivation.provenance import provenance
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.package import package_view

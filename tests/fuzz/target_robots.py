@@ -10,8 +10,8 @@ from oracle import torque_error
 from oracle_mjcf import mujoco_error
 from outcome import BrokenRule
 
-from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
+from psdmc.derivation.provenance import provenance
 from psdmc.errors import DerivationError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import LoadedRobot, SourceFormat, load_robot

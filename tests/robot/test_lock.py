@@ -9,8 +9,9 @@ import pinocchio as pin
 import pytest
 from small_robots import LIMIT, joint, largest_difference, link, robot_data, torques, urdf
 
-from psdmc.compiler import derive, provenance
+from psdmc.compiler import derive
 from psdmc.derivation.derive import derive_model
+from psdmc.derivation.provenance import provenance
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
