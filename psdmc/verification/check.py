@@ -12,24 +12,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.random_parameters import random_parameters
 from psdmc.model.random_states import states_of
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.coordinates import Following
-from psdmc.robot.load import LoadedRobot, load_robot_text
-from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
+from psdmc.robot.load import LoadedRobot
+from psdmc.robot.mechanism import Array, Mechanism
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
 from psdmc.robot.reference import Reference, pinocchio_version, reference
 from psdmc.robot.reference_followers import OnCoordinates
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
 from psdmc.verification.functions import function_errors
 from psdmc.verification.placements import chain_poses, frames_above, gravity_error, placement_errors, reach_of
-
-Array = NDArray[np.float64]
+from psdmc.verification.relative_errors import NO_TORQUE, relative_error, worst
+from psdmc.verification.source import compared_parameters, require_same_robot, source_of
 
 STATES = 200
 SEED = 14_630
@@ -38,7 +35,6 @@ TORQUE_LIMIT = 1e-10
 
 CONDITION_LIMIT = 1e-12
 """Forward dynamics passes within this times the mass matrix's condition number, and always within TORQUE_LIMIT."""
-
 
 SINGULAR = 1e15
 """Condition number from which a mass matrix cannot be inverted: that of a last link without inertia, for example."""
@@ -58,8 +54,6 @@ ANGLES_ACTED_ON = 2.0
 
 MUJOCO = "MuJoCo's mj_inverse"
 """Text for what rows of the second reader are compared with."""
-NO_TORQUE = 1e-9
-"""Share of the largest torque below which a joint's torque is rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,15 +78,6 @@ class CheckRow:
         return self.limit is None or self.error <= self.limit
 
 
-def source_of(model: DynamicsModel) -> LoadedRobot:
-    """The robot that the model was derived from, read again from the source embedded in it."""
-    kept = model.provenance
-    if not {"source_text", "source_format", "options"} <= set(kept):
-        raise InputError(f"the model of '{model.mechanism.name}' holds no source", "give the robot's file")
-    name = str(kept.get("source_name", "robot"))
-    return load_robot_text(kept["source_text"], kept["source_format"], source_name=name, **kept["options"])
-
-
 def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tuple[CheckRow, ...]:
     """Every function of the model compared with Pinocchio's; `source` None: the source embedded in the model.
 
@@ -101,8 +86,8 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     the source is another robot.
     """
     loaded = source_of(model) if source is None else source
-    _require_same_robot(model, loaded)
-    theta, parameters = _parameters(model, loaded)
+    require_same_robot(model, loaded)
+    theta, parameters = compared_parameters(model, loaded)
     written = reference(loaded, snapped=False, parameters=parameters)
     snapped = bool(loaded.snap_report)
     free = reference(loaded, parameters=parameters) if snapped else written
@@ -116,47 +101,12 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     return (*rows, _against_mujoco(model, loaded, angles))
 
 
-def _require_same_robot(model: DynamicsModel, loaded: LoadedRobot) -> None:
-    found, expected = loaded.mechanism, model.mechanism
-    for what, there, here in (
-        ("joints", found.joint_names, expected.joint_names),
-        ("links", _links(found), _links(expected)),
-    ):
-        if there != here:
-            raise InputError(
-                f"{loaded.source_name} has {what} {', '.join(there)}, the model has {', '.join(here)}",
-                "give the file, base and tip that the model was derived from",
-            )
-
-
-def _links(mechanism: Mechanism) -> tuple[str, ...]:
-    return tuple(joint.link_name for joint in mechanism.joints)
-
-
 def readers(rows: Sequence[CheckRow]) -> str:
     """Which readers of the source the rows come from, in words."""
     words = f"compared with Pinocchio {pinocchio_version()}'s reading of the source"
     if any(row.against == MUJOCO and row.limit is not None for row in rows):
         return f"{words} and with MuJoCo {mujoco_version()}'s"
     return words
-
-
-def _parameters(model: DynamicsModel, loaded: LoadedRobot) -> tuple[Array, Array | None]:
-    """theta_b, and the standard parameters that Pinocchio must be given; None: its own."""
-    if model.theta_b is not None:
-        theta = np.asarray(model.theta_b)
-        for known in (loaded.mechanism.parameters, model.mechanism.parameters):
-            if _gives(theta, model.B, known):
-                return theta, None if known is loaded.mechanism.parameters else known
-    x = random_parameters(model.mechanism)
-    return model.B @ x, x.reshape(model.n, PARAMETERS_PER_LINK)
-
-
-def _gives(theta: Array, B: Array, parameters: Array) -> bool:
-    """Whether standard parameters (n, 11) are known and have these base parameters."""
-    if np.isnan(parameters).any():
-        return False
-    return bool(np.allclose(B @ parameters.reshape(-1), theta, rtol=1e-9, atol=1e-12))
 
 
 def _states(robot: Mechanism) -> tuple[Array, Array, Array]:
@@ -192,7 +142,9 @@ def _compared(
         ("gravity", "computeGeneralizedGravity", gravity, robot.gravity(q)),
     )
     least = NO_TORQUE * float(np.abs(pairs[0][-1]).max(initial=0.0))
-    checked = [CheckRow(name, against, _error(a, b, least), TORQUE_LIMIT) for name, against, a, b in pairs]
+    checked = [
+        CheckRow(name, against, relative_error(a, b, least), TORQUE_LIMIT) for name, against, a, b in pairs
+    ]
     return (*checked, _forward(robot, q, qd, qdd, tau, condition))
 
 
@@ -220,7 +172,7 @@ def _forward(robot: OnCoordinates, q: Array, qd: Array, qdd: Array, tau: Array, 
     name = "forward dynamics of these torques"
     if not condition < SINGULAR:
         return CheckRow(name, "aba", np.nan, None, "not compared: the mass matrix is singular")
-    error = _error(robot.forward_dynamics(q, qd, tau), qdd)
+    error = relative_error(robot.forward_dynamics(q, qd, tau), qdd)
     return CheckRow(name, "aba", error, _solved_limit(condition))
 
 
@@ -250,7 +202,7 @@ def _snapping(model: DynamicsModel, theta: Array, written: Reference, angles: Ar
     states, robot = _states(model.mechanism), OnCoordinates.of(written, model.mechanism)
     expected = robot.inverse_dynamics(*states)
     bound = _bound(robot, angles, states)
-    error, limit = _worst(model.torques_for(theta, *states), expected, bound)
+    error, limit = worst(model.torques_for(theta, *states), expected, bound, TORQUE_LIMIT)
     return CheckRow(
         "effect of snapped rotations", "rnea", error, limit, "the limit is what the angles can do"
     )
@@ -268,10 +220,10 @@ def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) ->
     tau = model.torques_for(model.B @ loaded.mechanism.parameters.reshape(-1), *states)
     bound = np.full(model.nv, MUJOCO_ROUNDING * float(np.abs(expected).max(initial=0.0)))
     if not angles.any():
-        return CheckRow("inverse dynamics", MUJOCO, *_worst(tau, expected, bound, MUJOCO_LIMIT))
+        return CheckRow("inverse dynamics", MUJOCO, *worst(tau, expected, bound, MUJOCO_LIMIT))
     written = OnCoordinates.of(reference(loaded, snapped=False), loaded.mechanism)
     bound += _bound(written, angles, states)
-    figures = _worst(tau, expected, bound, MUJOCO_LIMIT)
+    figures = worst(tau, expected, bound, MUJOCO_LIMIT)
     return CheckRow("inverse dynamics", MUJOCO, *figures, "the limit is what snapping can do")
 
 
@@ -279,35 +231,3 @@ def _bound(robot: OnCoordinates, angles: Array, states: tuple[Array, Array, Arra
     """(nv,) what the angles can change of each coordinate's torque."""
     bound = torque_bound(robot.free, angles, *robot.on_joints(*states))
     return np.asarray(bound @ np.abs(robot.following.ratios))
-
-
-def _worst(values: Array, expected: Array, bound: Array, share: float = TORQUE_LIMIT) -> tuple[float, float]:
-    """Error and limit, `share` and bound, of the joint that uses most of it, both relative to its largest torque."""
-    scale = _scales(expected)
-    error = np.abs(values - expected).max(axis=0)
-    joint = int(np.argmax(error / (bound + share * scale)))
-    return float(error[joint] / scale[joint]), float(bound[joint] / scale[joint]) + share
-
-
-def _error(values: Array, expected: Array, least: float = 0.0) -> float:
-    """Largest difference relative to the largest magnitude, joint by joint; a matrix as one.
-
-    A joint that does less than NO_TORQUE of the largest torque, such as one with a vertical axis under
-    gravity, is measured against that largest one; where all do less than `least`, against `least` / NO_TORQUE.
-    """
-    if expected.ndim == 3:
-        return float(np.abs(values - expected).max()) / _largest(expected)
-    return float((np.abs(values - expected).max(axis=0) / _scales(expected, least)).max())
-
-
-def _largest(expected: Array) -> float:
-    return max(float(np.abs(expected).max(initial=0.0)), float(np.finfo(float).tiny))
-
-
-def _scales(expected: Array, least: float = 0.0) -> Array:
-    """(nv,) scale that each joint's error is relative to."""
-    overall = _largest(expected)
-    if overall < least:
-        return np.full(expected.shape[-1], least / NO_TORQUE)
-    largest = np.abs(expected).max(axis=0)
-    return np.where(largest > NO_TORQUE * overall, largest, overall)

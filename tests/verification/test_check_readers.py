@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from bundled import ROBOTS
 
-from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
+from psdmc.derivation.provenance import provenance
 from psdmc.robot import dh_chain, urdf_chain
 from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 from psdmc.robot.mechanism import Placement

@@ -9,8 +9,8 @@ import pytest
 from bundled import bundled_model, bundled_robot
 from random_chains import random_chain
 
-from psdmc.compiler import provenance
 from psdmc.derivation.derive import derive_model
+from psdmc.derivation.provenance import provenance
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Expansion
