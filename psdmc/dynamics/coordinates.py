@@ -41,12 +41,5 @@ def gathered_torques(coordinates: Sequence[Coordinate], tau: Sequence[Scalar]) -
     return list(found.values())
 
 
-def gathered_matrix(coordinates: Sequence[Coordinate], matrix: Rows) -> list[list[Scalar]]:
-    """The mass matrix of the coordinates from that of all joints."""
-    rows = [gathered_torques(coordinates, row) for row in matrix]
-    columns = [gathered_torques(coordinates, column) for column in zip(*rows, strict=True)]
-    return [list(row) for row in zip(*columns, strict=True)]
-
-
 def _times(coordinate: Coordinate, value: Scalar) -> Scalar:
     return value if coordinate.ratio == 1.0 else value * coordinate.ratio

@@ -67,7 +67,7 @@ def base_parameters(
     pivots   l, the standard parameter (index into x) that stands first in each equation
     theta_b  (l,) or None while unknown
     """
-    known = list(_known_numbers(_lengths(chain)))
+    known = list(_known_numbers(dh_lengths(chain)))
     values = [None] * len(B) if theta_b is None else theta_b.tolist()
     return tuple(
         _base_parameter(_terms(row, pivot, chain, known), _unit(pivot, chain), value)
@@ -79,22 +79,14 @@ def _base_parameter(terms: tuple[Term, ...], unit: str, value: float | None) -> 
     return BaseParameter(equation(terms), unit, value, terms)
 
 
-def standard_name(index: int) -> str:
-    """Name of entry `index` of x, by joint number: m2, Ixx3, Im1."""
-    return str(_standard_symbol(index))
-
-
-def _standard_symbol(index: int) -> Symbol:
+def standard_symbol(index: int) -> Symbol:
+    """Symbol of entry `index` of x, by joint number: m2, Ixx3, Im1."""
     joint, parameter = divmod(index, PARAMETERS_PER_LINK)
     return Symbol(PARAMETER_NAMES[parameter], joint + 1)
 
 
-def dh_lengths(chain: Mechanism) -> dict[str, float]:
-    """a and d of a DH table by name, zeros left out; empty for a URDF."""
-    return {str(symbol): value for symbol, value in _lengths(chain).items()}
-
-
-def _lengths(chain: Mechanism) -> dict[Symbol, float]:
+def dh_lengths(chain: Mechanism) -> dict[Symbol, float]:
+    """a and d (m) of a DH table by symbol, zeros left out; empty for a URDF."""
     return {
         Symbol(letters, number): value
         for number, joint in enumerate(chain.joints, start=1)
@@ -149,10 +141,10 @@ def _terms(row: Array, pivot: int, chain: Mechanism, known: list[_Known]) -> tup
     others = [int(index) for index in np.flatnonzero(row) if index != pivot]
     pivots_order = _order(pivot, chain)
     found = (
-        _term(float(row[index]), pivots_order - _order(index, chain), _standard_symbol(index), known)
+        _term(float(row[index]), pivots_order - _order(index, chain), standard_symbol(index), known)
         for index in others
     )
-    return (Term(_standard_symbol(pivot)), *found)
+    return (Term(standard_symbol(pivot)), *found)
 
 
 def _term(value: float, order: int, of: Symbol, known: list[_Known]) -> Term:

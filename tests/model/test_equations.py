@@ -10,7 +10,7 @@ from bundled import bundled_model, bundled_robot
 from random_chains import random_chain
 
 from psdmc.derivation.derive import derive_model
-from psdmc.model.equations import base_parameters, dh_lengths, standard_name
+from psdmc.model.equations import base_parameters, dh_lengths, standard_symbol
 from psdmc.robot.mechanism import Mechanism
 
 
@@ -91,7 +91,7 @@ def test_the_drive_inertia_of_a_sliding_joint_is_a_mass() -> None:
 
 
 def test_standard_names() -> None:
-    assert [standard_name(index) for index in (0, 12, 15, 32)] == ["m1", "mx2", "Ixx2", "Im3"]
+    assert [str(standard_symbol(index)) for index in (0, 12, 15, 32)] == ["m1", "mx2", "Ixx2", "Im3"]
 
 
 def test_lengths_whose_squares_are_no_doubles_have_no_name() -> None:

@@ -49,7 +49,7 @@ def coefficient(term: Term, lengths: dict[str, float]) -> float:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_terms_have_the_values_of_B(name: str) -> None:
     model = bundled_model(name)
-    lengths = dh_lengths(model.mechanism)
+    lengths = {str(symbol): value for symbol, value in dh_lengths(model.mechanism).items()}
     found = np.zeros_like(model.B)
     for row, parameter in zip(found, model.base_parameters, strict=True):
         for term in parameter.terms:

@@ -100,7 +100,7 @@ def _positions(
     for k, joint in enumerate(chain.joints):
         reach = float(survey.reach[k])
         bound = max(abs(joint.limits.lower), abs(joint.limits.upper))
-        bound = options.free_position if not np.isfinite(bound) else bound * (1 + options.limit_slack)
+        bound = _allowed(bound, options.free_position, options)
         if not reach > bound:
             continue
         unit = joint.type.position_unit
@@ -116,14 +116,18 @@ def _positions(
     return faults
 
 
+def _allowed(limit: float, free: float, options: CheckOptions) -> float:
+    """A joint's limit with its slack; `free` where the robot has none."""
+    return limit * (1 + options.limit_slack) if np.isfinite(limit) else free
+
+
 def _speeds(
     log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[Fault]:
     faults = []
     for k, joint in enumerate(chain.joints):
         speed = float(survey.speed[k])
-        bound = joint.limits.speed
-        bound = options.free_speed if not np.isfinite(bound) else bound * (1 + options.limit_slack)
+        bound = _allowed(joint.limits.speed, options.free_speed, options)
         if speed > bound:
             faults.append(
                 Fault(
