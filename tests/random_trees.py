@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 from helical import HELICAL, PITCH
 from random_chains import _body, _rotation, _tidy
+from slow_cases import slow_but_for
 
 from psdmc.dynamics.body import Body, body_from_parameters
 from psdmc.dynamics.choices import Choices
@@ -59,8 +60,11 @@ EXACT = 1e-12
 def on_trees(
     kinds: Iterable[str], parents: Iterable[tuple[int, ...]] = TREES.values()
 ) -> pytest.MarkDecorator:
-    """A test of (parents, kinds, parallel) on every tree."""
-    return pytest.mark.parametrize(("parents", "kinds", "parallel"), list(product(parents, kinds, PARALLEL)))
+    """A test of (parents, kinds, parallel) on every tree; quick: every tree with every kinds, each with one `parallel`."""
+    pairs = list(product(parents, kinds))
+    quick = [(*pair, PARALLEL[k % len(PARALLEL)]) for k, pair in enumerate(pairs)]
+    every = [(*pair, parallel) for pair in pairs for parallel in PARALLEL]
+    return pytest.mark.parametrize(("parents", "kinds", "parallel"), slow_but_for(quick, every, spread=True))
 
 
 def columns(values: Iterable[object], count: int = COUNT) -> np.ndarray:

@@ -6,8 +6,6 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 from psdmc import errors
 
 PACKAGE = Path(errors.__file__).parent
@@ -23,11 +21,14 @@ def without_hint(source: str) -> Iterator[int]:
                 yield node.lineno
 
 
-@pytest.mark.parametrize(
-    "path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE))
-)
-def test_it_has_a_hint(path: Path):
-    assert [f"{path.name}:{line}" for line in without_hint(path.read_text(encoding="utf-8"))] == []
+def test_it_has_a_hint():
+    sources = sorted(PACKAGE.rglob("*.py"))
+    assert [
+        f"{path.relative_to(PACKAGE)}:{line}"
+        for path in sources
+        for line in without_hint(path.read_text(encoding="utf-8"))
+    ] == []
+    assert len(sources) > 300
 
 
 def test_one_without_is_seen():

@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pinocchio as pin
 import pytest
+from slow_cases import slow_but_for
 
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.tangent_steps import _coefficients, step_slopes
@@ -55,7 +56,7 @@ def exact(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("joint", TYPES, ids=lambda joint: joint.word)
+@pytest.mark.parametrize("joint", slow_but_for([FREE, PLANAR], TYPES), ids=lambda joint: joint.word)
 def test_they_are_the_series_of_the_group(joint, size: float) -> None:
     rng = np.random.default_rng(4)
     places = [(*linear, *angular).index(1.0) for linear, angular in joint.twists]

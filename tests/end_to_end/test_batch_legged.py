@@ -61,6 +61,7 @@ def test_from_numpy_on_one_and_on_two_threads(
     assert all(float(ns) > 0.0 for _, _, ns in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
 def test_in_c_as_rows_and_lane_by_lane(from_python, tmp_path: Path) -> None:
     model = derive(from_python.solo12(), floating=True)

@@ -36,9 +36,10 @@ def lines(said: str) -> list[str]:
 # Ctrl-C
 
 INTERRUPTED = "error: interrupted\n"
+LOADING = [["derive", SCARA], ["calibrate", "m.npz", "log.csv", "-o", "x.npz"]]
 
 
-@pytest.mark.parametrize("command", [["derive", SCARA], ["calibrate", "m.npz", "log.csv", "-o", "x.npz"]])
+@pytest.mark.parametrize("command", slow_but_for(LOADING[:1], LOADING))
 def test_ctrl_c_while_modules_load_is_one_line(command: list[str], tmp_path: Path):
     """Sent as soon as psdmc's own first module is there, and ever later: Python's own start cannot be helped."""
     seen = set()
@@ -117,14 +118,17 @@ def into(target: str, *words: object, **more: str) -> subprocess.CompletedProces
         )
 
 
-@pytest.mark.parametrize("words", [["show"], ["show", "--terms"], ["check"]])
+WRITING = [["show"], ["show", "--terms"], ["check"]]
+
+
+@pytest.mark.parametrize("words", slow_but_for(WRITING[:2], WRITING))
 def test_a_full_output_is_one_line(words: list[str], model: Path):
     done = into("/dev/full", words[0], model, *words[1:])
     assert done.stderr == "error: standard output: No space left on device\n"
     assert done.returncode == 4
 
 
-@pytest.mark.parametrize("words", [["show"], ["show", "--terms"], ["check"]])
+@pytest.mark.parametrize("words", slow_but_for(WRITING[:2], WRITING))
 def test_a_closed_output_is_no_error(words: list[str], model: Path):
     with subprocess.Popen(
         [*PSDMC, words[0], str(model), *words[1:]], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

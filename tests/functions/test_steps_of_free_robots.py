@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 from against_pinocchio import WHOLE
 from fifty_digits import fifty_digit_jacobian
+from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 from wide_robots import KINDS, is_pinocchios, wide_robot
 
@@ -50,8 +51,11 @@ SECONDS = 10.0
 COUNT = 8
 
 
-@pytest.mark.parametrize("name", ["small", "hand"])
-@pytest.mark.parametrize("function", ["semi_implicit_euler", "rk4_step"])
+STEPS = [(function, name) for function in ("semi_implicit_euler", "rk4_step") for name in ("small", "hand")]
+QUICK = [("semi_implicit_euler", "small"), ("rk4_step", "hand")]
+
+
+@pytest.mark.parametrize(("function", "name"), slow_but_for(QUICK, STEPS, spread=True))
 def test_a_step_is_pinocchios(function: str, name: str) -> None:
     """Random trees' mass matrices are conditioned badly: relative to the accelerations' largest entry."""
     is_pinocchios(function, name, exact=1e-9, in_c=False)
@@ -87,7 +91,7 @@ def test_the_steps_jacobians_are_difference_quotients_along_the_tangents(name: s
         np.testing.assert_allclose(whole[:, :, j], slope, atol=1e-6 * np.abs(whole[:, :, j]).max())
 
 
-@pytest.mark.parametrize("name", ["two", "pair"])
+@pytest.mark.parametrize("name", slow_but_for(["two"], ["two", "pair"]))
 def test_a_runge_kutta_steps_jacobians_are_its_slopes_at_fifty_digits(name: str) -> None:
     """Coordinate by coordinate; what these have to do with tangents is asked of Pinocchio, at both ends."""
     own, dt = wide_robot(name), 0.2

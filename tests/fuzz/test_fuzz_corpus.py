@@ -21,6 +21,9 @@ KNOWN = json.loads(OWED.read_text(encoding="utf-8"))
 """Strict xfails: who mends one removes its line."""
 
 
+LONG = {"dh/tooslow-derive-reduce-reflect-53c8df.toml"}
+"""Which `make test` leaves to `make test-slow`: seconds each."""
+
 FATAL = ("SIG", "Exit", "Hang", "TooSlow")
 """Ways to end that a test run does not wait for."""
 
@@ -30,6 +33,7 @@ def entries() -> Iterator[object]:
         name = str(path.relative_to(CORPUS))
         fatal = KNOWN.get(name, "").startswith(FATAL)
         marks = [pytest.mark.xfail(strict=True, run=not fatal, reason=KNOWN[name])] if name in KNOWN else []
+        marks += [pytest.mark.slow] if name in LONG else []
         yield pytest.param(path, id=name, marks=marks)
 
 

@@ -241,6 +241,7 @@ def test_formats_are_chosen_by_beginning():
         chosen("x")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["mutate", "atheris"])
 def test_a_run_from_end_to_end(engine: str, tmp_path: Path):
     if engine == "atheris":

@@ -38,7 +38,7 @@ AT_MOST = {
 """Multiplications and additions: bars for ANYmal; for the others what this took, rounded up."""
 
 on_whole = pytest.mark.parametrize(("name", "floating"), WHOLE)
-on_each = pytest.mark.parametrize(("name", "floating"), ROBOTS)
+on_each = pytest.mark.parametrize(("name", "floating"), slow_but_for(WHOLE, ROBOTS, spread=True))
 
 
 def run(name: str, floating: bool, function: str, **given: np.ndarray) -> np.ndarray:

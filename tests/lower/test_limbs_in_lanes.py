@@ -14,7 +14,7 @@ from limbed import FUNCTIONS, SHAPES, kernels, limbed, shape
 from mimic_trees import as_urdf
 from random_trees import RandomTree
 from slow_cases import slow_but_for
-from whole_robots import ROBOTS, derived, lowered
+from whole_robots import ROBOTS, WHOLE, derived, lowered
 
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.frames import BASE
@@ -101,7 +101,7 @@ def counted_without_cutting(
     return worth_something(cost_of_limbs(recipe, arrangement, search.robot, groups)[1])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     seed=some.integers(0, 10_000),
     trunk=some.sampled_from(["", "F", "R", "FR", "SR"]),
@@ -137,7 +137,7 @@ def test_any_equal_limbs(
         )
 
 
-@pytest.mark.parametrize(("name", "floating"), ROBOTS)
+@pytest.mark.parametrize(("name", "floating"), slow_but_for(WHOLE, ROBOTS, spread=True))
 def test_real_robots_limbs_run_in_lanes_and_agree_with_pinocchio(name: str, floating: bool) -> None:
     theirs, model = derived(name, floating)
     made = lowered(name, floating)

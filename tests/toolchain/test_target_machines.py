@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from c_warnings import EXTRA, STRICT
 from direct import write_sources
+from slow_cases import slow_but_for
 from traced import arm_package
 
 import psdmc
@@ -82,7 +83,10 @@ def run(*words: str | Path) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("name", ["native", "scalar", "x86-64-v2", "x86-64-v3", "x86-64-v4"])
+OF_THIS_MACHINE = ["native", "scalar", "x86-64-v2", "x86-64-v3", "x86-64-v4"]
+
+
+@pytest.mark.parametrize("name", slow_but_for(["native", "scalar", "x86-64-v3"], OF_THIS_MACHINE))
 def test_every_target_that_this_machine_is_gives_the_models_results(
     two_link: DynamicsModel, name: str
 ) -> None:

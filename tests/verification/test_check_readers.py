@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bundled import ROBOTS
+from slow_cases import slow_but_for
 
 from psdmc.derivation.derive import derive_model
 from psdmc.derivation.provenance import provenance
@@ -134,8 +135,13 @@ URDF_MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("make", [oblique, rounded])
-@pytest.mark.parametrize("mistake", URDF_MISTAKES)
+URDF_CASES = [(make, mistake) for make in (oblique, rounded) for mistake in URDF_MISTAKES]
+
+
+@pytest.mark.parametrize(
+    ("make", "mistake"),
+    slow_but_for([*URDF_CASES[: len(URDF_MISTAKES)], URDF_CASES[-1]], URDF_CASES, spread=True),
+)
 def test_a_mistake_in_placing_a_urdfs_joints_is_noticed(make, mistake: str, monkeypatch) -> None:
     monkeypatch.setattr(urdf_chain, *URDF_MISTAKES[mistake])
 
@@ -196,7 +202,7 @@ def shifted_row(real):
 dh_about = dh_chain.about
 
 
-@pytest.mark.parametrize("make", [kr6, modified])
+@pytest.mark.parametrize("make", slow_but_for([modified], [kr6, modified]))
 @pytest.mark.parametrize("mistake", ["twist", "turn", "offset", "convention"])
 def test_a_mistake_in_placing_a_dh_tables_joints_is_noticed(make, mistake: str, monkeypatch) -> None:
     if mistake == "convention":

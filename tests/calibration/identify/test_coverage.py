@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy import signal
+from slow_cases import slow_but_for
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_campaign, calibrate_logs
 from psdmc.calibration.campaign_file import read_campaign
@@ -64,8 +65,12 @@ def with_outliers(rng: np.random.Generator, shape: tuple[int, int]) -> np.ndarra
     return rng.standard_normal(shape) * np.where(large, 5.0, 1.0)
 
 
-@pytest.mark.parametrize("errors", [normal, with_outliers])
-@pytest.mark.parametrize("method", ["wls", "irls"])
+OF_EACH = [(method, errors) for method in ("wls", "irls") for errors in (normal, with_outliers)]
+
+
+@pytest.mark.parametrize(
+    ("method", "errors"), slow_but_for([("wls", normal), ("irls", with_outliers)], OF_EACH, spread=True)
+)
 def test_standard_deviations_are_those_of_the_errors(method: Method, errors: Errors):
     """White errors of a linear fit: what is printed is the spread of the estimates, also where outliers count less. It
     may be 7 % too large, as no widening is ever below one. Of normal errors 68.27 % lie within one standard deviation and
@@ -103,7 +108,10 @@ def within_three(
     return [abs(value - true) < 3 * std for value, std, true in rows]
 
 
-@pytest.mark.parametrize("times", [(0.0,), (0.1,), (0.0, 1.0), (0.02, 0.3, 3.0)])
+MEMORIES = [(0.0,), (0.1,), (0.0, 1.0), (0.02, 0.3, 3.0)]
+
+
+@pytest.mark.parametrize("times", slow_but_for([(0.0,), (0.02, 0.3, 3.0)], MEMORIES))
 def test_one_log_with_coloured_noise(arm, times: tuple[float, ...]):
     """Twelve seeds each: torques by Pinocchio, friction by its formula, noise of one or several time scales."""
     time = np.arange(int(60 * RATE)) / RATE

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shared_data import UR10_LOG
+from slow_cases import slow_but_for
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_logs
 from psdmc.calibration.identify.predictor import ChainRegressor
@@ -53,6 +54,8 @@ WRONG = {
         "shoulder_lift_joint and elbow_joint look swapped (position and effort)",
     ),
 }
+QUICK = ["negated", "amperes", "lift's effort turned", "lift's position turned", "joints swapped"]
+"""Of every way to be wrong one; the others are further joints, a further factor, and efforts alone."""
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +87,7 @@ def test_the_log_as_it_is_can_be_used(model, log):
     assert visible == ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"]
 
 
-@pytest.mark.parametrize("kind", WRONG)
+@pytest.mark.parametrize("kind", slow_but_for(QUICK, WRONG))
 def test_a_wrong_log_cannot_and_the_cause_is_named(model, log, kind: str):
     spoil, words = WRONG[kind]
 
@@ -94,7 +97,7 @@ def test_a_wrong_log_cannot_and_the_cause_is_named(model, log, kind: str):
     assert any(words in suspect for suspect in found.suspects)
 
 
-@pytest.mark.parametrize("seconds", [3.0, 5.0])
+@pytest.mark.parametrize("seconds", slow_but_for([3.0], [3.0, 5.0]))
 def test_a_piece_of_it_has_too_few_samples(model, log, seconds: float):
     found = verdict_on(model, log.between(0.0, seconds))
 

@@ -61,10 +61,14 @@ def _name(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-@pytest.mark.parametrize("path", sources(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_no_file_asks_a_joint_what_kind_it_is(path: Path) -> None:
-    lines = list(questions(ast.parse(path.read_text(encoding="utf-8"))))
-    assert not lines, f"{path.relative_to(PACKAGE)}, lines {lines}: use what the joint's type gives"
+def test_no_file_asks_a_joint_what_kind_it_is() -> None:
+    asked = {
+        str(path.relative_to(PACKAGE)): lines
+        for path in sources()
+        if (lines := list(questions(ast.parse(path.read_text(encoding="utf-8")))))
+    }
+    assert asked == {}, "use what the joint's type gives"
+    assert len(sources()) > 300
 
 
 @pytest.mark.parametrize(
