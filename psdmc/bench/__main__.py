@@ -20,6 +20,7 @@ START = time.perf_counter()
 
 
 def main() -> int:
+    """Run the benchmark as the command line says; the exit status."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench", description=__doc__)
     parser.add_argument("names", nargs="*", help="standard robots; all where none is named")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="trials that count (default %(default)s)")

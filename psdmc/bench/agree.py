@@ -57,4 +57,5 @@ def relative_error(found: Array, expected: Array) -> float:
 
 
 def tolerance(function: str) -> float:
+    """Largest relative difference of a function's outputs that counts as agreement."""
     return SOLVED if RECIPES[function].needs is Needs.POSITIVE_MASS else STRICT

@@ -102,6 +102,7 @@ def _ns(measured: Measurement | None) -> str:
 
 
 def main() -> int:
+    """Print the table of the model that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench.demo", description=__doc__)
     parser.add_argument("model", type=Path, help="model file made by psdmc derive (.npz)")
     options = parser.parse_args()

@@ -89,6 +89,7 @@ def compare(before: Baseline, after: Baseline) -> tuple[str, bool]:
 
 
 def main() -> int:
+    """Compare with the baseline, or save it, as the command line says."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.bench.gate", description=__doc__)
     parser.add_argument("action", choices=("compare", "save"))
     parser.add_argument("names", nargs="*", help="standard robots; all where none is named")

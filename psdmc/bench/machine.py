@@ -39,6 +39,7 @@ class Machine:
 
 
 def this_machine() -> Machine:
+    """This machine, as far as its system tells."""
     return Machine(
         processor=_cpu_line("model name") or platform.processor() or platform.machine(),
         cores=os.cpu_count() or 1,

@@ -8,6 +8,7 @@ PACKAGES = ("psdmc", "numpy", "pin", "casadi", "cmeel-cppadcodegen", "mujoco")
 
 
 def version_of(package: str) -> str:
+    """A package's installed version, in words where it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -15,4 +16,5 @@ def version_of(package: str) -> str:
 
 
 def versions() -> dict[str, str]:
+    """Installed version of each compared package, by its name."""
     return {package: version_of(package) for package in PACKAGES}

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 def megabytes(size: int) -> str:
+    """A size in bytes, in words."""
     return f"{size / 2**20:.1f} MiB"
 
 

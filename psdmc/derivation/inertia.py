@@ -57,6 +57,7 @@ class Moving(NamedTuple):
 
 
 def moving(frame: Frame) -> Moving:
+    """A joint at formal points of its coordinate, one for each factor of degree one."""
     q = formal_coordinate(frame.joint.basis)
     state = JointState(joint_angle(frame, q).turn(), joint_offset(frame, q))
     return Moving(frame.joint.basis, frame, state)
@@ -86,6 +87,7 @@ def column(v: Vector) -> Vector:
 
 
 def expanded(v: Vector, count: int, basis: Basis) -> Vector:
+    """Coefficients of a vector's three entries, given at `count` formal points, in the basis."""
     x, y, z = (coefficients(entry, count, basis) for entry in v)
     return (x, y, z)
 
@@ -99,6 +101,7 @@ def carried_twist(joint: Moving, twist: Twist) -> Twist:
 
 
 def constant_twist(frame: Frame) -> Twist:
+    """The twist of a frame's own joint, as coefficients of the factor 1 alone."""
     linear, angular = own_twist(frame)
     return _as_arrays(linear), _as_arrays(angular)
 

@@ -29,6 +29,7 @@ class Terms(NamedTuple):
 
 
 def no_terms() -> Terms:
+    """An empty list of terms."""
     none = np.zeros(0, dtype=np.int64)
     return Terms(none, none, none, np.zeros(0))
 
@@ -46,6 +47,7 @@ def joined(parts: Sequence[Terms]) -> Terms:
 
 
 def selected(terms: Terms, chosen: NDArray[np.bool_] | Integers) -> Terms:
+    """The terms that a mask or a list of places chooses."""
     row, monomial, column, value = terms
     return Terms(row[chosen], monomial[chosen], column[chosen], value[chosen])
 

@@ -36,6 +36,7 @@ def length_unit(chain: Mechanism) -> float:
 
 
 def in_unit(placement: Placement, unit: float) -> Placement:
+    """A placement with its translation (m) in another unit of length (m)."""
     return Placement(placement.rotation, placement.translation / unit)
 
 

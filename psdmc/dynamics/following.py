@@ -27,6 +27,7 @@ Gather = Callable[[Sequence[Frame], Any], Any]
 
 
 def any_follows(frames: Sequence[Frame]) -> bool:
+    """Whether some joint follows another one's coordinate."""
     return any(frame.follows is not None for frame in frames)
 
 

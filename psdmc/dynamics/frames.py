@@ -134,6 +134,7 @@ def as_matrix(values: Sequence[Sequence[float]]) -> Matrix:
 
 
 def as_vector(values: Sequence[float]) -> Vector:
+    """Three numbers as a vector of Python floats, which symbols take as constants."""
     x, y, z = (float(v) for v in values)
     return (x, y, z)
 
@@ -155,6 +156,7 @@ def what_follows(chain: Mechanism, i: int) -> tuple[int, float, float] | None:
 
 
 def frame_at(joint: JointType, parent: int, placement: Placement) -> Frame:
+    """A joint frame that is placed so in its parent's."""
     rotation = as_matrix(placement.rotation.tolist())
     return Frame(joint, parent, rotation, as_vector(placement.translation.tolist()))
 
@@ -172,10 +174,12 @@ def base_acceleration(chain: Mechanism) -> Vector:
 
 
 def outward(turn: Turn | Rotation | None, v: Vector) -> Vector:
+    """A vector along the axes before the turn, along those after it; None: no turn."""
     return v if turn is None else turn.outward(v)
 
 
 def inward(turn: Turn | Rotation | None, v: Vector) -> Vector:
+    """A vector along the axes after the turn, along those before it; None: no turn."""
     return v if turn is None else turn.inward(v)
 
 
@@ -238,4 +242,5 @@ def to_previous(frame: Frame, v: Vector) -> Vector:
 
 
 def from_previous(frame: Frame, v: Vector) -> Vector:
+    """A vector along the parent's axes, along this frame's before its joint's turn."""
     return v if frame.is_parallel else rotated(frame.outward_rows, v)

@@ -27,18 +27,22 @@ Fixed = tuple[Terms, Terms, Terms]
 
 
 def add(a: Vector, b: Vector) -> Vector:
+    """a + b"""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def scale(a: Vector, factor: Scalar) -> Vector:
+    """k v"""
     return (a[0] * factor, a[1] * factor, a[2] * factor)
 
 
 def dot(a: Vector, b: Vector) -> Scalar:
+    """a . b"""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
+    """a x b"""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
@@ -48,6 +52,7 @@ def transform(rows: Matrix, v: Vector) -> Vector:
 
 
 def transpose(rows: Matrix) -> Matrix:
+    """The transposed matrix."""
     return (
         (rows[0][0], rows[1][0], rows[2][0]),
         (rows[0][1], rows[1][1], rows[2][1]),
@@ -56,6 +61,7 @@ def transpose(rows: Matrix) -> Matrix:
 
 
 def multiply(a: Matrix, b: Matrix) -> Matrix:
+    """a @ b"""
     columns = transpose(b)
     product = tuple(tuple(dot(row, column) for column in columns) for row in a)
     return product  # type: ignore[return-value]

@@ -87,6 +87,7 @@ def solve(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
 
 
 def inner_product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
+    """a . b, of vectors of equal length."""
     total: Scalar = 0.0
     for x, y in zip(a, b, strict=True):
         total = total + x * y

@@ -51,11 +51,13 @@ def without_products(sizes: Mapping[str, int], products: Sequence[Multiplication
 
 
 def unread(program: Program, inputs: Sequence[str]) -> tuple[str, ...]:
+    """Inputs that the PROGRAM never reads, by name."""
     read = {slot.vector for slot in program.inputs()}
     return tuple(name for name in inputs if name not in read)
 
 
 def has_roots(program: Program) -> bool:
+    """Whether the PROGRAM takes square roots."""
     return any(instr.op is Op.SQRT for instr in program)
 
 

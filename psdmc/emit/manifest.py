@@ -57,6 +57,7 @@ def _target(target: Target) -> dict[str, Any]:
 
 
 def digest(text: str) -> str:
+    """SHA-256 of a text as UTF-8, in hexadecimal digits."""
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 

@@ -24,6 +24,7 @@ _UNIFORM = frozenset({"theta_b", KEPT_REALS})
 
 
 def is_long(program: Program, sizes: Mapping[str, int]) -> bool:
+    """Whether a PROGRAM is cut into parts: by its operations and the entries that it stores (`sizes` by vector)."""
     operations = sum(bool(instr.args) for instr in program)
     return operations + sum(sizes.values()) > LONG
 

@@ -37,10 +37,12 @@ def inertial_element(body: Body) -> Element | None:
 
 
 def origin_element(place: Placement) -> Element:
+    """<origin> of a placement."""
     return Element("origin", xyz=exact(place.translation), rpy=exact(roll_pitch_yaw_of(place.rotation)))
 
 
 def dynamics_element(friction: JointFriction) -> Element:
+    """<dynamics> of a joint's friction."""
     return Element("dynamics", damping=exact([friction.damping]), friction=exact([friction.constant]))
 
 
@@ -76,6 +78,7 @@ def fixed_link(robot: Element, frame: NamedFrame, parent: str) -> None:
 
 
 def fixed_joint(robot: Element, child: str, parent: str, place: Placement) -> None:
+    """Add a fixed joint to the robot; its name is the child's, unless another joint has that."""
     joint = SubElement(robot, "joint", name=free_joint_name(robot, f"{child}_fixed"), type="fixed")
     joint.append(origin_element(place))
     SubElement(joint, "parent", link=parent)
@@ -83,6 +86,7 @@ def fixed_joint(robot: Element, child: str, parent: str, place: Placement) -> No
 
 
 def free_joint_name(robot: Element, name: str) -> str:
+    """The name, with underscores behind it while another joint has it."""
     used = {joint.get("name") for joint in robot.findall("joint")}
     while name in used:
         name += "_"

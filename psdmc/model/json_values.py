@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 
 def record(value: object, what: str) -> dict[str, Any]:
+    """A JSON object, whose keys are not checked."""
     if not isinstance(value, dict):
         raise _wrong(value, what, "named values")
     return value
@@ -37,12 +38,14 @@ def entries(value: object, what: str, most: int) -> list[Any]:
 
 
 def text(value: object, what: str) -> str:
+    """A string."""
     if not isinstance(value, str):
         raise _wrong(value, what, "a text")
     return value
 
 
 def flag(value: object, what: str) -> bool:
+    """True or false."""
     if not isinstance(value, bool):
         raise _wrong(value, what, "true or false")
     return value

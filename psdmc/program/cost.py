@@ -38,6 +38,7 @@ class Cost:
 
 
 def cost(program: Program) -> Cost:
+    """Operations of the PROGRAM by kind; `fused` counts the sums of which a term is a product without another use."""
     body, uses = program.body, program.uses()
     mul = add = div = neg = fused = 0
     angles: set[int] = set()

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 
 class Op(StrEnum):
+    """Operations of a PROGRAM's instructions; their words are those of its text form."""
+
     LOAD = "load"
     CONST = "const"
     ADD = "add"

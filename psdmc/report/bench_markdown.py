@@ -67,6 +67,7 @@ def _cell(case: CaseResult, function: str, layout: str) -> str:
 
 
 def main() -> int:
+    """Print the table of the result that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.report.bench_markdown", description=__doc__)
     parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
     parser.add_argument("--command", default="make bench", help="what is said to have made it")

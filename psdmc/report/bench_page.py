@@ -110,6 +110,7 @@ def read_result(path: Path) -> BenchResult:
 
 
 def main() -> int:
+    """Write the page of the result that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m psdmc.report.bench_page", description=__doc__)
     parser.add_argument("result", type=Path, help="JSON of python -m psdmc.bench or psdmc bench")
     parser.add_argument("page", type=Path, help="HTML to write")

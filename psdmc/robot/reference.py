@@ -198,4 +198,5 @@ def reference(loaded: LoadedRobot, *, snapped: bool = True, parameters: Array | 
 
 
 def pinocchio_version() -> str:
+    """The version of the Pinocchio that is loaded."""
     return str(pinocchio.__version__)

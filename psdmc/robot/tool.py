@@ -19,4 +19,5 @@ def tool_in_tip(tool: Sequence[float]) -> Placement:
 
 
 def tool_frame(tip: NamedFrame, tool: Sequence[float]) -> NamedFrame:
+    """The frame 'tool', given by x y z (m), roll pitch yaw (rad) in the tip's."""
     return NamedFrame(TOOL, tip.joint, tip.placement @ tool_in_tip(tool))

@@ -96,6 +96,7 @@ def _is_ours(status: os.stat_result) -> bool:
 
 
 def unusable(place: Path, error: OSError) -> ToolchainError:
+    """The error for a cache folder that cannot be written to."""
     return ToolchainError(f"{place}: cannot write to the compile cache: {error.strerror or error}", _choose())
 
 

@@ -156,6 +156,7 @@ def pinocchio_prefix() -> Path:
 
 
 def includes(prefix: Path) -> tuple[str, ...]:
+    """Compiler options for the headers of the wheels installed at `prefix`."""
     return ("-isystem", str(prefix / "include"), "-isystem", str(prefix / "include/eigen3"))
 
 

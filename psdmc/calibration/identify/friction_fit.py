@@ -67,6 +67,7 @@ class JointFriction:
 
 
 def unknowns_of(found: JointFriction) -> Array:
+    """(10,) the unknowns of a fit at its result: seven of LuGre as the fit has them, then inertia, offset and delay."""
     f = found.friction
     peak, log_speed, log_stiffness = f.static - f.coulomb, np.log(f.stribeck_velocity), np.log(f.stiffness)
     seven = (f.coulomb, peak, log_speed, f.viscous, f.viscous_exponent, log_stiffness, f.damping)

@@ -127,6 +127,7 @@ def write_parquet(columns: Mapping[str, Array], path: Path) -> None:
 
 
 def parquet_module() -> Any:
+    """pyarrow's module for Parquet; InputError where it is not installed."""
     try:
         import pyarrow.parquet
     except ImportError as error:

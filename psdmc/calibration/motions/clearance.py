@@ -125,6 +125,7 @@ def floor_points(chain: Mechanism, height: float) -> FloorPoints:
 
 
 def touch(pair: tuple[str, str], pose: Array) -> str:
+    """The pair of links that comes too close at a pose (n,), in words."""
     angles = ", ".join(f"{value:.2f}" for value in pose)
     return f"{' and '.join(pair)} come within {1000 * APART:g} mm of each other at q = ({angles})"
 

@@ -69,6 +69,7 @@ def swept_range(joint: Joint, share: float) -> tuple[float, float]:
 
 
 def sweep_speed(joint: Joint, share: float) -> float:
+    """rad/s or m/s: a share of the joint's speed limit, of 2 where it has none."""
     return share * (joint.limits.speed if np.isfinite(joint.limits.speed) else 2.0)
 
 

@@ -35,12 +35,14 @@ def unit_of(joint: Joint, turning: str) -> str:
 
 
 def by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:
+    """Values (n,) by their joints' names."""
     return dict(zip(model.joint_names, values.tolist(), strict=True))
 
 
 def parameter_rows(
     model: DynamicsModel, theta: Array, std: Array, groups: list[str], seen: Visibility
 ) -> tuple[ParameterRow, ...]:
+    """One row for each base parameter: theta and std (l,), the group of each, and what the data show of it."""
     return tuple(
         ParameterRow(
             name=f"theta_{k + 1}",

@@ -99,6 +99,7 @@ def source(robot: str, real: str, kernels: Sequence[KernelView]) -> str:
 
 
 def casadi_view(robot: str, real: str, every: Sequence[KernelView]) -> CasadiView:
+    """What CasADi's adapter prints of these kernels. InputError for float, and where theta_b is unknown."""
     if real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
     kernels = {kernel.name: kernel for kernel in every if not kernel.theta}

@@ -23,6 +23,7 @@ MOST_SPEEDS = 6
 
 
 def name_of(speed: float) -> str:
+    """Name of the value that belongs to one speed (rad/s or m/s), in records."""
     return f"stribeck_{float(speed)!r}"
 
 
