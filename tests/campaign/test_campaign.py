@@ -163,6 +163,7 @@ def test_a_random_robot_lowered_and_compiled(mixed: bool, tmp_path, monkeypatch:
     assert_right_when_lowered(seed)
 
 
+@pytest.mark.slow
 def test_a_random_tree_lowered_and_compiled(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A free root, and joints that follow others."""
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))

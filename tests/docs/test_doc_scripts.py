@@ -8,13 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from slow_cases import slow_but_for
 
 import psdmc
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
-@pytest.mark.parametrize("script", ["verdicts.py", "long_log.py", "excitation.py"])
+SCRIPTS = ["verdicts.py", "long_log.py", "excitation.py"]
+
+
+@pytest.mark.parametrize("script", slow_but_for(SCRIPTS[:1], SCRIPTS))
 def test_a_script_of_the_documents_starts(script: str):
     done = subprocess.run(
         [sys.executable, str(DOCS / script), "--help"], capture_output=True, text=True, check=False

@@ -11,6 +11,7 @@ from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
+from slow_cases import slow_but_for
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -81,7 +82,7 @@ def test_extras_that_documents_name_exist() -> None:
     assert found <= set(EXTRAS)
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", slow_but_for(NOTEBOOKS[:1], NOTEBOOKS), ids=lambda path: path.stem)
 def test_what_is_told_to_install_is_enough_for_a_notebook(path: Path) -> None:
     command = re.search(
         r"`pip install ('psdmc\[[^`]*jupyterlab)`", (ROOT / "examples" / "README.md").read_text("utf-8")

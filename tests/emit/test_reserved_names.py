@@ -10,6 +10,7 @@ from pathlib import Path
 
 import platform_names
 import pytest
+from slow_cases import slow_but_for
 from small import pendulum, pendulum_info
 
 from psdmc.emit.names import RESERVED, identifier, is_reserved
@@ -82,8 +83,15 @@ def headers(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     return folder, _headers(dict.fromkeys(names), folder)
 
 
-@pytest.mark.parametrize("order", ["package first", "system first"])
-@pytest.mark.parametrize(("compiler", "kind"), [("gcc", "h"), ("g++", "hpp"), ("clang++", "hpp")])
+COMPILED = [
+    (compiler, kind, order)
+    for compiler, kind in (("gcc", "h"), ("g++", "hpp"), ("clang++", "hpp"))
+    for order in ("package first", "system first")
+]
+QUICK = [("gcc", "h", "package first"), ("g++", "hpp", "system first")]
+
+
+@pytest.mark.parametrize(("compiler", "kind", "order"), slow_but_for(QUICK, COMPILED, spread=True))
 def test_headers_compile_beside_all_system_headers(
     compiler: str, kind: str, order: str, headers: tuple[Path, list[str]], tmp_path: Path
 ) -> None:

@@ -44,9 +44,9 @@ SINGLE = ("scara", *(("kr6",) if WHOLE else ()), "sliding")
 COMPILED = {("scara", "float64"), (ARM, "float64"), ("sliding", "float64"), ("sliding", "float32")}
 """Robots and precisions whose long functions are compiled; of other robots their PROGRAMs are interpreted."""
 
-OPTIMISED = COMPILED if WHOLE else {("two_link", "float64"), ("scara", "float32")}
-"""Libraries that are compiled as psdmc.compile does, the others without optimisation: one of each precision shows what a
-compiler makes of each function's C, all show what the C says."""
+OPTIMISED = COMPILED if WHOLE else {("two_link", "float64")}
+"""Libraries that are compiled as psdmc.compile does, the others without optimisation: one shows what a compiler makes of
+each function's C, all show what the C says."""
 
 INTERPRETED = ("two_link", *(("Panda",) if WHOLE else ()), "first slides")
 

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 from against_pinocchio import WHOLE
 from pinocchio_robots import path_of
+from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 from wide_robots import KINDS, is_pinocchios, wide_robot
 
@@ -40,7 +41,7 @@ def test_torques_derivatives_are_pinocchios(function: str, name: str) -> None:
     is_pinocchios(function, name, EXACT, in_c=name == "small")
 
 
-@pytest.mark.parametrize("function", ACCELERATIONS)
+@pytest.mark.parametrize("function", slow_but_for(["forward_dynamics_derivatives"], ACCELERATIONS))
 def test_accelerations_derivatives_are_pinocchios(function: str) -> None:
     is_pinocchios(function, "small", SOLVED, in_c=function == "forward_dynamics_derivatives")
 

@@ -7,6 +7,7 @@ import pytest
 from against_pinocchio import ARM, EVERY, bench, matches_pinocchio
 from direct import Direct
 from robots_at_hand import drawn
+from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
 from psdmc.compiler import compile
@@ -24,9 +25,10 @@ def test_they_are_pinocchios(robot: str, real: str) -> None:
     matches_pinocchio("forward_dynamics_derivatives", robot, real)
 
 
-@pytest.mark.parametrize(
-    ("seed", "kinds", "tidy"), [(201, "RRPRR", False), (202, "PRRRR", True), (203, "RRRRRR", False)]
-)
+RANDOM = [(201, "RRPRR", False), (202, "PRRRR", True), (203, "RRRRRR", False)]
+
+
+@pytest.mark.parametrize(("seed", "kinds", "tidy"), slow_but_for(RANDOM[:2], RANDOM, spread=True))
 def test_on_random_robots_the_programs_are_pinocchios(seed: int, kinds: str, tidy: bool) -> None:
     """Those of inverse dynamics too; what sliding joints alone do not feel is zero but for rounding."""
     robot, rng = drawn(seed, kinds, tidy=tidy), np.random.default_rng(seed)

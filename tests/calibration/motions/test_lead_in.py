@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from slow_cases import slow_but_for
 
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions.allowed import Allowed
@@ -83,8 +84,11 @@ def test_what_cannot_begin_at_rest_says_why(arm):
         from_rest_to_rest(motion, arm.model.chain, 1e-1, 1, lambda whole: ["too cold"])
 
 
-@pytest.mark.parametrize("duration", [2.0, 5.0, 10.0])
-@pytest.mark.parametrize("name", ["denso_wall", "kr6", "lbr7"])
+SEARCHES = [(name, duration) for name in ("denso_wall", "kr6", "lbr7") for duration in (2.0, 5.0, 10.0)]
+QUICK = [("denso_wall", 10.0), ("kr6", 5.0), ("lbr7", 2.0)]
+
+
+@pytest.mark.parametrize(("name", "duration"), slow_but_for(QUICK, SEARCHES, spread=True))
 def test_every_one_of_nine_searches_for_the_condition_ends_in_a_run(name: str, duration: float):
     """Motions of LBR7 in 2 s had no lead-in: they start near a limit of position, moving away from it."""
     model = derive_model(load_robot(ROBOTS / f"{name}.toml", drive_inertia=True).chain, expand=False)

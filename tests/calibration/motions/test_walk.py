@@ -88,7 +88,7 @@ def test_a_motion_between_shapes_gets_better_by_it(tmp_path: Path, monkeypatch):
     chain = bounded(model.mechanism, GivenLimits(acceleration=12.0))
     allowed = allowed_of(model, chain, regressor, 0.8, (), 0.2)
     columns = all_columns(regressor, model.l, LinearOptions())
-    options = ExciteOptions(duration=5.0, samples=50, evaluations=400, random=50)
+    options = ExciteOptions(duration=5.0, samples=50, evaluations=120, random=50)
 
     first, again = (excite(chain, columns, options, None, allowed) for _ in range(2))
     monkeypatch.setattr(search, "STEPS_PER_EVALUATION", 0)

@@ -1,0 +1,58 @@
+"""What the command line calls: a model file in, a campaign, its logs, and a calibrated model file out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bundled import bundled_model
+from quick_campaign import QUICK
+
+from psdmc.calibration.simulate_campaign import SimulateOptions
+from psdmc.errors import InputError
+from psdmc.model.load import load
+from psdmc.model.store import save
+from psdmc.report.calibrate_commands import (
+    calibrate_command,
+    excite_command,
+    simulate_command,
+    write_actuators,
+)
+
+
+def test_from_a_model_without_parameters_to_one_with_them(arm, tmp_path: Path):
+    """Of the arm of two joints; `make test-demo` and `make calibrate-demo` take the virtual Denso."""
+    save(arm.unknown, tmp_path / "unknown.npz")
+    folder = tmp_path / "campaign"
+
+    found = excite_command(tmp_path / "unknown.npz", folder, replace(QUICK, repeats=1)).found
+    count = simulate_command(arm.plant, folder, SimulateOptions(ideal_sensors=True))
+    record = calibrate_command(
+        tmp_path / "unknown.npz",
+        [folder],
+        tmp_path / "calibrated.npz",
+        tmp_path / "page.html",
+        actuators=tmp_path / "c",
+    )
+
+    assert found.deviation < found.random_deviation
+    assert count == 2 + 2 + 1 + 2 + 1
+    assert (folder / "excitation.csv").exists()
+    assert (folder / "excitation.svg").read_text(encoding="utf-8").startswith("<svg")
+    calibrated = load(tmp_path / "calibrated.npz")
+    assert calibrated.theta_b is not None
+    assert np.abs(calibrated.theta_b - arm.model.theta_b).max() < 0.05
+    assert "two_link" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert (tmp_path / "page.json").exists()
+    assert sorted(path.name for path in (tmp_path / "c").rglob("*.*")) == [
+        "two_link_actuators.c",
+        "two_link_actuators.h",
+    ]
+    assert len(record.friction) == 14
+
+
+def test_actuators_need_a_calibration(tmp_path: Path):
+    with pytest.raises(InputError, match="two_link: not calibrated"):
+        write_actuators(bundled_model("two_link"), tmp_path)
