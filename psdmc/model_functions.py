@@ -62,7 +62,7 @@ def evaluated(
 ) -> Any:
     """The output, or a named tuple of the outputs, of a function at these states."""
     signature = recipe.signature
-    sizes = _sizes(model)
+    sizes = _sizes(model, recipe)
     lead, given = _states(signature, sizes, inputs)
     _refuse_other_lengths(model, signature, given)
     _admit(model, recipe.name, theta_b is None)
@@ -89,9 +89,10 @@ def _refuse_other_lengths(model: DynamicsModel, signature: Signature, given: Map
             refuse_other_lengths(f"{signature.name}: {quantity.name}", given[quantity.name], units)
 
 
-def _sizes(model: DynamicsModel) -> Sizes:
+def _sizes(model: DynamicsModel, recipe: Recipe) -> Sizes:
     own = len(model.mechanism.own_joints)
-    return Sizes(own, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    kept = len(recipe.packs.places(model.mechanism, model.representative)) if recipe.packs else 0
+    return Sizes(own, model.nq, model.nv, model.l, len(model.mechanism.frames), kept)
 
 
 def _parameters(model: DynamicsModel, signature: Signature, theta_b: ArrayLike | None) -> Array:

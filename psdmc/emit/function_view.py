@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from psdmc.emit.kernel_view import KernelView
-from psdmc.emit.make_kernel_view import make_kernel_view
+from psdmc.emit.make_kernel_view import make_kernel_view, sizes_of
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.products import Multiplication
 from psdmc.errors import InternalError
@@ -67,7 +67,8 @@ def function_views(
     for function in in_order(tuple(functions.values())):
         own = [kernels[name] for name in (function.name, f"{function.name}_theta") if name in kernels]
         shown = tuple(make_kernel_view(kernel, sizes, robot, options) for kernel in own)
-        views.append(FunctionView(function.name, function.meaning, _shape(function, sizes), function, shown))
+        shape = _shape(function, sizes_of(own[0], sizes))
+        views.append(FunctionView(function.name, function.meaning, shape, function, shown))
     return tuple(views)
 
 

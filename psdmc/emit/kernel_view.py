@@ -45,6 +45,7 @@ class KernelView:
     limbs        a further body for one state; None where there is none
     positive     what must be positive and is not put out; None where there is no such thing
     pivot_order  its entries in the order in which they are found
+    places       of a packed matrix: (row, column) of each entry
     """
 
     name: str
@@ -62,6 +63,7 @@ class KernelView:
     cost: Cost
     lowering: str
     limbs: LimbsView | None = None
+    places: tuple[tuple[int, int], ...] = ()
 
     @property
     def pivots_in_loop(self) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from psdmc.emit.body import make_body
 from psdmc.emit.kernel_view import KernelView, OutputView, VectorView
 from psdmc.emit.limbs import LimbsView, limbs_view
@@ -23,7 +25,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
 
     robot   identifier that the C functions' names start with
     """
-    function = _checked(kernel.function)
+    function, sizes = _checked(kernel.function), sizes_of(kernel, sizes)
     has_lanes = options.target.has_batches and not _is_by_state(kernel, sizes)
     outputs = tuple(
         OutputView(
@@ -59,7 +61,13 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         cost=cost(kernel.single),
         lowering=kernel.lowering,
         limbs=_limbs(kernel, sizes, options),
+        places=kernel.places,
     )
+
+
+def sizes_of(kernel: Kernel, sizes: Sizes) -> Sizes:
+    """The robot's sizes, with the number of entries that this kernel puts out where it packs a matrix."""
+    return replace(sizes, nonzeros=len(kernel.places))
 
 
 def _limbs(kernel: Kernel, sizes: Sizes, options: EmitOptions) -> LimbsView | None:
@@ -126,7 +134,7 @@ def _body(
     """The body. Large outputs are stored as they are computed, as keeping them all until the end would spill them."""
     sizes = {output.name: output.size for output in outputs}
     suffix = "" if options.real == "float64" else "f"
-    has_matrix = any(len(output.shape) > 1 for output in outputs)
+    has_matrix = any(output.is_matrix for output in kernel.function.outputs)
     direct = tuple(output.name for output in outputs if output.direct)
     products = kernel.function.products if kernel.before else ()
     in_lines = bool(products) and has_lanes  # lanes' products take values from the lines before them
@@ -141,7 +149,7 @@ def _zero(output: Quantity, program: Program, sizes: Sizes) -> tuple[int, ...]:
 
 
 def _is_direct(output: Quantity, sizes: Sizes) -> bool:
-    return len(output.axes) > 1 and sizes.size(output) >= GROUP
+    return output.is_matrix and sizes.size(output) >= GROUP
 
 
 def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:

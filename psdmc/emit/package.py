@@ -69,10 +69,9 @@ class PackageView:
 
     @property
     def patterns(self) -> tuple[Pattern, ...]:
-        """Of sparse matrices; a serial chain's zeros are few, and its package has no such tables."""
-        if not self.info.is_tree:
-            return ()
-        return tuple(pattern for pattern in patterns(self.functions) if pattern.is_sparse)
+        """Of packed matrices, and of trees' sparse ones: a serial chain's zeros are few."""
+        found = patterns(self.functions)
+        return tuple(each for each in found if each.is_packed or (self.info.is_tree and each.is_sparse))
 
     @property
     def l(self) -> int:  # noqa: E743

@@ -13,18 +13,16 @@ from psdmc.emit.tables import Table
 class Pattern:
     """The entries of a function's matrix that may differ from zero, row by row.
 
-    function  name of the function, whose one output is the matrix
-    shape     rows and columns
-    places    (row, column) of each
+    function   name of the function, whose one output is the matrix
+    places     (row, column) of each
+    is_packed  whether these entries are all that it puts out
+    is_sparse  whether the matrix has others
     """
 
     function: str
-    shape: tuple[int, int]
     places: tuple[tuple[int, int], ...]
-
-    @property
-    def is_sparse(self) -> bool:
-        return len(self.places) < self.shape[0] * self.shape[1]
+    is_packed: bool
+    is_sparse: bool
 
     @property
     def macro(self) -> str:
@@ -44,16 +42,20 @@ class Pattern:
 
 
 def patterns(functions: Sequence[FunctionView]) -> Iterator[Pattern]:
-    """Of every function that puts out one matrix.
+    """Of every function that puts out one matrix, packed or not.
 
-    An entry is left out where every kernel of the function, with parameters compiled in and given at run time, has the
-    constant zero in its place.
+    An entry of one that is not is left out where every kernel of the function, with parameters compiled in and given at
+    run time, has the constant zero in its place.
     """
     for function in functions:
+        if function.kernels[0].places:
+            yield Pattern(function.name, function.kernels[0].places, is_packed=True, is_sparse=True)
+            continue
         outputs = [kernel.outputs for kernel in function.kernels]
         if len(outputs[0]) != 1 or len(outputs[0][0].shape) != 2:
             continue
         rows, columns = outputs[0][0].shape
         zero = set.intersection(*(set(of_kernel.zero) for (of_kernel,) in outputs))
         kept = (k for k in range(rows * columns) if k not in zero)
-        yield Pattern(function.name, (rows, columns), tuple(divmod(k, columns) for k in kept))
+        places = tuple(divmod(k, columns) for k in kept)
+        yield Pattern(function.name, places, is_packed=False, is_sparse=bool(zero))

@@ -17,6 +17,7 @@ from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
 from psdmc.lower.limb_search import LimbSearch
 from psdmc.lower.loops import in_loops
+from psdmc.lower.packed import packed
 from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
 from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
@@ -25,7 +26,7 @@ from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.products import written_out
 from psdmc.program.program import Program
 from psdmc.progress import Step
-from psdmc.recipes.recipe import Recipe
+from psdmc.recipes.recipe import Packing, Recipe
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.mechanism import Mechanism
 from psdmc.target.costs import Costs
@@ -138,8 +139,25 @@ class _Lowered:
         self._searches: dict[bool, Search] = {}
         self._arrangements: dict[tuple[str, bool], Arrangement] = {}
         self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
+        self._kernels: dict[tuple[str, bool], Kernel] = {}
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
+        """The kernel of one function, made once: another one may be a part of it."""
+        key = recipe.name, theta
+        if key not in self._kernels:
+            self._kernels[key] = (
+                self._packed(recipe, recipe.packs, theta) if recipe.packs else self._made(recipe, theta)
+            )
+        return self._kernels[key]
+
+    def _packed(self, recipe: Recipe, packing: Packing, theta: bool) -> Kernel:
+        """Of a function that packs a matrix, from that matrix's own function."""
+        dense, sizes = RECIPES[packing.function], self._search(theta).robot.sizes
+        _, columns = sizes.shape(dense.signature.outputs[0].axes)
+        places = packing.places(self.model.mechanism, self.model.representative)
+        return packed(self.kernel(dense, theta), recipe.signature, columns, places)
+
+    def _made(self, recipe: Recipe, theta: bool) -> Kernel:
         if recipe.signature.calls:
             arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
             program = trace_dynamics(recipe, arranged, self._search(theta).robot)

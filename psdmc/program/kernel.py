@@ -20,6 +20,7 @@ class Kernel:
     lowering  how it was made: 'expanded' or 'factored'
     before    where the function's products are multiplied in loops: the arithmetic in front of them, for one state and for
               lanes; single and batch have them written out
+    places    of a function that packs a matrix: (row, column) of each entry that it puts out
     limbs     the same for one state, limbs of equal structure in the lanes of vectors, for machines whose vectors make it
               worth while; None: none do
     """
@@ -31,6 +32,7 @@ class Kernel:
     lowering: str
     before: Program | None = None
     limbs: LimbProgram | None = None
+    places: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
         inputs = set(self.inputs)

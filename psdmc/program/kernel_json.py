@@ -15,7 +15,7 @@ from psdmc.program.signature import Signature
 
 _OPERATIONS = {op.value: op for op in Op}
 
-FORMAT = 3
+FORMAT = 4
 """Version of the text's form."""
 
 
@@ -30,6 +30,7 @@ def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
             "batch": None if kernel.batch is kernel.single else _program_to_plain(kernel.batch),
             "before": None if kernel.before is None else _program_to_plain(kernel.before),
             "limbs": None if kernel.limbs is None else _limbs_to_plain(kernel.limbs),
+            "places": kernel.places,
         }
         for kernel in kernels.values()
     ]
@@ -56,9 +57,9 @@ def _kernel_from_plain(entry: Mapping[str, Any], functions: Mapping[str, Signatu
     batch = single if entry["batch"] is None else _program_from_plain(entry["batch"])
     before = None if entry["before"] is None else _program_from_plain(entry["before"])
     limbs = None if entry["limbs"] is None else _limbs_from_plain(entry["limbs"])
-    return Kernel(
-        functions[entry["function"]], entry["theta"], single, batch, entry["lowering"], before, limbs
-    )
+    places = tuple((row, column) for row, column in entry["places"])
+    function, theta, lowering = functions[entry["function"]], entry["theta"], entry["lowering"]
+    return Kernel(function, theta, single, batch, lowering, before, limbs, places)
 
 
 def _limbs_to_plain(limbs: LimbProgram) -> dict[str, Any]:

@@ -11,8 +11,9 @@ from itertools import pairwise
 from psdmc.errors import InternalError
 from psdmc.program.products import Product
 
-WORDS = ("n", "nq", "nv", "nx", "l", "frames")
-"""Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames."""
+WORDS = ("n", "nq", "nv", "nx", "l", "frames", "nonzeros")
+"""Sizes that depend on the robot: joints, length of q, of qd, and of both together, base parameters, named frames; and, of
+a function that packs a matrix, entries that it puts out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,7 @@ class Sizes:
     nv: int
     l: int
     frames: int
+    nonzeros: int = 0
 
     @property
     def nx(self) -> int:
@@ -60,6 +62,11 @@ class Quantity:
         wrong = [axis for axis in self.axes if axis not in WORDS and not axis.isdecimal()]
         if wrong or not self.name.isidentifier():
             raise ValueError(f"{self.name!r} with axes {self.axes}: an axis is a number or one of {WORDS}")
+
+    @property
+    def is_matrix(self) -> bool:
+        """Whether it is a matrix, packed or not: many entries, which are stored as they are computed."""
+        return len(self.axes) > 1 or "nonzeros" in self.axes
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,9 @@ from psdmc.dynamics.choices import Choices
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.dynamics.slices import first_rates
+from psdmc.dynamics.structure import Places
 from psdmc.program.signature import Signature
-from psdmc.robot.mechanism import Array, NamedFrame, Placement
+from psdmc.robot.mechanism import Array, Mechanism, NamedFrame, Placement
 
 if TYPE_CHECKING:
     from psdmc.recipes.on_arrays import RobotOnArrays
@@ -105,6 +106,20 @@ class Needs(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Packing:
+    """Entries of a matrix.
+
+    function     name of the function that puts out the whole matrix and nothing else
+    places       their (row, column), from the robot and the lift of its base parameters
+    is_triangle  whether they are a symmetric matrix's lower triangle
+    """
+
+    function: str
+    places: Callable[[Mechanism, Array], Places]
+    is_triangle: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Recipe:
     """One generated function.
 
@@ -129,6 +144,8 @@ class Recipe:
     default      whether it is generated where no functions are named, and
     default_where_wide  whether it is then where some joint has several coordinates
     benched      whether `make bench` measures it
+    packs        the matrix some of whose entries it puts out: its own function is lowered, and the other entries are left
+                 out. Its `trace`, and the values of `pinocchio`, are that function's
     """
 
     signature: Signature
@@ -150,6 +167,7 @@ class Recipe:
     default: bool = False
     default_where_wide: bool = False
     benched: bool = False
+    packs: Packing | None = None
 
     def __post_init__(self) -> None:
         if self.needs is None and self.signature.positive is not None:

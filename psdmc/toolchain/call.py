@@ -63,7 +63,7 @@ class CompiledRobot(CompiledFunctions):
             function.positive is not None,
             self.dtype == np.float32,
             tuple(self._sizes.shape(quantity.axes) for quantity in function.inputs),
-            tuple(self._sizes.shape(quantity.axes) for quantity in function.outputs),
+            compiled._tails_of(function.name),
             results(function) if len(function.outputs) > 1 else None,
             self._units_of(function),
             compiled._address_of(with_theta) if takes_theta else 0,

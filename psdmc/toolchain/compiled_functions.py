@@ -129,13 +129,13 @@ class CompiledFunctions(RobotFacts):
         """The outputs as Dask's or xarray's arrays, as the inputs are."""
         if out is not None:
             raise InputError(f"{function.name}: out is for NumPy arrays", "leave it out")
-        self._kernel(function.name if theta_b is None else f"{function.name}_theta")
+        kernel = self._kernel(function.name if theta_b is None else f"{function.name}_theta")
         call = OnArrays(self, function.name, theta_b)
         if any(map(is_labelled, inputs)):
             found: tuple[Any, ...] = by_names(call, self, function, inputs)
         else:
-            shapes = {word: getattr(self._sizes, word) for word in WORDS}
-            found = in_chunks(call, function, shapes, inputs, self._dtype)
+            lengths = {word: getattr(self._sizes, word) for word in WORDS}
+            found = in_chunks(call, function, lengths, kernel.tails, inputs, self._dtype)
         return found[0] if len(found) == 1 else results(function)(*found)
 
     def _kernel(self, name: str) -> _Kernel:
@@ -159,6 +159,11 @@ class CompiledFunctions(RobotFacts):
 
     def _bind(self, compiled: CompiledFunctions) -> None:
         """Take over what is called without a detour through Python; here nothing is."""
+
+    def _tails_of(self, function: str) -> tuple[tuple[int, ...], ...]:
+        """Trailing axes of each output of a function that the library has, with parameters compiled in or given."""
+        kernels = self._kernels
+        return (kernels[function] if function in kernels else kernels[f"{function}_theta"]).tails
 
     def _address_of(self, function: str) -> int:
         """Where the library has a kernel's batch function."""

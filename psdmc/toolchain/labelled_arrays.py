@@ -45,12 +45,18 @@ def is_labelled(value: object) -> bool:
 
 
 def in_chunks(
-    call: Call, function: Signature, shapes: Mapping[str, int], inputs: Sequence[Any], dtype: Any
+    call: Call,
+    function: Signature,
+    shapes: Mapping[str, int],
+    tails: Sequence[tuple[int, ...]],
+    inputs: Sequence[Any],
+    dtype: Any,
 ) -> tuple[Any, ...]:
     """The outputs as arrays of Dask's, computed chunk by chunk when they are asked for.
 
     call    takes the inputs' chunks
-    shapes  length of each word of an axis
+    shapes  length of each word of an input's axis
+    tails   trailing axes of each output
 
     Inputs whose last axes are cut are put together along these; chunks of states are cut alike.
     """
@@ -64,7 +70,11 @@ def in_chunks(
     arrays = _cut_alike(da, arrays, [len(quantity.axes) for quantity in function.inputs])
     ins = ",".join(map(_core, function.inputs))
     outs = ",".join(map(_core, function.outputs))
-    made = {word: shapes[word] if word in shapes else int(word) for q in function.outputs for word in q.axes}
+    made = {
+        word: length
+        for quantity, tail in zip(function.outputs, tails, strict=True)
+        for word, length in zip(quantity.axes, tail, strict=True)
+    }
     for array, quantity in zip(arrays, function.inputs, strict=True):
         _check_tail(function, quantity, array, shapes)
     found = da.apply_gufunc(

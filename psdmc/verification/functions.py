@@ -12,6 +12,7 @@ from psdmc.model.random_states import on_joints
 from psdmc.model.standard_parameters import lack_of_standard_parameters
 from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.packed import VALUES, unpacked
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.robot.mechanism import Array
 from psdmc.robot.reference_followers import OnCoordinates
@@ -85,7 +86,11 @@ def _error(
     theta: Array,
     least: float,
 ) -> float:
-    expected, found = _expected(recipe, robot, given), recipe.reference(arrays, given)
+    found = recipe.reference(arrays, given)
+    if recipe.packs is not None:
+        packing, recipe = recipe.packs, RECIPES[recipe.packs.function]
+        found = unpacked(packing, recipe, arrays, found[VALUES.name])
+    expected = _expected(recipe, robot, given)
     if recipe.times_theta:
         found = {name: values @ theta for name, values in found.items()}
     if recipe.gradient is not None:

@@ -24,6 +24,8 @@ from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.packed import VALUES
+from psdmc.recipes.recipe import Recipe
 from psdmc.robot.reference import Reference
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.interface import interface_of
@@ -151,7 +153,7 @@ def matches_pinocchio(function: str, name: str, real: str = "float64") -> None:
     """Rows, lanes, run-time parameters and the NumPy reference of a function, all outputs."""
     own, recipe = bench(name, real), RECIPES[function]
     signature = recipe.signature
-    expected = recipe.pinocchio(own.pinocchio, own.given)
+    expected = _expected(own, recipe)
     inputs = [own.given[quantity.name] for quantity in signature.inputs]
     reference = recipe.reference(own.arrays, own.given)
     _compare(own, function, expected, reference, LIMIT["float64"])
@@ -162,6 +164,16 @@ def matches_pinocchio(function: str, name: str, real: str = "float64") -> None:
     if signature.theta:
         again = own.robot.call(signature, inputs, own.model.theta_b)
         _compare(own, function, expected, _named(function, again), LIMIT[real])
+
+
+def _expected(own: Bench, recipe: Recipe) -> dict[str, Array]:
+    """Pinocchio's values; of a packed matrix the entries that are put out."""
+    found = recipe.pinocchio(own.pinocchio, own.given)
+    if recipe.packs is None:
+        return found
+    rows, columns = np.array(recipe.packs.places(own.model.mechanism, own.model.representative)).T
+    (matrix,) = found.values()
+    return {VALUES.name: matrix[:, rows, columns]}
 
 
 def program_matches_pinocchio(function: str, name: str) -> None:
@@ -197,6 +209,7 @@ def _named(function: str, found: object) -> dict[str, Array]:
 def _by_lane(own: Bench, function: str, inputs: list[Array]) -> dict[str, Array]:
     lanes, sizes = own.package.lanes, own.package.info.sizes
     signature = RECIPES[function].signature
+    sizes = replace(sizes, nonzeros=next(len(k.places) for k in own.package.kernels if k.name == function))
     blocks = -(-COUNT // lanes)
     laid = []
     for array in inputs:

@@ -1,0 +1,15 @@
+"""The mass matrix for sparse solvers: of its lower triangle the entries that can differ from zero."""
+
+from __future__ import annotations
+
+from psdmc.dynamics.structure import mass_matrix_places
+from psdmc.functions import mass_matrix
+from psdmc.recipes.packed import packed
+from psdmc.recipes.recipe import Packing
+
+RECIPE = packed(
+    mass_matrix.RECIPE,
+    31,
+    "M(q), the lower triangle's entries that can differ from zero, row by row",
+    Packing(mass_matrix.RECIPE.name, mass_matrix_places, is_triangle=True),
+)

@@ -1,0 +1,15 @@
+"""The torques' regressor in theta_b for recursive estimators: the entries that can differ from zero."""
+
+from __future__ import annotations
+
+from psdmc.dynamics.structure import regressor_places
+from psdmc.functions import regressor
+from psdmc.recipes.packed import packed
+from psdmc.recipes.recipe import Packing
+
+RECIPE = packed(
+    regressor.RECIPE,
+    71,
+    "Y's entries that can differ from zero, row by row",
+    Packing(regressor.RECIPE.name, regressor_places),
+)

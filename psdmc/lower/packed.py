@@ -1,0 +1,72 @@
+"""Of a matrix function's kernel, the part that puts out some entries of the matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from psdmc.dynamics.structure import Places
+from psdmc.program.kernel import Kernel
+from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
+from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.program import Program, Slot
+from psdmc.program.signature import Signature
+
+Kept = Mapping[Slot, Slot]
+"""Where each entry that is kept goes."""
+
+
+def packed(kernel: Kernel, function: Signature, columns: int, places: Places) -> Kernel:
+    """The kernel of `function`, whose one output has these entries of the other kernel's matrix one after the other. Its
+    arithmetic is the same, less what no entry needs.
+
+    columns  of the matrix
+    """
+    (matrix,), (values,) = kernel.function.outputs, function.outputs
+    kept = {
+        Slot(matrix.name, row * columns + column): Slot(values.name, k)
+        for k, (row, column) in enumerate(places)
+    }
+    single = _only(kernel.single, kept)
+    batch = single if kernel.batch is kernel.single else _only(kernel.batch, kept)
+    limbs = None if kernel.limbs is None else _limbs(kernel.limbs, matrix.name, kept)
+    return replace(kernel, function=function, single=single, batch=batch, limbs=limbs, places=places)
+
+
+def _only(program: Program, kept: Kept) -> Program:
+    outputs = tuple((kept[slot], index) for slot, index in program.outputs if slot in kept)
+    return drop_unused(Program(program.body, outputs))
+
+
+def _limbs(limbs: LimbProgram, matrix: str, kept: Kept) -> LimbProgram | None:
+    """None where an entry is kept of some limbs of a group and left out of others."""
+    groups = []
+    for group in limbs.groups:
+        outputs = []
+        for slot, own in group.outputs:
+            found = [kept[each] for each in own if each in kept]
+            if len(found) not in (0, len(own)):
+                return None
+            if found:
+                outputs.append((slot, tuple(found)))
+        groups.append(replace(group, outputs=tuple(outputs)))
+    stages = _stages(limbs.stages, groups, matrix, kept)
+    return replace(limbs, groups=tuple(groups), stages=stages)
+
+
+def _stages(
+    stages: Iterable[Stage], groups: Iterable[LimbGroup], matrix: str, kept: Kept
+) -> tuple[Stage, ...]:
+    """The stages without the outputs that nothing puts out; what led to these alone is dropped within each stage."""
+    wanted = {group.output: {slot for slot, _ in group.outputs} for group in groups}
+    found = []
+    for stage in stages:
+        outputs = []
+        for slot, index in stage.program.outputs:
+            if slot.vector == matrix:
+                if slot in kept:
+                    outputs.append((kept[slot], index))
+            elif slot.vector not in wanted or slot in wanted[slot.vector]:
+                outputs.append((slot, index))
+        found.append(replace(stage, program=drop_unused(Program(stage.program.body, tuple(outputs)))))
+    return tuple(found)

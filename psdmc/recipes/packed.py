@@ -1,0 +1,58 @@
+"""Functions that put out the entries of a matrix that can differ from zero, one after the other, and no others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.program.signature import Quantity, Signature
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Arrays, Packing, Recipe
+from psdmc.robot.mechanism import Array
+
+VALUES = Quantity("values", ("nonzeros",))
+"""A packed matrix."""
+
+
+def packed(dense: Recipe, order: int, meaning: str, packing: Packing) -> Recipe:
+    """The recipe of a function that packs `dense`, a function of one matrix."""
+    function, (matrix,) = dense.signature, dense.signature.outputs
+
+    def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
+        rows, columns = _indices(packing, robot)
+        return {VALUES.name: dense.reference(robot, given)[matrix.name][:, rows, columns]}
+
+    return replace(
+        dense,
+        signature=Signature(
+            f"{dense.name}_packed", order, meaning, function.inputs, (VALUES,), theta=function.theta
+        ),
+        title=f"{dense.title}, packed",
+        reference=reference,
+        starts=None,
+        polynomials=None,
+        in_limbs=False,
+        default=False,
+        benched=False,
+        packs=packing,
+    )
+
+
+def unpacked(packing: Packing, dense: Recipe, robot: RobotOnArrays, values: Array) -> Arrays:
+    """The outputs of `dense` from the values of the function that packs it, (k, nonzeros)."""
+    (matrix,) = dense.signature.outputs
+    lengths = {"nv": robot.nv, "l": robot.lift.shape[1]}
+    found = np.zeros((len(values), *(lengths[axis] for axis in matrix.axes)))
+    rows, columns = _indices(packing, robot)
+    found[:, rows, columns] = values
+    if packing.is_triangle:
+        found[:, columns, rows] = values
+    return {matrix.name: found}
+
+
+def _indices(packing: Packing, robot: RobotOnArrays) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    rows, columns = np.array(packing.places(robot.chain, robot.lift), dtype=np.intp).reshape(-1, 2).T
+    return rows, columns
