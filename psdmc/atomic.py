@@ -2,7 +2,7 @@
 
 A file is written under a temporary name in its own folder, put to disk, and renamed into place: a reader sees
 the old content or the new, whatever happens in between. A process that is killed leaves its temporary file,
-which is known by its name and by the lock that died with the process; whoever writes into that folder next
+which is known by its name and by the lock that died with the process; the next process that writes into that folder
 removes it.
 """
 

@@ -1,7 +1,7 @@
-"""How accurately a robot's torques are determined by its numbers: the change when their last digits change.
+"""The change of a robot's torques when the last digits of its numbers change: no model can be more accurate.
 
 A direction that a file gives to 16 digits is uncertain by 1e-16 rad. That changes the moment about an axis of 100 N
-that act 3 m away by some 1e-14 N m: negligible, unless the axis itself moves a gram at a micrometre.
+that act 3 m away by some 1e-14 N m: negligible, unless that axis itself moves no more than a gram at a micrometre.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Bodies with joints that move freely beyond them, as what they resist with: symmetric 6 x 6 inertias in blocks."""
+"""Articulated inertias: the wrench per acceleration of a body whose further joints move freely, as symmetric 6 x 6
+matrices in blocks.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""Accelerations by articulated bodies (Featherstone 2008, 7.3), on the sweeps of Newton-Euler.
+"""Joint accelerations from torques by articulated bodies (Featherstone 2008, 7.3), on the sweeps of Newton-Euler.
 
-Outward, how bodies would move if no joint accelerated; inward, the wrenches that this asks for, and what each body with all
-beyond it resists with where its frame accelerates besides: each joint takes its part of both, and hands on what it cannot
-hold back. Outward again, these further accelerations. It costs a fixed number of operations a joint, where a factorized mass
-matrix costs the square of how many carry each: less on long limbs.
+Three sweeps. Outward: each body's motion if no joint accelerated. Inward: the wrench that this motion requires and the
+articulated inertia, the wrench per acceleration of the body's frame with all bodies beyond it; each joint takes the
+component along its axis of both, and the rest goes to the parent. Outward: the joints' accelerations. The number of
+operations per joint is fixed, while that of a factorized mass matrix grows with the square of how many joints carry a
+body: fewer operations on long limbs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where a robot comes from a position by its rates, and back: joint by joint, over abstract scalars.
+"""Position after constant rates for a time, and the rates between two positions: joint by joint, over abstract scalars.
 
 q ranges over a manifold where joints have several coordinates: a quaternion stays on its sphere. Tangents are rates, nv
 of them, along each moved frame's own axes.

@@ -140,5 +140,5 @@ def sweep_inward(
 def _driven(
     efforts: tuple[Scalar, ...], frame: Frame, drive_inertia: Scalar, qdd: Scalar
 ) -> tuple[Scalar, ...]:
-    """With what the joint's own drive asks for; joints of several rates have none."""
+    """A joint's efforts with the torque of its own drive inertia, drive_inertia qdd; joints of several rates have none."""
     return (efforts[0] + drive_inertia * qdd,) if frame.joint.about_z else efforts

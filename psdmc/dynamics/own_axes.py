@@ -1,8 +1,8 @@
-"""Joints of several coordinates in the recursion of derivatives: each of their rates is along or about one of the moved
-frame's own axes, which takes the place of z.
+"""Rows and wrenches of joints of several coordinates, in the recursion of derivatives: each of their rates is along or
+about one of the moved frame's own axes, which takes the place of z.
 
-All is in the orientation after the joint's turn. Beyond what holds of an axis there is one term: where one rate bends the
-direction that another one acts along, V x E of the joint's own twist V, which no single axis has.
+All is in the orientation after the joint's turn. One term is added to those of a single axis: a rate of the joint turns
+the directions of its other rates, V x E with the joint's own twist V.
 """
 
 from __future__ import annotations

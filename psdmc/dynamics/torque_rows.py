@@ -1,7 +1,7 @@
-"""What all joint torques depend on: rows over the links' parameters, joint by joint, in extended precision.
+"""Rows over the links' parameters, joint by joint, that all joint torques are combinations of; in extended precision.
 
 Link k's parameters leave the torque of joint k at zero in every motion exactly where its Lagrangian depends on neither
-q_k nor its rate. Then link k might as well be fixed to its parent, and its parameters, moved there, belong to that link.
+q_k nor its rate. Then the torques are those of a robot whose link k is fixed to its parent, with its parameters moved there.
 So with C_k the rows that joint k's torque has in the parameters of its own link, and T_c those of a link c moved to its
 parent where joint c has not moved, the torques of all joints depend on the parameters through
 

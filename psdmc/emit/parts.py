@@ -1,4 +1,4 @@
-"""A long PROGRAM as several C functions, so that compilers stay near linear in its length."""
+"""A long PROGRAM as several C functions, so that compile time grows nearly linearly with its length."""
 
 from __future__ import annotations
 

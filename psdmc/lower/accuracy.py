@@ -1,5 +1,8 @@
-"""How exactly an arrangement gives a model's torques. On robots of many scales, frames on other feet and other carriers
-lose digits: a gram at a micrometre is moved by what a hundred kilograms leave beyond the last one."""
+"""Error of the torques that an arrangement gives, relative to the model's own.
+
+Frames at other feet, or other carriers, lose digits on robots of many scales: where carriers of 100 kg stand for the
+parameters of a gram at a micrometre too, that gram's torque is beyond their last digit.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What an exchange of carriers saves, told from the branches of a tree that it changes.
+"""What an exchange of carriers saves, estimated from the branches of a tree that it changes.
 
-What a function of a tree costs is the sum over its branches, but for what the bodies that carry them share. The search of a
-large robot therefore traces the changed branches on these bodies alone, before and behind, and traces as a whole only what
-is cheaper there: of talos's 33 joints 9 to 11.
+The cost of a function of a tree is nearly a sum over its branches; the bodies that carry them add what branches share. The
+search of a large robot therefore traces the changed branches with these bodies alone, before and after the exchange, and
+traces the whole robot only where that is cheaper: 9 to 11 of talos's 33 joints are traced.
 """
 
 from __future__ import annotations

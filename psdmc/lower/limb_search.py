@@ -1,8 +1,8 @@
-"""Whether a function's limbs run in lanes, and in which arrangement: by cost, as everything else (search.py).
+"""Whether a function's limbs run in lanes, and in which arrangement: by the cost of its PROGRAMs, like search.py.
 
-What was found for the straight line is the start. There, limbs need not be alike: what carries one leg's inertia may be
-other parameters than another leg's. Lanes pay for every parameter that any limb has, so that each limb's choice is tried
-for all of its group; then exchanges are made in all limbs at once.
+The search starts from the arrangement of the PROGRAM without lanes. There, the carriers of one leg may be other parameters
+than those of another leg. In lanes, a parameter that one limb has costs the same as if all had it. Therefore each limb's
+carriers are tried for all limbs of its group; then exchanges are made in all limbs at once.
 """
 
 from __future__ import annotations

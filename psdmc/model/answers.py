@@ -1,7 +1,7 @@
 """A model's functions beyond E, P and theta_b: those that compiled robots have, by the same names, in NumPy.
 
-Their arithmetic stands to the right of the model, which imports nothing that imports it: `psdmc` puts the answers in when
-it is imported. Type checkers read the methods from answers.pyi, which `python -m psdmc.toolchain.stubs` writes.
+Their arithmetic (psdmc.model_functions) imports the model, so that the model cannot import it: `psdmc` registers it here
+when it is imported. Type checkers read the methods from answers.pyi, which `python -m psdmc.toolchain.stubs` writes.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MOST_MONOMIALS = 2000
-"""Of one torque. SymPy takes about a millisecond for each, and nobody reads more."""
+"""Of one torque. SymPy takes about a millisecond for each."""
 
 
 def torque_expression(

@@ -1,4 +1,4 @@
-"""PROGRAM: straight-line, single-assignment arithmetic on scalars. The waist between robots and C."""
+"""PROGRAM: straight-line, single-assignment arithmetic on scalars: all that lowering hands to emission."""
 
 from __future__ import annotations
 

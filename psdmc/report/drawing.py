@@ -41,8 +41,8 @@ STYLE: dict[Any, Any] = {
 
 
 def svg(draw: Callable[[Figure], None], size: tuple[float, float], says: str) -> str:
-    """The drawing by `draw` on a figure of `size` (inches), as an <svg> element that scales with the page; `says` is what
-    a reader hears who does not see it. The same numbers give the same bytes."""
+    """The drawing by `draw` on a figure of `size` (inches), as an <svg> element that scales with the page; `says` is the
+    description that screen readers read out. The same numbers give the same bytes."""
     with _style(STYLE):
         figure = _new_figure(figsize=size)
         draw(figure)

@@ -1,4 +1,4 @@
-"""What a reader hands over: a robot whose assumptions are not applied yet."""
+"""The result of reading a robot file: a robot whose assumptions are not applied yet."""
 
 from __future__ import annotations
 

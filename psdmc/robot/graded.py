@@ -1,4 +1,4 @@
-"""Independent columns of a matrix in a given order, those that are barely independent last.
+"""Independent columns of a matrix, chosen in a given order: those of which little is left beside the others come last.
 
 The result is the same on every processor and in whatever precision the matrix has; between equal residuals the order
 decides, never rounding.

@@ -1,4 +1,6 @@
-"""What an MJCF file repeats. MuJoCo's compiler takes time that grows with the square of the copies; no signal ends it."""
+"""How many elements an MJCF file makes by repetition, and the refusal of too many: the time of MuJoCo's compiler grows with
+their square, and no signal ends it.
+"""
 
 from __future__ import annotations
 

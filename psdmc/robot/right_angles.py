@@ -1,4 +1,4 @@
-"""Right angles that a file writes with so few digits that they are kept as they are written: what is said of them."""
+"""A warning about angles that are nearly right, but written with so few digits that snapping leaves them as they are."""
 
 from __future__ import annotations
 

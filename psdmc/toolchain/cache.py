@@ -2,8 +2,8 @@
 
 The key covers everything that the binary depends on: sources, flags, compiler, CPU features, psdmc's version and the
 platform. An entry is used while its files have the digests that they were sealed with, and is built again otherwise.
-Who comes while an entry is built waits and uses it. Each builds in a folder of its own and renames it into place, so that
-where files cannot be locked two may build the same entry: the later one uses the earlier one's.
+A process that needs an entry while another one builds it waits and uses it. Where files cannot be locked, two may build
+the same entry, each in a folder of its own that it renames into place: the later one uses the earlier one's.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ def turn(place: Path, key: str) -> Iterator[None]:
     """Hold the only right to build an entry, waiting for the process or thread that has it.
 
     The lock is given back explicitly: a process that was forked meanwhile has a copy of the handle, which would keep it.
-    Where the file system cannot lock nobody waits.
+    Where the file system has no locks, no process waits.
     """
     path = place / f".turn-{key[:16]}"
     handle = _taken(path)
@@ -34,8 +34,8 @@ def turn(place: Path, key: str) -> Iterator[None]:
 
 
 def _taken(path: Path) -> int:
-    """The lock file, open and locked. Where it was removed meanwhile, by whoever had it or as a leftover, its lock keeps
-    nobody out: the next one is taken."""
+    """The lock file, open and locked. A file that was removed before it was locked excludes no other process: it is made
+    and locked again."""
     until = time.monotonic() + LONGEST
     while True:
         handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)

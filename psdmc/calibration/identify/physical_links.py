@@ -1,5 +1,5 @@
-"""Links that have given base parameters exactly, nearest to the file's: what a reader of link masses needs, who knows no
-base parameters."""
+"""Links that have given base parameters exactly, nearest to the file's: for programs that read link
+masses and inertias, not base parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What planned motions are checked for, and the sentences that say so: doubt is said where something cannot be looked at."""
+"""What planned motions are checked for, and the sentences that say so; also which checks were not possible, and why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A walk by random steps from a motion that hits nothing: along what is in the way, where slopes lead into it."""
+"""A better exciting motion by random steps from one that hits nothing, where a descent by slopes ends at an obstacle."""
 
 from __future__ import annotations
 
