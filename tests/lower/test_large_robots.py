@@ -31,7 +31,16 @@ LARGE = [
 ]
 
 
-@pytest.mark.parametrize("tree", LARGE, ids=["serial", "oblique", "four sliding legs"])
+NAMES = ["serial", "oblique", "four sliding legs"]
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        pytest.param(tree, id=name, marks=[pytest.mark.slow] if name == "oblique" else [])
+        for tree, name in zip(LARGE, NAMES, strict=True)
+    ],
+)
 def test_the_program_s_torques_are_pinocchio_s(tree: RandomTree, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(search, "BUDGET", BUDGET)
     model = derive_model(tree.mechanism(), expand=False)

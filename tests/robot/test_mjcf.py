@@ -339,7 +339,7 @@ def balled(seed: int) -> str:
 BALLED = [BALLS, *map(balled, (0, 1, 2, 3, 4, 6, 7, 8))]
 
 
-@pytest.mark.parametrize("text", slow_but_for(BALLED[:3], BALLED))
+@pytest.mark.parametrize("text", slow_but_for([BALLED[0], BALLED[2]], BALLED))
 def test_ball_joints_turn_as_mujocos(text: str, tmp_path: Path) -> None:
     """Alone on a body, before and behind other joints, about other points than the body's origin."""
     robot = balls_agree(written(tmp_path, text))

@@ -44,6 +44,7 @@ def test_the_library_has_at_most_400_kib_of_source(package: Path) -> None:
     assert source_of(package) <= LARGEST_SOURCE
 
 
+@pytest.mark.slow
 def test_with_derivatives_at_most_640_kib(package: Path, tmp_path: Path) -> None:
     emit_c(bundled_model("kr6"), tmp_path / "kr6", functions=["default", *DERIVATIVES])
     assert source_of(package) < source_of(tmp_path / "kr6") <= WITH_DERIVATIVES

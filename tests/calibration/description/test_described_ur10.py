@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shared_data import UR10_LOG
+from slow_cases import slow_but_for
 from test_ur10 import model  # noqa: F401  a fixture
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
@@ -25,7 +26,7 @@ def described(folder: Path, text: str) -> Path:
     return folder / "log.toml"
 
 
-@pytest.mark.parametrize("how", ["as it is", "in other units"])
+@pytest.mark.parametrize("how", slow_but_for(["in other units"], ["as it is", "in other units"]))
 def test_the_same_calibration(model: DynamicsModel, tmp_path: Path, how: str):  # noqa: F811
     log = read_log(TABLE)
     assert log.velocity is not None

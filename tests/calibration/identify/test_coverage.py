@@ -40,7 +40,7 @@ def coloured(rng: np.random.Generator, count: int, n: int, times: tuple[float, .
     return np.sum(parts, axis=0) / np.sqrt(len(times))
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9, 0.97])
+@pytest.mark.parametrize("memory", slow_but_for([0.0, 0.97], [0.0, 0.5, 0.9, 0.97]))
 def test_coloured_noise_widens_standard_deviations_as_much_as_it_must(memory: float):
     """Regressors as slow as the noise: the worst that can meet a count of effective samples."""
     rng = np.random.default_rng(11)
