@@ -13,7 +13,10 @@ from psdmc.bench.threads import ThreadTime
 
 def times(ns: float) -> Times:
     return Times(
-        Spread(ns, ns - 1, ns + 1, ns - 2), Spread(1.3 * ns, ns, 2 * ns, ns), Tail(ns, 2 * ns, 3 * ns, 10_240)
+        Spread(ns, ns - 1, ns + 1, ns - 2),
+        Spread(1.3 * ns, ns, 2 * ns, ns),
+        Tail(ns, 2 * ns, 3 * ns, 10_240),
+        Spread(20 * ns, 18 * ns, 22 * ns, 17 * ns),
     )
 
 
@@ -21,7 +24,8 @@ def measurement(
     rival: str, function: str, ns: float, variant: str = "", layout: str = "state"
 ) -> Measurement:
     operations = (225, 222) if rival.startswith("psdmc") else None
-    return Measurement(rival, variant, function, layout, 1e-15, times(ns), operations, 885.0)
+    code = 12_345 if rival.startswith("psdmc") else None
+    return Measurement(rival, variant, function, layout, 1e-15, times(ns), operations, 885.0, code)
 
 
 def made_up_result() -> BenchResult:

@@ -28,6 +28,7 @@ def main() -> int:
         "--rivals", nargs="+", choices=[entrant.name for entrant in EVERYONE], help="whom to measure"
     )
     parser.add_argument("--quick", action="store_true", help="no instruction counts, no threads, no scaling")
+    parser.add_argument("--cold", action="store_true", help="single calls after sweeping the caches, too")
     parser.add_argument("--json", type=Path, help="write everything measured there")
     options = parser.parse_args()
     return exit_status_of(lambda: _measure(options))
@@ -37,7 +38,9 @@ def _measure(options: argparse.Namespace) -> int:
     """Measure, print the table and write the JSON; 1 where a contestant's results are wrong."""
     rivals = tuple(options.rivals) if options.rivals else None
     full = not options.quick
-    settings = Settings(rounds=options.rounds, rivals=rivals, count=full, threads=full)
+    settings = Settings(
+        rounds=options.rounds, rivals=rivals, count=full, threads=full, cold=full or options.cold
+    )
     cases = list(standard_cases(options.names or None, progress=_tell))
     scaling = list(scaling_cases(progress=_tell)) if full and not options.names else []
     result = run(cases, settings, _tell, scaling)

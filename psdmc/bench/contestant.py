@@ -60,6 +60,7 @@ class Contestant:
     weights       where functions differ in what they put out (regressors): output rows times these are torques
     operations    (multiplications, additions), None where unknown
     instructions  per state on x86-64-v3, None where not counted
+    code_bytes    of machine code for one state, None where its library does not tell
     """
 
     rival: str
@@ -76,6 +77,7 @@ class Contestant:
     weights: Array | None = None
     operations: tuple[int, int] | None = None
     instructions: float | None = None
+    code_bytes: int | None = None
 
     @property
     def label(self) -> str:
@@ -137,6 +139,15 @@ class Runner:
         """ns per call over blocks of 64 calls, the clock's own cost subtracted."""
         return self._timed("throughput", self._output, TAIL_BLOCK) - self._clock_cost() / TAIL_BLOCK
 
+    def cold(self, calls: int, memory: Array) -> Array:
+        """ns of each of so many single calls, after each of which all memory is read; the clock's own cost subtracted."""
+        seconds = np.zeros(min(calls, self._states.count))
+        loop = getattr(self._library, f"{self.contestant.symbol}_cold")
+        work, sizes = self._work(self._output, len(seconds)), (len(seconds), memory.size)
+        count, reals = map(ctypes.c_size_t, sizes)
+        loop(ctypes.byref(work), count, _pointer(memory), reals, _pointer(seconds))
+        return seconds * 1e9 - self._clock_cost()
+
     def outputs(self) -> Array:
         """(count, outputs) what the function puts out at every state, as rows."""
         count, size = self._states.count, self.contestant.outputs
@@ -149,13 +160,20 @@ class Runner:
 
     def _timed(self, kind: str, output: Array, block: int, count: int | None = None) -> Array:
         """Seconds of each block from the library's loop over `count` states (its share), as ns per state."""
-        count = max(block, count or self._count)
+        work = self._work(output, max(block, count or self._count))
+        seconds = np.zeros(work.count // block)
+        loop = getattr(self._library, f"{self.contestant.symbol}_{kind}")
+        loop(ctypes.byref(work), ctypes.c_size_t(block), _pointer(seconds))
+        return seconds * (1e9 / block)
+
+    def _work(self, output: Array, count: int) -> Work:
+        """What a loop over `count` states runs over."""
         states, function = self._states, self.contestant.function
         inputs = states.inputs(function, self.contestant.lanes, self.contestant.convention)
         q, qd, x, *others = (vector.ctypes.data for vector in inputs)
         ring = len(output) // self.contestant.outputs
         y = others[0] if others else None
-        work = Work(
+        return Work(
             count,
             states.nq,
             states.nv,
@@ -168,10 +186,6 @@ class Runner:
             states.more(function),
             y,
         )
-        seconds = np.zeros(count // block)
-        loop = getattr(self._library, f"{self.contestant.symbol}_{kind}")
-        loop(ctypes.byref(work), ctypes.c_size_t(block), ctypes.c_void_p(seconds.ctypes.data))
-        return seconds * (1e9 / block)
 
     @property
     def _sections(self) -> tuple[int, ...]:
@@ -186,6 +200,10 @@ class Runner:
     def _copy_matrices(self, yes: bool) -> None:
         if hasattr(self._library, "copy_matrices"):
             self._library.copy_matrices(int(yes))
+
+
+def _pointer(array: Array) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
 
 
 def _as_rows(array: Array, lanes: int, count: int) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from psdmc.bench.cold import CALLS, swept_memory
 from psdmc.bench.contestant import Runner
 from psdmc.bench.machine import IDLE_SHARE, others_share
 from psdmc.progress import Step
@@ -43,11 +44,15 @@ class Tail:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """One contestant's times; latency and tail only where it takes one state a call."""
+    """One contestant's times; latency, tail and cold calls only where it takes one state a call.
+
+    cold  over single calls with nothing in the caches; None where they were not measured
+    """
 
     throughput: Spread
     latency: Spread | None
     tail: Tail | None
+    cold: Spread | None = None
 
 
 @dataclass(slots=True)
@@ -55,6 +60,7 @@ class _Trials:
     throughput: list[float] = field(default_factory=list)
     latency: list[float] = field(default_factory=list)
     tail: list[Array] = field(default_factory=list)
+    cold: list[Array] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +77,10 @@ def measure(
     rounds: int,
     progress: Callable[[str], None] = lambda message: None,
     between: Callable[[], None] = lambda: None,
+    cold: bool = False,
 ) -> Measured:
-    """Every runner once a round, `rounds` rounds that count; `between` runs before each of them."""
+    """Every runner once a round, `rounds` rounds that count; `between` runs before each of them. `cold`: single calls with
+    nothing in the caches, too."""
     _round(runners)  # caches, branch predictors and the clock speed settle
     quiet: list[list[_Trials]] = []
     noisy: list[list[_Trials]] = []
@@ -81,6 +89,8 @@ def measure(
         between()
         share = others_share()
         trials = _round(runners)
+        if cold:
+            _add_cold(runners, trials)
         (quiet if share() < IDLE_SHARE else noisy).append(trials)
     idle = len(quiet) == rounds
     taken = quiet if idle else quiet + noisy
@@ -100,13 +110,22 @@ def _round(runners: Sequence[Runner]) -> list[_Trials]:
     return trials
 
 
+def _add_cold(runners: Sequence[Runner], trials: Sequence[_Trials]) -> None:
+    """After all others of a round, as nobody finds anything in the caches then."""
+    for runner, trial in zip(runners, trials, strict=True):
+        if runner.contestant.layout == "state":
+            trial.cold.append(runner.cold(CALLS, swept_memory()))
+
+
 def _times(trials: Sequence[_Trials]) -> Times:
     latency = [value for trial in trials for value in trial.latency]
     blocks = [block for trial in trials for block in trial.tail]
+    calls = [own for trial in trials for own in trial.cold]
     return Times(
         throughput=Spread.of([value for trial in trials for value in trial.throughput]),
         latency=Spread.of(latency) if latency else None,
         tail=_tail(np.concatenate(blocks)) if blocks else None,
+        cold=Spread.of(np.concatenate(calls)) if calls else None,
     )
 
 

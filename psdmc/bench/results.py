@@ -26,6 +26,7 @@ class Measurement:
     error         largest error of its outputs, relative to each output's largest value
     operations    (mul, add), None where unknown
     instructions  per state, as callgrind counts them on x86-64-v3; None where not counted
+    code_bytes    of machine code for one state; None where the library does not tell
     """
 
     rival: str
@@ -36,6 +37,7 @@ class Measurement:
     times: Times
     operations: tuple[int, int] | None = None
     instructions: float | None = None
+    code_bytes: int | None = None
 
     @property
     def ns(self) -> float:

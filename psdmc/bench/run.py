@@ -11,7 +11,7 @@ from psdmc.bench.case import Case
 from psdmc.bench.contestant import Contestant, Runner, Unavailable
 from psdmc.bench.defaults import ROUNDS, SEED
 from psdmc.bench.machine import this_machine
-from psdmc.bench.measure import measure
+from psdmc.bench.measure import Times, measure
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.rivals import EVERYONE, Entrant, psdmc_c
 from psdmc.bench.states import COUNT, States
@@ -36,6 +36,7 @@ class Settings:
     functions  names to measure; None: all
     count      whether to count instructions under callgrind
     threads    whether to time batch calls on one and two threads
+    cold       whether to time single calls with nothing in the caches
     """
 
     rounds: int = ROUNDS
@@ -45,6 +46,7 @@ class Settings:
     functions: tuple[str, ...] | None = None
     count: bool = False
     threads: bool = False
+    cold: bool = False
 
     def entrants(self) -> tuple[Entrant, ...]:
         return tuple(e for e in EVERYONE if self.rivals is None or e.name in self.rivals)
@@ -89,7 +91,7 @@ def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> Ca
         for runner in runners:
             runner.move()
 
-    measured = measure(runners, settings.rounds, within(case.name, progress), move)
+    measured = measure(runners, settings.rounds, within(case.name, progress), move, settings.cold)
     return CaseResult(
         name=case.name,
         note=case.note,
@@ -99,7 +101,7 @@ def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> Ca
         derive_seconds=case.derive_seconds,
         derive_bytes=case.derive_bytes,
         measurements=tuple(
-            Measurement(c.rival, c.variant, c.function, c.layout, error, times, c.operations, c.instructions)
+            _measurement(c, error, times)
             for c, error, times in zip(right, errors, measured.times, strict=True)
         ),
         unavailable=assembled.unavailable,
@@ -108,6 +110,11 @@ def run_case(assembled: Assembled, settings: Settings, progress: Progress) -> Ca
         idle=measured.idle,
         threads=measure_threads(right, states) if settings.threads else (),
     )
+
+
+def _measurement(c: Contestant, error: float, times: Times) -> Measurement:
+    counted = (c.operations, c.instructions, c.code_bytes)
+    return Measurement(c.rival, c.variant, c.function, c.layout, error, times, *counted)
 
 
 def checked(

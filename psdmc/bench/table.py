@@ -38,4 +38,8 @@ def _line(m: Measurement) -> str:
     text = f"    {m.label:<32} {m.layout:<6} {operations:>14} {m.ns:10.1f} ns  [{spread.low:.1f}, {spread.high:.1f}]"
     if m.times.latency:
         text += f"  latency {m.times.latency.median:.1f}"
+    if m.times.cold:
+        text += f"  cold {m.times.cold.median:.0f}"
+    if m.code_bytes is not None:
+        text += f"  code {m.code_bytes / 1e3:.1f} KB"
     return f"{text}  error {m.error:.0e}"

@@ -30,6 +30,8 @@ class Row:
     ns: str
     spread: str
     latency: str
+    cold: str
+    code: str
     worst: str
     ratio: str
     error: str
@@ -105,6 +107,8 @@ def _row(m: Measurement, reference: float | None) -> Row:
         ns=f"{m.ns:.1f}",
         spread=f"{times.throughput.low:.1f} – {times.throughput.high:.1f}",
         latency=f"{times.latency.median:.1f}" if times.latency else "",
+        cold=f"{times.cold.median:,.0f}" if times.cold else "",
+        code=f"{m.code_bytes / 1e3:.1f}" if m.code_bytes is not None else "",
         worst=f"{times.tail.percentile_99_99:.0f} / {times.tail.worst:.0f}" if times.tail else "",
         ratio=f"{reference / m.ns:.1f}×" if reference else "",
         error=f"{m.error:.0e}",

@@ -10,6 +10,9 @@ BODIES = {
     "sums": "for (int j = 0; j < 2; ++j) out[j] = q[j] + 10.0 * qd[j] + 100.0 * x[j];",
     "few": 'asm volatile(".rept 10\\n nop\\n .endr"); out[0] = q[0];',
     "many": 'asm volatile(".rept 1010\\n nop\\n .endr"); out[0] = q[0];',
+    # From one cache line of 256 KiB to another that no prefetcher expects.
+    "walk": "static volatile double lines[32768] = {1.0}; std::size_t at = 1; "
+    "for (int k = 0; k < 4096; ++k) at = (at * 1229 + 1 + (std::size_t)lines[8 * at]) % 4096; out[0] = double(at);",
 }
 
 BATCH_BODY = (

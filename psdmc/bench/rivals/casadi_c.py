@@ -10,6 +10,7 @@ from typing import Any
 
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
+from psdmc.bench.code_size import code_sizes
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.bench.rivals.pinocchio_cpp import (
     DEFINES,
@@ -60,6 +61,7 @@ def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavail
 def _entered(
     case: Case, library: Path, by_lane: bool, counts: dict[str, tuple[int, int]]
 ) -> list[Contestant]:
+    sizes = {} if by_lane else code_sizes(library)
     return [
         Contestant(
             RIVAL,
@@ -72,6 +74,7 @@ def _entered(
             lanes=ctypes.CDLL(str(library)).lanes() if by_lane else 1,
             weights=standard_parameters(case) if function == "regressor" else None,
             operations=counts[way],
+            code_bytes=sizes.get(way),
         )
         for function, ways in ways_of(case, WAYS).items()
         for way in ways

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
+from psdmc.bench.code_size import code_sizes
 from psdmc.bench.contestant import Contestant, source
 from psdmc.bench.rivals.pinocchio_cpp import (
     DEFINES,
@@ -40,9 +41,16 @@ def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant]:
     ways_by_function = ways_of(case, WAYS)
     every = [way for ways in ways_by_function.values() for way in ways]
     library = _library(written(case), every, flags)
+    sizes = code_sizes(library)
     return [
         Contestant(
-            RIVAL, function, library, way, outputs_of(case, function), variant=variant_of(way, function)
+            RIVAL,
+            function,
+            library,
+            way,
+            outputs_of(case, function),
+            variant=variant_of(way, function),
+            code_bytes=sizes.get(way),
         )
         for function, ways in ways_by_function.items()
         for way in ways

@@ -108,6 +108,29 @@ void latency(const Work &w, std::size_t block, double *seconds, Call call) {
   }
 }
 
+/// Nothing that ran before is in a cache: memory of twice their size is read, a cache line at a time, and more machine code
+/// than the first cache of instructions holds is run.
+__attribute__((noinline)) inline void sweep(const double *memory, std::size_t reals) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < reals; i += 8) sum += memory[i];
+  asm volatile("" : : "g"(&sum) : "memory");
+  asm volatile(".rept 131072\n nop\n .endr");
+}
+
+/// Seconds of single calls, each after a sweep. The clock has been read just before, so that it costs what it does warm.
+template <class Call>
+void cold(const Work &w, std::size_t calls, const double *memory, std::size_t reals, double *seconds, Call call) {
+  for (std::size_t i = 0; i < calls; ++i) {
+    sweep(memory, reals);
+    now();
+    keep();
+    const double start = now();
+    call_one(call, w.q + i * w.nq, w.qd + i * w.nv, w.x + i * w.nv, w.y + i * w.more, w.output);
+    keep();
+    seconds[i] = now() - start;
+  }
+}
+
 /// Seconds of each call that takes a whole block of states.
 template <class Call>
 void batch(const Work &w, std::size_t block, double *seconds, Call call) {
@@ -128,6 +151,10 @@ void batch(const Work &w, std::size_t block, double *seconds, Call call) {
   }                                                                                                \
   PSDMC_EXPORT void symbol##_latency(const bench::Work *w, std::size_t block, double *seconds) {   \
     bench::latency(*w, block, seconds, __VA_ARGS__);                                               \
+  }                                                                                                \
+  PSDMC_EXPORT void symbol##_cold(const bench::Work *w, std::size_t calls, const double *memory, std::size_t reals, \
+                                  double *seconds) {                                               \
+    bench::cold(*w, calls, memory, reals, seconds, __VA_ARGS__);                                   \
   }
 
 #define PSDMC_BATCH_CONTESTANT(symbol, ...)                                                        \

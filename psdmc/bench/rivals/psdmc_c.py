@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
 
 from psdmc.bench.build import built, cxx, produced
 from psdmc.bench.case import BENCHED, MOST_DIFFERENTIATED, Case
+from psdmc.bench.code_size import code_bytes, code_sizes
 from psdmc.bench.contestant import Contestant, Unavailable, source
 from psdmc.emit.info import package_info
 from psdmc.emit.options import EmitOptions
@@ -31,6 +33,9 @@ EXPANDED = tuple(
 )
 """The functions whose times PSDM-2021 and Denso-2022 published."""
 
+
+LIBRARY = "library.so"
+"""The package's own library, in a folder of its own."""
 
 EXPANDED_LIMIT = 30_000
 """Monomials p up to which the expanded form is measured: beyond, lowering and compiling it takes many minutes."""
@@ -60,7 +65,11 @@ def contestants(
     kernels = kernels_of(case.model, lowering, tuple(functions))
     package = package_view(package_info(case.model, name="bench"), kernels, EmitOptions())
     library = compiled(package, flags)
-    ways = (_ways(case, f"psdmc {lowering}", k, library, package.lanes) for k in kernels.values())
+    sizes = code_sizes(_library(library_files(package), package.sources, package.robot, flags) / LIBRARY)
+    ways = (
+        _ways(case, f"psdmc {lowering}", k, library, package.lanes, _code(package.robot, k.name, sizes))
+        for k in kernels.values()
+    )
     return [way for group in ways for way in group]
 
 
@@ -70,15 +79,24 @@ def kernels_of(model: DynamicsModel, lowering: Lowering, functions: tuple[str, .
     return lower(model, lowering, functions, theta_variants=False)
 
 
-def _ways(case: Case, rival: str, kernel: Kernel, library: Path, lanes: int) -> list[Contestant]:
+def _code(robot: str, kernel: str, sizes: Mapping[str, int]) -> int | None:
+    """Bytes of the function for one state and of the parts that a long one consists of."""
+    own = re.compile(rf"{robot}_{kernel}|{kernel}_part_\d+")
+    return code_bytes(sizes, lambda name: own.fullmatch(name) is not None)
+
+
+def _ways(
+    case: Case, rival: str, kernel: Kernel, library: Path, lanes: int, code: int | None
+) -> list[Contestant]:
     name = kernel.name
     sections = _sections(kernel.function, case.sizes)
     size = sum(sections)
     weights = case.model.theta_b if RECIPES[name].times_theta else None
     single, batch = (cost(program) for program in (kernel.single, kernel.batch))
     one = Contestant(
-        rival, name, library, name, size, weights=weights, operations=(single.mul, single.add + single.div)
-    )
+        rival, name, library, name, size,
+        weights=weights, operations=(single.mul, single.add + single.div), code_bytes=code,
+    )  # fmt: skip
     many = (batch.mul, batch.add + batch.div)
     rows = Contestant(
         rival, name, library, f"{name}_batch", size,
@@ -98,7 +116,7 @@ def compiled(package: PackageView, flags: tuple[str, ...]) -> Path:
     home = _library(files, package.sources, robot, flags)
     header = next(path for path in files if path.startswith("include/") and path.endswith(".h"))
     sources = {"loops.hpp": source("loops.hpp"), "glue.cpp": glue(package), "library.h": files[header]}
-    command = [cxx(), "-std=c++17", *flags, "-shared", "-I.", "glue.cpp", str(home / "library.so")]
+    command = [cxx(), "-std=c++17", *flags, "-shared", "-I.", "glue.cpp", str(home / LIBRARY)]
     return built("contestant.so", [*command, "-o", "contestant.so"], sources)
 
 
@@ -112,7 +130,7 @@ def _library(files: dict[str, str], sources: tuple[str, ...], robot: str, flags:
         "-Iinclude",
         *sources,
         "-o",
-        "library.so",
+        LIBRARY,
     )
 
     def build(folder: Path) -> None:
