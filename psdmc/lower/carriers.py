@@ -24,7 +24,7 @@ INDEPENDENT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12)
 first figure first, then, for places that are still open, the next. A carrier that is barely independent would have
 huge values."""
 
-EXACT = 3e-14
+EXACT = 4e-15
 """Contributions below this, relative to the whole, are rounding of an exact zero."""
 
 FAIR_SHARE = 1e-3

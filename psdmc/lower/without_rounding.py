@@ -7,8 +7,9 @@ import numpy as np
 from psdmc.robot.mechanism import Array, Placement
 from psdmc.robot.small import length
 
-EXACT = 1e-12
-"""Lengths (relative to the chain's reach) and direction cosines below this are rounding of an exact zero."""
+EXACT = 4e-15
+"""Lengths (relative to the chain's reach) and direction cosines below this are rounding of an exact zero: some units in the
+last place. A small joint's torque may be a hundredth of what passes it by: 1e-12 here has been 1e-10 there."""
 
 DECIMALS = 12
 """A length that differs by rounding from one of so many decimals is replaced by that one, so that equal lengths stay

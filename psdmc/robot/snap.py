@@ -18,8 +18,9 @@ from psdmc.robot.mechanism import Array
 ROUNDING = 1e-14
 """rad: a smaller angle is floating-point noise of composing rotations, always cleaned, never reported."""
 
-LENGTH_ROUNDING = 1e-13
-"""A coordinate below this fraction of the chain's length is noise of composing placements: zero."""
+LENGTH_ROUNDING = 4e-15
+"""A coordinate below this fraction of the chain's length is noise of composing placements, some units in the last place:
+zero. What a file means by 1.57079632679 for a right angle is a thousand times larger."""
 
 
 def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:

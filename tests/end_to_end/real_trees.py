@@ -1,4 +1,5 @@
-"""Whole robots of the example-robot-data wheel on a fixed base, and Pinocchio's own model of each file, mimic joints too."""
+"""Whole robots of the example-robot-data wheel on a fixed or a free base, Pinocchio's own model of each file, mimic joints
+too, and the file's numbers in extended precision."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from extended_tree import ROOT_V, ExtendedTree
 
-from psdmc.derivation.last_digit import extended_torques
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot, load_robot
 
@@ -40,6 +41,7 @@ ROBOTS = {
 """Movable joints of each; those of baxter, panda, pr2 and tiago_pro that mimic others are among them."""
 
 COUNT = 30
+FIGURES = ("rnea", "nle", "gravity", "M", "kinetic", "potential", "cmm")
 Array = np.ndarray
 
 
@@ -59,17 +61,24 @@ class RealTree:
     free     the same, every joint with a coordinate of its own: Pinocchio has no energies of mimic joints
     """
 
-    def __init__(self, name: str) -> None:
-        self.loaded: LoadedRobot = load_robot(path_of(name), snap=0.0)
+    def __init__(self, name: str, is_floating: bool = False) -> None:
+        self.loaded: LoadedRobot = load_robot(path_of(name), snap=0.0, floating=is_floating)
         text = self.loaded.source_text.replace('type="continuous"', 'type="revolute"')
-        self.oracle = pin.buildModelFromXML(text, mimic=True)
-        self.free = pin.buildModelFromXML(text)
+        root = [pin.JointModelFreeFlyer()] if is_floating else []
+        self.oracle = pin.buildModelFromXML(text, *root, mimic=True)
+        self.free = pin.buildModelFromXML(text, *root)
         self.following = Following.of(self.loaded.mechanism.coordinates, self.loaded.mechanism.types)
         n = self.oracle.nv
         self.q, self.qd, self.qdd = (
             np.random.default_rng(len(name)).uniform(-1.0, 1.0, (3, COUNT, n))
             * (np.array([np.pi, 3.0, 5.0])[:, None, None])
         )
+        if is_floating:
+            turns = np.random.default_rng(COUNT).normal(size=(COUNT, 4))
+            turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+            self.q = np.hstack([self.q[:, :3], turns, self.q[:, ROOT_V:]])
+        joints = list(self.oracle.names)[1 + len(root) :]
+        self.extended = ExtendedTree(self.loaded.source_text, joints, is_floating)
 
     def each(self, function: Callable[..., object], *states: Array, model: pin.Model | None = None) -> Array:
         model = model or self.oracle
@@ -80,11 +89,30 @@ class RealTree:
     def tau(self) -> Array:
         return self.each(pin.rnea, self.q, self.qd, self.qdd)
 
-    def exact(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Torques in extended precision."""
-        chain = self.loaded.mechanism
-        states = [list(vector.T) for vector in (q, qd, qdd)]
-        return extended_torques(chain, chain.parameters.reshape(-1), states)
+    @cached_property
+    def truth(self) -> dict[str, Array]:
+        """In extended precision, of the file's numbers, a name of FIGURES each."""
+        still = np.zeros_like(self.qd)
+        moving, resting = self.extended.at(self.q, self.qd, self.qdd), self.extended.at(self.q, still, still)
+        at_zero = self.extended.at(self.neutral[None, :], still[:1], still[:1])
+        return {
+            "rnea": moving.torques,
+            "nle": self.extended.at(self.q, self.qd, still).torques,
+            "gravity": resting.torques,
+            "M": moving.mass_matrix,
+            "kinetic": moving.kinetic_energy,
+            "potential": moving.potential_energy - at_zero.potential_energy,
+            "cmm": moving.centroidal_momentum_matrix,
+        }
+
+    @cached_property
+    def pinocchios(self) -> dict[str, Array]:
+        found = (self.tau, self.bias, self.gravity, self.mass, self.kinetic, self.potential, self.momentum)
+        return dict(zip(FIGURES, found, strict=True))
+
+    @property
+    def neutral(self) -> Array:
+        return np.asarray(pin.neutral(self.oracle))
 
     @cached_property
     def mass(self) -> Array:
@@ -107,9 +135,16 @@ class RealTree:
     @cached_property
     def potential(self) -> Array:
         """Above that where every joint is at zero."""
-        at_zero = pin.computePotentialEnergy(self.free, self.free.createData(), np.zeros(self.free.nq))
+        neutral = self.following.positions(self.neutral)
+        at_zero = pin.computePotentialEnergy(self.free, self.free.createData(), neutral)
         q = self.following.positions(self.q)
         return self.each(pin.computePotentialEnergy, q, model=self.free) - at_zero
+
+    @cached_property
+    def momentum(self) -> Array:
+        """The centroidal momentum matrix, (count, 6, nv)."""
+        q = self.following.positions(self.q)
+        return self.following.summed(self.each(pin.computeCentroidalMap, q, model=self.free))
 
     @cached_property
     def condition(self) -> float:
@@ -120,10 +155,13 @@ class RealTree:
         """Rank of Pinocchio's regressor, over bodies that the file has; columns that are rounding beside the largest have no
         effect."""
         data, rng = self.free.createData(), np.random.default_rng(1)
-        bodies = self.free.nv
+        bodies = self.free.njoints - 1
         factor = np.zeros((0, 10 * bodies))
         for _ in range(3 * len(self.loaded.chain)):
             q, qd, qdd = rng.uniform(-2.0, 2.0, (3, self.oracle.nv))
+            if self.extended.is_floating:
+                turn = rng.normal(size=4)
+                q = np.hstack([q[:3], turn / np.linalg.norm(turn), q[ROOT_V:]])
             joints = self.following.positions(q), self.following.rates(qd), self.following.rates(qdd)
             rows = pin.computeJointTorqueRegressor(self.free, data, *joints)
             factor = np.linalg.qr(np.vstack([factor, self.following.ratios.T @ rows]), mode="r")
@@ -138,10 +176,11 @@ NOTHING = 1e-12
 """Share of a robot's largest value below which a joint's is rounding: a vertical axis under gravity, for one."""
 
 
-def error(found: Array, expected: Array) -> float:
-    """Largest difference, column by column relative to the column's largest value, or to the robot's where that is NOTHING
-    beside it; a matrix as one."""
+def error(found: Array, expected: Array, least: Array | float = 0.0) -> float:
+    """Largest difference relative to the largest value of the same joint (a matrix's row), or to the robot's where that is
+    NOTHING beside it, or to `least` where that is larger; of the momentum matrix, rows are its six parts."""
+    others = (0, 2) if expected.ndim == 3 else 0
     overall = float(np.abs(expected).max())
-    scale = overall if expected.ndim == 3 else np.abs(expected).max(axis=0)
-    scale = np.where(scale > NOTHING * overall, scale, overall or 1.0)
-    return float(np.max(np.abs(found - expected).max(axis=None if expected.ndim == 3 else 0) / scale))
+    scale = np.abs(expected).max(axis=others)
+    scale = np.maximum(np.where(scale > NOTHING * overall, scale, overall or 1.0), least)
+    return float(np.max(np.abs(found - expected).max(axis=others) / scale))

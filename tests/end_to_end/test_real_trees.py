@@ -1,4 +1,5 @@
-"""Robots of example-robot-data whole: models, lowered and compiled functions against Pinocchio and MuJoCo.
+"""Robots of example-robot-data whole, on a fixed and on a free base: models and compiled functions against extended
+precision, Pinocchio and MuJoCo.
 
 `make test` takes a few, `make test-trees` all of them, and prints the figures.
 """
@@ -10,7 +11,7 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from real_trees import ROBOTS, RealTree, error
+from real_trees import COUNT, ROBOTS, RealTree, error
 from slow_cases import slow_but_for
 from unoptimised import without_optimisation
 
@@ -20,13 +21,19 @@ from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques
-from psdmc.toolchain.call import CompiledRobot
 
 WHOLE = os.environ.get("PSDMC_TREES") == "whole"
 FEW = ("allegro_right_hand.urdf", "go2.urdf", "panda.urdf", "simple_humanoid.urdf", "tiago.urdf")
-COMPILED = ("panda.urdf", "quadruped.urdf")
+FEW_FLOATING = ("quadruped.urdf", "tiago.urdf")
+COMPILED = [("panda.urdf", False), ("quadruped.urdf", False), ("quadruped.urdf", True)]
+ALL_COMPILED = [(name, is_floating) for is_floating in (False, True) for name in ROBOTS]
 
 EXACT = 1e-12
+PINOCCHIOS = 1e-12
+"""What Pinocchio itself may differ by from extended precision."""
+SLIGHT = 1e-3
+"""Share of a joint's largest torque below which its nonlinear effects and gravity torques are compared on that scale: about
+a wheel's own axis they are 6e-7 N m, the rounding of its inertias."""
 SOLVED = 1e-10
 ORDINARY = 1e6
 """Condition of a mass matrix up to which forward dynamics keep to SOLVED; beyond, to that share of it."""
@@ -40,13 +47,20 @@ FUNCTIONS = (
     "gravity",
     "kinetic_energy",
     "potential_energy",
+    "centroidal_momentum_matrix",
 )
 
 
-@pytest.fixture(scope="module", params=ROBOTS if WHOLE else FEW)
+@pytest.fixture(
+    scope="module",
+    params=[(name, False) for name in (ROBOTS if WHOLE else FEW)]
+    + [(name, True) for name in (ROBOTS if WHOLE else FEW_FLOATING)],
+    ids=lambda case: f"{case[0]}{'-floating' if case[1] else ''}",
+)
 def tree(request: pytest.FixtureRequest) -> tuple[str, RealTree, DynamicsModel]:
-    found = RealTree(request.param)
-    return request.param, found, derive_model(found.loaded.mechanism)
+    name, is_floating = request.param
+    found = RealTree(name, is_floating)
+    return name, found, derive_model(found.loaded.mechanism)
 
 
 def report(name: str, **figures: float) -> None:
@@ -56,47 +70,43 @@ def report(name: str, **figures: float) -> None:
 def test_joints_are_pinocchios(tree) -> None:
     name, robot, model = tree
     assert list(model.joint_names) == list(robot.oracle.names)[1:]
-    assert len(model.joint_names) == ROBOTS[name]
+    assert len(model.joint_names) == ROBOTS[name] + robot.extended.is_floating
 
 
-def test_the_models_torques_and_mass_matrix(tree) -> None:
+def errors(robot: RealTree, given: dict[str, np.ndarray]) -> dict[str, float]:
+    """Against extended precision, within EXACT; against Pinocchio, too, but for what Pinocchio differs by from that."""
+    truth, pinocchios = robot.truth, robot.pinocchios
+    found: dict[str, float] = {}
+    for figure, values in given.items():
+        least = SLIGHT * np.abs(truth["rnea"]).max(axis=0) if figure in ("nle", "gravity") else 0.0
+        own = error(pinocchios[figure], truth[figure], least)
+        assert own <= PINOCCHIOS, f"Pinocchio's {figure}: {own:.1e}"
+        found[figure] = error(values, truth[figure], least)
+        assert error(values, pinocchios[figure], least) <= EXACT + own, figure
+    return found
+
+
+def test_the_model(tree) -> None:
     name, robot, model = tree
-    figures = torque_errors(robot, model)
-    torques = model.regressor(robot.q, robot.qd, robot.qdd) @ model.theta_b
-    figures["regressor"] = torque_error(robot, torques, robot.tau, robot.q, robot.qd, robot.qdd)
-    report(name, **figures)
-    assert max(figures.values()) <= EXACT, figures
-
-
-def torque_error(robot: RealTree, found: np.ndarray, expected: np.ndarray, *states: np.ndarray) -> float:
-    """Against Pinocchio; where its own rounding is more than half of EXACT, as on a wrist of a tenth of a newton
-    millimetre behind an arm, against extended precision."""
-    direct = error(found, expected)
-    if direct <= EXACT:
-        return direct
-    exact = robot.exact(*states)
-    assert error(expected, exact) > EXACT / 2, "Pinocchio agrees with extended precision"
-    return error(found, exact)
-
-
-def torque_errors(robot: RealTree, functions: DynamicsModel | CompiledRobot) -> dict[str, float]:
     q, qd, qdd = robot.q, robot.qd, robot.qdd
-    rest = np.zeros_like(qd)
-    return {
-        "rnea": torque_error(robot, functions.inverse_dynamics(q, qd, qdd), robot.tau, q, qd, qdd),
-        "M": error(functions.mass_matrix(q), robot.mass),
-        "nle": torque_error(robot, functions.nonlinear_effects(q, qd), robot.bias, q, qd, rest),
-        "gravity": torque_error(robot, functions.gravity(q), robot.gravity, q, rest, rest),
+    on_arrays, given = RobotOnArrays.of(model, model.theta_b), {"q": q, "qd": qd}
+
+    def recipe(function: str) -> np.ndarray:
+        (values,) = RECIPES[function].reference(on_arrays, given).values()
+        return values.reshape(COUNT, 6, -1) if function == "centroidal_momentum_matrix" else values
+
+    found = {
+        "rnea": model.inverse_dynamics(q, qd, qdd),
+        "nle": model.nonlinear_effects(q, qd),
+        "gravity": model.gravity(q),
+        "M": model.mass_matrix(q),
+        "kinetic": recipe("kinetic_energy"),
+        "potential": recipe("potential_energy"),
+        "cmm": recipe("centroidal_momentum_matrix"),
     }
-
-
-def test_energies(tree) -> None:
-    name, robot, model = tree
-    on_arrays, given = RobotOnArrays.of(model, model.theta_b), {"q": robot.q, "qd": robot.qd}
-    kinetic = RECIPES["kinetic_energy"].reference(on_arrays, given)
-    potential = RECIPES["potential_energy"].reference(on_arrays, given)
-    (T,), (V,) = kinetic.values(), potential.values()
-    figures = {"kinetic": error(T, robot.kinetic), "potential": error(V, robot.potential)}
+    figures = errors(robot, found)
+    regressor = {"rnea": model.regressor(q, qd, qdd) @ model.theta_b}
+    figures["regressor"] = errors(robot, regressor)["rnea"]
     report(name, **figures)
     assert max(figures.values()) <= EXACT, figures
 
@@ -105,6 +115,12 @@ def test_base_parameters_are_as_many_as_pinocchios_rank(tree) -> None:
     name, robot, model = tree
     print(name, "l", model.l)
     assert model.l == robot.base_parameters
+    if (
+        robot.extended.is_floating
+        and robot.oracle.nq == robot.free.nq
+        and model.mechanism.parameters[:, 0].all()
+    ):
+        assert model.l == 10 * model.n - sum(joint.hidden for joint in model.mechanism.types)
 
 
 def test_mujoco_says_the_same(tree) -> None:
@@ -122,15 +138,24 @@ def test_mujoco_says_the_same(tree) -> None:
     assert share <= MUJOCO
 
 
-@pytest.mark.parametrize("name", ROBOTS if WHOLE else slow_but_for(["quadruped.urdf"], COMPILED))
-def test_compiled_functions(name: str) -> None:
-    robot = RealTree(name)
+@pytest.mark.parametrize(
+    ("name", "is_floating"), ALL_COMPILED if WHOLE else slow_but_for(COMPILED[1:2], COMPILED, spread=True)
+)
+def test_compiled_functions(name: str, is_floating: bool) -> None:
+    robot = RealTree(name, is_floating)
     with nullcontext() if WHOLE else without_optimisation():
         compiled = psdmc.compile(derive_model(robot.loaded.mechanism), functions=FUNCTIONS)
     q, qd, qdd = robot.q, robot.qd, robot.qdd
-    figures = torque_errors(robot, compiled)
-    figures["kinetic"] = error(compiled.kinetic_energy(q, qd), robot.kinetic)
-    figures["potential"] = error(compiled.potential_energy(q), robot.potential)
+    found = {
+        "rnea": compiled.inverse_dynamics(q, qd, qdd),
+        "nle": compiled.nonlinear_effects(q, qd),
+        "gravity": compiled.gravity(q),
+        "M": compiled.mass_matrix(q),
+        "kinetic": compiled.kinetic_energy(q, qd),
+        "potential": compiled.potential_energy(q),
+        "cmm": compiled.centroidal_momentum_matrix(q),
+    }
+    figures = errors(robot, found)
     solved = error(compiled.forward_dynamics(q, qd, robot.tau), qdd)
     report(name, **figures, fd=solved, condition=robot.condition)
     assert max(figures.values()) <= EXACT, figures

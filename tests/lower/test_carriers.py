@@ -41,7 +41,7 @@ def larger(chain: Mechanism, times: float) -> Mechanism:
 
 
 def test_what_is_zero_or_one_but_for_rounding_is_so_exactly_and_nothing_else_is() -> None:
-    rounding = 4e-15
+    rounding = 2e-15
     given = [[1.0 + rounding, 2.0 + rounding], [-1.0 - rounding, rounding], [0.5, 1.0 + 1e-12]]
     tableau = Tableau((0, 1, 2), np.hstack([np.eye(3), given]).astype(np.longdouble))
     space = CarrierSpace(np.eye(3), tableau, whole=np.ones(2))
