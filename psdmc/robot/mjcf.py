@@ -16,12 +16,13 @@ from psdmc.robot.limits import shown
 from psdmc.robot.mjcf_copies import refuse_many_copies
 from psdmc.robot.mjcf_faults import (
     followers,
-    left_out,
     refuse_armatures,
     refuse_constraints,
     refuse_references,
 )
 from psdmc.robot.mjcf_names import Names
+from psdmc.robot.mjcf_notes import left_out
+from psdmc.robot.mjcf_terms import gravity
 from psdmc.robot.mjcf_text import tree_text
 from psdmc.robot.mujoco_warnings import kept_warnings
 
@@ -61,12 +62,13 @@ def read_mjcf(path: Path, source: str) -> MjcfRobot:
     names = Names.of(mujoco, model)
     refuse_constraints(mujoco, model, names, source)
     refuse_references(mujoco, model, names, source)
-    refuse_armatures(model, names, source)
+    refuse_armatures(mujoco, model, names, source)
     free = _free_root(mujoco, model, names, source)
     notes = [f"MJCF, as MuJoCo {mujoco.__version__} compiles it", *left_out(mujoco, model, names), *warned]
-    gx, gy, gz = model.opt.gravity.tolist()
     follows = followers(mujoco, model, names)
-    return MjcfRobot(tree_text(mujoco, model, names, follows, free, notes), (gx, gy, gz), free is not None)
+    return MjcfRobot(
+        tree_text(mujoco, model, names, follows, free, notes), gravity(mujoco, model), free is not None
+    )
 
 
 def _mujoco(source: str) -> Any:

@@ -1,11 +1,14 @@
-"""How many elements an MJCF file makes by repetition, and the refusal of too many: the time of MuJoCo's compiler grows with
-their square, and no signal ends it.
+"""What an MJCF file repeats, in itself and in all that it includes and attaches.
+
+MuJoCo's compiler takes time that grows with the square of the copies, and dies of a model that is a part of itself; no
+signal ends the one, no exception tells of the other.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, ParseError
@@ -15,11 +18,18 @@ from defusedxml.common import DefusedXmlException
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import MAX_BYTES, MAX_COPIES, shown
+from psdmc.robot.mjcf_sizes import refuse_large
 
 REPEATING = ("replicate", "composite", "flexcomp")
 """Elements whose `count` says how many copies there are; of the last two, along up to three axes."""
 
-WORD = re.compile(rb"<\s*(replicate|composite|flexcomp)\b")
+WORD = re.compile(rb"<\s*(replicate|composite|flexcomp|attach|model)\b")
+MAX_DEPTH = 300
+"""Elements within each other: more than the joints of a robot."""
+MAX_MODELS = 20
+"""Models that are attached within each other."""
+MOST_DIGITS = 1e15
+"""Beyond, a number of copies is only called large."""
 
 
 class _Count(NamedTuple):
@@ -29,34 +39,92 @@ class _Count(NamedTuple):
     copies: float
 
 
+@dataclass(slots=True)
+class _Document:
+    """A model's own file: the file that is read, or one that <model> names for <attach>.
+
+    root      None: not well-formed, and nothing in it that could be counted
+    models    of its <model> elements, by name
+    included  files that are in it; MuJoCo takes each once
+    """
+
+    path: Path
+    root: Element | None
+    models: dict[str, Path] = field(default_factory=dict)
+    included: set[Path] = field(default_factory=set)
+
+
+@dataclass(slots=True)
+class _Reading:
+    """source: what messages call the robot's file. counts: of documents that are read; None while one is being read."""
+
+    source: str
+    counts: dict[Path, _Count | None] = field(default_factory=dict)
+    documents: dict[Path, _Document] = field(default_factory=dict)
+    attached: set[tuple[Path, str | None]] = field(default_factory=set)
+
+
 def refuse_many_copies(path: Path, source: str) -> None:
-    """InputError where a file, with all that it includes, asks for more than MAX_COPIES elements by repetition, or repeats
-    something and is no well-formed XML. Whatever else is wrong with it is left to MuJoCo."""
-    copies = _of_file(path, path.parent, source, set()).copies
+    """InputError where a file, with all that it includes and attaches, asks for more than MAX_COPIES elements by repetition,
+    attaches itself, makes a mesh or a field that is too large, or repeats something and is no well-formed XML. Whatever
+    else is wrong with it is left to MuJoCo."""
+    copies = _of_document(path, _Reading(source)).copies
     if not copies <= MAX_COPIES:
+        many = f"{copies:.0f}" if copies < MOST_DIGITS else f"more than {MOST_DIGITS:.0f}"
         raise InputError(
-            f"{source}: <replicate>, <composite> or <flexcomp> ask for {copies:.3g} elements, "
+            f"{source}: <replicate>, <composite>, <flexcomp> or <attach> ask for {many} elements, "
             f"expected {MAX_COPIES} at most",
             "give a smaller count",
         )
 
 
-def _of_file(path: Path, folder: Path, source: str, known: set[Path]) -> _Count:
-    """`folder`: what file names are relative to; a file is counted once, as MuJoCo takes it once."""
-    if path in known:
-        return _Count(1.0, 0.0)
-    known.add(path)
+def _of_document(path: Path, reading: _Reading) -> _Count:
+    """A model's file, each read once."""
+    where = _resolved(path)
+    if where in reading.counts:
+        known = reading.counts[where]
+        if known is None:
+            raise InputError(
+                f"{reading.source}: {shown(path.name)} attaches itself", "leave that <model> out"
+            )
+        return known
+    if sum(count is None for count in reading.counts.values()) >= MAX_MODELS:
+        raise InputError(
+            f"{reading.source}: models attach models more than {MAX_MODELS} deep", "attach what they attach"
+        )
+    reading.counts[where] = None
+    document = _Document(path, _root(path, reading.source))
+    reading.documents[where] = document
+    root = document.root
+    found = _Count(1.0, 0.0) if root is None else _of_element(root, path.parent, document, reading)
+    reading.counts[where] = found
+    return found
+
+
+def _root(path: Path, source: str) -> Element | None:
+    """A file's root element; None where it is none and has nothing to count."""
     text = _text(path, source)
     try:
-        root = defusedxml.ElementTree.fromstring(text)
+        root: Element = defusedxml.ElementTree.fromstring(text)
     except (ParseError, DefusedXmlException, ValueError, LookupError) as error:
         if WORD.search(text) is None:
-            return _Count(1.0, 0.0)
+            return None
         raise InputError(
             f"{source}: not well-formed XML ({shown(str(error))}), so that what it repeats cannot be counted",
             "correct it, or write the copies out",
         ) from None
-    return _of_element(root, folder, source, known)
+    _refuse_depth(root, source)
+    return root
+
+
+def _refuse_depth(root: Element, source: str) -> None:
+    level, depth = [root], 0
+    while level:
+        level, depth = [child for element in level for child in element], depth + 1
+    if depth > MAX_DEPTH:
+        raise InputError(
+            f"{source}: elements within each other {depth} deep, expected {MAX_DEPTH} at most", "nest less"
+        )
 
 
 def _text(path: Path, source: str) -> bytes:
@@ -76,15 +144,62 @@ def _text(path: Path, source: str) -> bytes:
     return text
 
 
-def _of_element(element: Element, folder: Path, source: str, known: set[Path]) -> _Count:
-    inside = [_of_element(child, folder, source, known) for child in element]
-    if element.tag == "include" and element.get("file"):
-        inside.append(_of_file(folder / element.get("file", ""), folder, source, known))
+def _of_element(element: Element, folder: Path, document: _Document, reading: _Reading) -> _Count:
+    """folder: of the file that the element stands in."""
+    refuse_large(element, reading.source)
+    inside = [_of_element(child, folder, document, reading) for child in element]
+    file = element.get("file")
+    if element.tag == "include" and file:
+        inside += [
+            _included(where / file, document, reading)
+            for where in dict.fromkeys((folder, document.path.parent))
+        ]
+    elif element.tag == "model" and file:
+        inside.append(_model(folder / file, element.get("name"), document, reading))
+    elif element.tag == "attach":
+        inside.append(_attached(element, document, reading))
     elements = sum(part.elements for part in inside)
     if element.tag in REPEATING:
         made = _times(element.get("count", "1")) * max(1.0, elements)
         return _Count(made, made)
     return _Count(1.0 + elements, sum(part.copies for part in inside))
+
+
+def _included(path: Path, document: _Document, reading: _Reading) -> _Count:
+    """A file that is included; MuJoCo looks for it beside the file that names it, and beside the model's own."""
+    where = _resolved(path)
+    if where in document.included:
+        return _Count(0.0, 0.0)
+    document.included.add(where)
+    root = _root(path, reading.source)
+    return _Count(1.0, 0.0) if root is None else _of_element(root, path.parent, document, reading)
+
+
+def _model(path: Path, name: str | None, document: _Document, reading: _Reading) -> _Count:
+    """A model to attach, which MuJoCo reads where it is named; what is read again are copies."""
+    is_new = _resolved(path) not in reading.counts
+    found = _of_document(path, reading)
+    root = reading.documents[_resolved(path)].root
+    own = root.get("model") if root is not None else None
+    document.models[name or own or ""] = path
+    return found if is_new else _Count(found.elements, found.elements)
+
+
+def _attached(element: Element, document: _Document, reading: _Reading) -> _Count:
+    """What <attach> puts in its place: the whole model, or one body of it. It is a copy where it is attached again."""
+    path, name = document.models.get(element.get("model", "")), element.get("body")
+    if path is None:
+        return _Count(1.0, 0.0)
+    where = _resolved(path)
+    whole = reading.counts[where] or _Count(1.0, 0.0)
+    root = reading.documents[where].root
+    bodies = [] if root is None or not name else [b for b in root.iter("body") if b.get("name") == name]
+    elements = whole.elements
+    if bodies and not any(child.tag in (*REPEATING, "include", "attach") for child in bodies[0].iter()):
+        elements = float(sum(1 for _ in bodies[0].iter()))
+    is_new = (where, name) not in reading.attached
+    reading.attached.add((where, name))
+    return _Count(elements, 0.0 if is_new else elements)
 
 
 def _times(count: str) -> float:
@@ -93,3 +208,11 @@ def _times(count: str) -> float:
         return math.prod(max(1.0, float(number)) for number in count.split())
     except ValueError:
         return 1.0
+
+
+def _resolved(path: Path) -> Path:
+    """The same for two ways to one file."""
+    try:
+        return path.resolve()
+    except (OSError, ValueError, RuntimeError):
+        return path

@@ -1,16 +1,16 @@
-"""What an MJCF file has beside a tree of rigid bodies: refused by name where it changes how the tree moves, noted where
-it is a force, a drive or a picture."""
+"""What an MJCF file has beside a tree of rigid bodies and changes how the tree moves: followers, and what is refused by
+name."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import ANGLE, LENGTH, joined, shown
 from psdmc.robot.mjcf_names import Names, named
-from psdmc.robot.tree import listed
+from psdmc.robot.mjcf_terms import acting, armatures, armatures_elsewhere, is_active, reflected
 
 REMEDY = "take them out of the file: psdmc models trees of rigid bodies"
 
@@ -26,7 +26,12 @@ class Follows:
 
 def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> None:
     """InputError that names all constraints and joints that psdmc has no model of."""
-    faults = [*_loops(mujoco, model), *_tendons(mujoco, model), *_balls(mujoco, model, names)]
+    faults = [
+        *_loops(mujoco, model),
+        *_followed_twice(mujoco, model, names),
+        *_tendons(mujoco, model),
+        *_balls(mujoco, model, names),
+    ]
     if model.nflex:
         faults.append("deformable bodies (flex)")
     if faults:
@@ -45,10 +50,15 @@ def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> Non
         raise InputError(f"{source}: {joined(found)}", "write an angle within a few turns")
 
 
-def refuse_armatures(model: Any, names: Names, source: str) -> None:
-    """InputError that names joints with negative armatures, which MuJoCo takes."""
-    armatures = [(j, float(model.dof_armature[model.jnt_dofadr[j]])) for j in range(model.njnt)]
-    found = [f"joint {shown(names.joint(j))}: armature {value:g}" for j, value in armatures if value < 0.0]
+def refuse_armatures(mujoco: Any, model: Any, names: Names, source: str) -> None:
+    """InputError that names joints and actuators with negative armatures, which MuJoCo takes."""
+    own = [(j, float(model.dof_armature[model.jnt_dofadr[j]])) for j in range(model.njnt)]
+    found = [f"joint {shown(names.joint(j))}: armature {value:g}" for j, value in own if value < 0.0]
+    found += [
+        f"actuator {_name(mujoco, model, 'ACTUATOR', k)}: armature {reflected(model, k):g} at its joint"
+        for k in range(len(model.actuator_trntype))
+        if reflected(model, k) < 0.0
+    ]
     if found:
         raise InputError(
             f"{source}: {joined(found)}, expected 0 or more", "give the inertia of the joint's drive"
@@ -57,7 +67,7 @@ def refuse_armatures(model: Any, names: Names, source: str) -> None:
 
 def _loops(mujoco: Any, model: Any) -> Iterator[str]:
     for k in range(model.neq):
-        if model.eq_active0[k] and not _is_linear(mujoco, model, k):
+        if is_active(mujoco, model, k) and not _is_linear(mujoco, model, k):
             kind = mujoco.mjtEq(model.eq_type[k]).name.removeprefix("mjEQ_").lower()
             yield f"equality constraint {_name(mujoco, model, 'EQUALITY', k)} ({kind})"
 
@@ -68,24 +78,36 @@ def _is_linear(mujoco: Any, model: Any, k: int) -> bool:
     return bool(both) and not model.eq_data[k, 2:5].any()
 
 
+def _followed_twice(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
+    own = [
+        int(model.eq_obj1id[k])
+        for k in range(model.neq)
+        if is_active(mujoco, model, k) and _is_linear(mujoco, model, k)
+    ]
+    for j in sorted(j for j in set(own) if own.count(j) > 1):
+        yield f"{own.count(j)} equality constraints of joint {shown(names.joint(j))}"
+
+
 def _tendons(mujoco: Any, model: Any) -> Iterator[str]:
+    words = ("armature", "stiffness", "damping", "frictionloss")
+    found = {word: acting(model, "tendon", word) for word in words}
+    drives = [int(model.actuator_trnid[k, 0]) for k in armatures_elsewhere(mujoco, model)]
     for k in range(model.ntendon):
-        forces = [
-            word
-            for word in ("armature", "stiffness", "damping", "frictionloss")
-            if getattr(model, f"tendon_{word}")[k] > 0.0
-        ]
+        forces = [word for word in words if found[word][k]]
+        forces += ["armature of an actuator"] if k in drives else []
         if forces:
             yield f"tendon {_name(mujoco, model, 'TENDON', k)} ({', '.join(forces)})"
 
 
 def _balls(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
-    for k in _of_balls(mujoco, model):
-        if model.dof_armature[model.jnt_dofadr[k]] > 0.0:
+    inertias = armatures(mujoco, model)
+    for k in of_balls(mujoco, model):
+        if inertias[k] > 0.0:
             yield f"armature of ball joint {shown(names.joint(k))}, a drive's inertia about three axes"
 
 
-def _of_balls(mujoco: Any, model: Any) -> list[int]:
+def of_balls(mujoco: Any, model: Any) -> list[int]:
+    """Numbers of the ball joints."""
     return [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_BALL]
 
 
@@ -93,61 +115,13 @@ def followers(mujoco: Any, model: Any, names: Names) -> dict[str, Follows]:
     """Joints that an equality constraint makes follow another: q1 - ref1 = c0 + c1 (q2 - ref2)."""
     found = {}
     for k in range(model.neq):
-        if not (model.eq_active0[k] and _is_linear(mujoco, model, k)):
+        if not (is_active(mujoco, model, k) and _is_linear(mujoco, model, k)):
             continue
         own, leader = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         shift, ratio = model.eq_data[k, :2].tolist()
         ref, leaders = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (own, leader))
         found[names.joint(own)] = Follows(names.joint(leader), ratio, ref + shift - ratio * leaders)
     return found
-
-
-def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
-    """Notes on what the model of rigid bodies leaves out, by name."""
-    joints, bodies = range(model.njnt), range(model.nbody)
-    found = {
-        "actuators are not modelled: efforts are those of the joints": _names(
-            mujoco, model, "ACTUATOR", range(model.nu)
-        ),
-        "tendons without forces of their own are left out": _names(
-            mujoco, model, "TENDON", range(model.ntendon)
-        ),
-        "equality constraints that are not active are left out": _names(
-            mujoco, model, "EQUALITY", (k for k in range(model.neq) if not model.eq_active0[k])
-        ),
-        "springs of joints are not modelled": [
-            names.joint(j) for j in joints if model.jnt_stiffness[j] != 0.0
-        ],
-        "compensation of gravity is not modelled": [
-            names.body(b) for b in bodies if model.body_gravcomp[b] != 0.0
-        ],
-        "bodies that a program moves (mocap) stand where they are": [
-            names.body(b) for b in bodies if model.body_mocapid[b] >= 0
-        ],
-        "q of ball joints is a quaternion x y z w, MuJoCo's w x y z": [
-            names.joint(j) for j in _of_balls(mujoco, model)
-        ],
-        "limits of ball joints are not read": [
-            names.joint(j) for j in _of_balls(mujoco, model) if model.jnt_limited[j]
-        ],
-        "drive inertia of a free joint is left out": [
-            names.joint(j)
-            for j in joints
-            if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
-            and model.dof_armature[model.jnt_dofadr[j]] > 0.0
-        ],
-    }
-    notes = [f"{what}: {listed(which)}" for what, which in found.items() if which]
-    followed = followers(mujoco, model, names)
-    if followed:
-        notes.append(f"equality constraints of joints hold exactly: {listed(list(followed))}")
-    if model.opt.density > 0.0 or model.opt.viscosity > 0.0:
-        notes.append("forces of the medium (density, viscosity) are not modelled")
-    return [*notes, *(["plugins are not modelled"] if model.nplugin else [])]
-
-
-def _names(mujoco: Any, model: Any, kind: str, numbers: Iterable[int]) -> list[str]:
-    return [named(mujoco, model, kind, k) or f"number {k}" for k in numbers]
 
 
 def _name(mujoco: Any, model: Any, kind: str, number: int) -> str:

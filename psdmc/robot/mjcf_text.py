@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from psdmc.robot.limits import TINIEST
 from psdmc.robot.mjcf_faults import Follows
 from psdmc.robot.mjcf_names import Names, free_name
+from psdmc.robot.mjcf_terms import armatures
 from psdmc.robot.source_words import BALL, DRIVE, NOTE
 
 Array = NDArray[np.float64]
@@ -27,20 +28,21 @@ UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 
 @dataclass(slots=True)
 class _Writer:
-    """The text under way. `links`, `joints`: names that are taken."""
+    """The text under way. `armatures`: kg m^2 (kg) of each joint; `links`, `joints`: names that are taken."""
 
     mujoco: Any
     model: Any
     names: Names
     follows: Mapping[str, Follows]
     root: Element
+    armatures: Array
     links: set[str] = field(default_factory=set)
     joints: set[str] = field(default_factory=set)
 
     def link(self, name: str, body: int | None = None) -> None:
         """A link; with the inertia of a body where it has one."""
         element = SubElement(self.root, "link", name=name)
-        if body is None or self.model.body_mass[body] <= 0.0:
+        if body is None or not (self.model.body_mass[body] > 0.0 or self.model.body_inertia[body].any()):
             return
         inertial = SubElement(element, "inertial")
         _origin(inertial, self.model.body_ipos[body], self.model.body_iquat[body])
@@ -69,7 +71,8 @@ def tree_text(
     robot = Element("robot", name=_robot_name(model), version="1.1")
     for note in notes:
         SubElement(robot, NOTE, text=note)
-    writer = _Writer(mujoco, model, names, follows, robot, set(names.bodies), set(names.joints))
+    drives = armatures(mujoco, model)
+    writer = _Writer(mujoco, model, names, follows, robot, drives, set(names.bodies), set(names.joints))
     root = 0 if free is None else free
     writer.link(names.body(root), root)
     for body in range(1, model.nbody):
@@ -136,7 +139,7 @@ def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array
     if limited:
         limits |= dict(zip(("lower", "upper"), map(_number, model.jnt_range[j]), strict=True))
     if forced:
-        limits["effort"] = _number(np.abs(model.jnt_actfrcrange[j]).max())
+        limits["effort"] = _number(_effort(*model.jnt_actfrcrange[j]))
     if limits:
         SubElement(element, "limit", limits)
     _dynamics(writer, j, element)
@@ -144,9 +147,14 @@ def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array
         rule = writer.follows[name]
         numbers = {"multiplier": _number(rule.ratio), "offset": _number(rule.offset)}
         SubElement(element, "mimic", {"joint": rule.leader, **numbers})
-    armature = model.dof_armature[model.jnt_dofadr[j]]
-    if armature > 0.0:
-        SubElement(element, DRIVE, inertia=_number(armature))
+    if writer.armatures[j] > 0.0:
+        SubElement(element, DRIVE, inertia=_number(writer.armatures[j]))
+
+
+def _effort(least: float, most: float) -> float:
+    """The effort that a joint has in both directions; where it has but one, what it has in that."""
+    both = min(-least, most)
+    return both if both > 0.0 else max(abs(least), abs(most))
 
 
 def _is_ball(writer: _Writer, j: int) -> bool:

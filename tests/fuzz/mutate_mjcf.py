@@ -15,7 +15,7 @@ BOOL = ("true", "false", "auto")
 ELEMENTS: dict[str, dict[str, Choice]] = {
     "joint": {
         "type": ("hinge", "slide", "ball", "free"), "axis": 3, "pos": 3, "ref": 1, "range": 2, "armature": 1,
-        "stiffness": 1, "damping": 1, "limited": BOOL, "springref": 1, "frictionloss": 1, "actuatorfrcrange": 2,
+        "stiffness": 3, "damping": 3, "limited": BOOL, "springref": 1, "frictionloss": 1, "actuatorfrcrange": 2,
     },
     "freejoint": {"name": ("root", "x")},
     "geom": {
@@ -31,7 +31,13 @@ ELEMENTS: dict[str, dict[str, Choice]] = {
     },
     "option": {"gravity": 3, "density": 1, "viscosity": 1, "wind": 3, "timestep": 1},
     "include": {"file": ("robot.xml", "missing.xml", "/dev/zero", "..")},
-    "equality": {}, "tendon": {}, "contact": {}, "keyframe": {}, "default": {"class": ("thin", "main", "x")},
+    "motor": {"joint": ("turn", "hip_l", "left", "root"), "gear": 1, "armature": 1, "damping": 3},
+    "flag": {word: ("disable", "enable") for word in ("gravity", "equality", "constraint", "spring", "damper")},
+    "model": {"name": ("m",), "file": ("robot.xml", "missing.xml")},
+    "attach": {"model": ("m",), "body": ("a", "b", "x"), "prefix": ("p", "q")},
+    "mesh": {"name": ("none",), "builtin": ("sphere", "supersphere", "supertorus", "cone", "plate"), "params": 3},
+    "size": {"nkey": 1, "memory": ("1M", "x"), "nuserdata": 1},
+    "asset": {}, "actuator": {}, "equality": {}, "tendon": {}, "contact": {}, "keyframe": {}, "default": {"class": ("thin", "main", "x")},
     "frame": {"pos": 3, "quat": 4}, "site": {"pos": 3},
     "replicate": {"count": ("2", "9", "0", "-1", "1000000"), "offset": 3},
 }  # fmt: skip

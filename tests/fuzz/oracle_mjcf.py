@@ -12,6 +12,10 @@ from oracle import SEED, STATES
 
 from psdmc.model.dynamics_model import DynamicsModel
 
+FORCES = ("dof_damping", "dof_dampingpoly", "dof_frictionloss", "jnt_stiffness", "jnt_stiffnesspoly", "body_gravcomp",
+          "actuator_damping", "actuator_dampingpoly")  # fmt: skip
+"""Arrays of what is no inertia, and noted by name; older MuJoCos have not all of them."""
+
 
 def mujoco_error(path: Path, model: DynamicsModel) -> float | None:
     """Largest difference at three states over the largest torque; None where there is nothing to compare: a free root,
@@ -22,8 +26,9 @@ def mujoco_error(path: Path, model: DynamicsModel) -> float | None:
     numbers = [mujoco.mj_name2id(robot, mujoco.mjtObj.mjOBJ_JOINT, name) for name in model.joint_names]
     if robot.neq or -1 in numbers or len(numbers) != robot.nv or model.theta_b is None:
         return None
-    for forces in (robot.dof_damping, robot.dof_frictionloss, robot.jnt_stiffness, robot.body_gravcomp):
-        forces[:] = 0.0
+    for name in FORCES:
+        if hasattr(robot, name):
+            getattr(robot, name)[:] = 0.0
     robot.opt.density = robot.opt.viscosity = 0.0
     bits = mujoco.mjtDisableBit
     robot.opt.disableflags = int(bits.mjDSBL_CONTACT | bits.mjDSBL_LIMIT)

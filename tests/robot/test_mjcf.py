@@ -157,7 +157,7 @@ def test_joints_anchors_references_armature_and_geometry_as_mujoco_has_them(tmp_
         "revolute",
     ]
     assert (turn.limits.lower, turn.limits.upper) == pytest.approx((-np.pi / 2, np.pi / 2))
-    assert (slide.limits.lower, slide.limits.upper, slide.limits.effort) == (-1.0, 1.0, 40.0)
+    assert (slide.limits.lower, slide.limits.upper, slide.limits.effort) == (-1.0, 1.0, 30.0)
     assert robot.mechanism.parameters[:, 10].tolist() == [0.02] * 4
     assert robot.mechanism.gravity.tolist() == [0.3, 0.0, -9.5]
 

@@ -5,12 +5,14 @@ Status 0 where nothing was found. Tools that are not installed are listed.
 python tests/toolchain/sanitize_campaign.py --jobs 1 scara     one robot, one build at a time
 python tests/toolchain/sanitize_campaign.py --functions gravity,momentum --options 1 two_link
                                                                these functions, in one precision with one sine
+python tests/toolchain/sanitize_campaign.py --tools clang kr6   some of the tools
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -66,6 +68,7 @@ def main() -> int:
         "--functions", default="all", help="NAME,... or 'default'; default: all that there are"
     )
     parser.add_argument("--options", type=int, default=len(OPTIONS), help="of how many precisions and sines")
+    parser.add_argument("--tools", default="", help="a regular expression in their names; default: all")
     chosen = parser.parse_args()
     functions = wanted([word.strip() for word in chosen.functions.split(",")])
     found: list[tuple[str, Outcome]] = []
@@ -84,6 +87,7 @@ def main() -> int:
         (name, package, tool)
         for name, package in packages(tuple(chosen.robots), functions, chosen.options)
         for tool in (*DYNAMIC, *STATIC)
+        if re.search(chosen.tools, tool.name)
     ]
     with ThreadPoolExecutor(chosen.jobs) as pool:
         list(pool.map(one, jobs))

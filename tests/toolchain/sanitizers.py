@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
+import signal
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -192,4 +194,13 @@ def _read(tool: Tool, package: PackageView, folder: Path) -> Outcome:
 
 
 def _done(words: list[str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=SECONDS)
+    """What a command ended with; one that does not end in time is ended with all that it started, and has failed."""
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        try:
+            said = process.communicate(timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            return subprocess.CompletedProcess(words, 1, "", f"{words[0]}: not done in {SECONDS} s")
+        return subprocess.CompletedProcess(words, process.returncode, *said)

@@ -1,0 +1,83 @@
+"""What a compiled MJCF spreads over several arrays: inertias of drives, coefficients of forces, whether constraints act.
+
+Arrays that the installed MuJoCo does not have yet are zero.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def armatures(mujoco: Any, model: Any) -> Array:
+    """(njnt,) drive inertia at each joint, kg m^2 (kg): its own, and that of each actuator by the square of its gear."""
+    found = np.array(model.dof_armature[model.jnt_dofadr], dtype=float)
+    for k in _with_armature(model):
+        if model.actuator_trntype[k] in _joint_transmissions(mujoco):
+            found[model.actuator_trnid[k, 0]] += reflected(model, k)
+    return found
+
+
+def armatures_elsewhere(mujoco: Any, model: Any) -> list[int]:
+    """Actuators with armature that act on something else than a joint: on a tendon."""
+    return [k for k in _with_armature(model) if model.actuator_trntype[k] not in _joint_transmissions(mujoco)]
+
+
+def reflected(model: Any, actuator: int) -> float:
+    """Inertia of an actuator at its joint."""
+    return float(model.actuator_armature[actuator] * model.actuator_gear[actuator, 0] ** 2)
+
+
+def acting(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
+    """Of each joint (kind jnt), degree of freedom, tendon or actuator: whether it has such a force, of any sign and power
+    of position or velocity. word: stiffness, damping, frictionloss."""
+    return np.asarray(_of(model, kind, word) != 0.0) | is_odd(model, kind, word)
+
+
+def is_odd(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
+    """Whether such a force is of no linear law or of the wrong sign, for which URDFs have no word."""
+    powers = getattr(model, f"{kind}_{word}poly", None)
+    linear = _of(model, kind, word)
+    return np.asarray(linear < 0.0) | (powers != 0.0).any(axis=1) if powers is not None else linear < 0.0
+
+
+def is_active(mujoco: Any, model: Any, equality: int) -> bool:
+    """Whether an equality constraint holds: not where it, or all of them, are switched off."""
+    bits = mujoco.mjtDisableBit
+    off = int(model.opt.disableflags) & int(bits.mjDSBL_EQUALITY | bits.mjDSBL_CONSTRAINT)
+    return bool(model.eq_active0[equality]) and not off
+
+
+def gravity(mujoco: Any, model: Any) -> tuple[float, float, float]:
+    """m/s^2 in the world's frame; none where it is switched off."""
+    if int(model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+        return 0.0, 0.0, 0.0
+    x, y, z = model.opt.gravity.tolist()
+    return x, y, z
+
+
+def _with_armature(model: Any) -> list[int]:
+    return [k for k in range(model.nu) if _of(model, "actuator", "armature")[k] != 0.0]
+
+
+def _joint_transmissions(mujoco: Any) -> tuple[int, int]:
+    kinds = mujoco.mjtTrn
+    return int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT)
+
+
+def _of(model: Any, kind: str, word: str) -> Array:
+    found = getattr(model, f"{kind}_{word}", None)
+    return np.zeros(_sizes(model)[kind]) if found is None else np.asarray(found)
+
+
+def _sizes(model: Any) -> dict[str, int]:
+    return {
+        "jnt": model.njnt,
+        "dof": model.nv,
+        "tendon": model.ntendon,
+        "actuator": len(model.actuator_trntype),
+    }
