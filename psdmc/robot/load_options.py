@@ -112,9 +112,12 @@ def _tool(tool: Sequence[float] | None) -> tuple[float, ...] | None:
         raise InputError(
             f"tool {_listed(tool)} is not six finite numbers", "x y z in m, roll pitch yaw in rad"
         )
-    faults = [f"{value:g} {fault}" for value in values[:3] if (fault := limits.LENGTH.fault(value))]
+    ranges = (*[limits.LENGTH] * 3, *[limits.ANGLE] * 3)
+    faults = [
+        f"{value:g} {fault}" for of, value in zip(ranges, values, strict=True) if (fault := of.fault(value))
+    ]
     if faults:
-        raise InputError(f"tool: {faults[0]}", "x y z in m")
+        raise InputError(f"tool: {faults[0]}", "x y z in m, roll pitch yaw in rad")
     return values
 
 

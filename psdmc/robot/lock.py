@@ -9,7 +9,7 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import ANGLE, LENGTH, shown
 from psdmc.robot.mimic import followed
 from psdmc.robot.placement import Placement
 from psdmc.robot.snap import link_rotation, snap_axis
@@ -50,7 +50,19 @@ def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> 
             f"{source}: joint {shown(strange[0])}, to be locked, is of type {shown(known[strange[0]].type)}",
             f"types of joints that can be held: {listed([kind for kind in LOCKABLE if kind != 'fixed'])}",
         )
+    _refuse_far(found, known, source)
     return found
+
+
+def _refuse_far(held: Mapping[str, float], known: Mapping[str, UrdfJoint], source: str) -> None:
+    """InputError where a position is none that sines are exact for, or no length of a robot."""
+    for name, value in held.items():
+        fault = (LENGTH if known[name].type == "prismatic" else ANGLE).fault(value)
+        if fault:
+            raise InputError(
+                f"{source}: joint {shown(name)} is to be locked at {value:g}, which {fault}",
+                "positions are in rad or m",
+            )
 
 
 def locked(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> UrdfRobot:
@@ -58,7 +70,7 @@ def locked(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> UrdfRobo
     held = held_positions(robot, lock, source)
     if not held:
         return robot
-    notes = [_note(joint, held[joint.name]) for joint in robot.joints if joint.name in held]
+    notes = [_note(joint, held, lock) for joint in robot.joints if joint.name in held]
     joints = tuple(
         replace(joint, type="fixed", mimic=None, held=_moved(joint, held[joint.name]))
         if joint.name in held
@@ -68,10 +80,12 @@ def locked(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> UrdfRobo
     return replace(robot, joints=joints, notes=(*robot.notes, *notes))
 
 
-def _note(joint: UrdfJoint, value: float) -> str:
-    limits = joint.limits
+def _note(joint: UrdfJoint, held: Mapping[str, float], lock: Mapping[str, float]) -> str:
+    limits, value = joint.limits, held[joint.name]
     beyond = "" if limits.lower <= value <= limits.upper else ", beyond its limits"
-    return f"joint '{joint.name}' is locked at {value:g}{beyond}"
+    leader = joint.mimic.joint if joint.mimic is not None and joint.name in lock else None
+    parted = f", and no longer follows {shown(leader)}" if leader is not None and leader not in held else ""
+    return f"joint '{joint.name}' is locked at {value:g}{beyond}{parted}"
 
 
 def _moved(joint: UrdfJoint, value: float) -> Placement:

@@ -188,3 +188,18 @@ def test_texts_of_the_command_line() -> None:
 def test_a_dh_table_has_nothing_to_lock() -> None:
     with pytest.raises(InputError, match="--lock holds joints of a URDF"):
         load_robot_text('[[joint]]\nname = "j"', "dh", lock={"j": 0.0})
+
+
+@pytest.mark.parametrize("name", ["a", "c"])
+def test_positions_far_away_are_refused(name: str) -> None:
+    """Sines of 1e9 rad have lost nine digits; before, only a note of the joint's limits told."""
+    with pytest.raises(InputError, match=rf"joint '{name}' is to be locked at 1e\+09, which is out of range"):
+        loaded({name: 1e9})
+    with pytest.raises(InputError, match="tool: 1e\\+06 is out of range"):
+        loaded({}, tool=(0, 0, 0, 0, 0, 1e6))
+
+
+def test_a_follower_that_is_held_alone_is_said() -> None:
+    assert "joint 'l' is locked at 0.1, and no longer follows 'r'" in loaded({"l": 0.1}, ARM).chain.notes
+    both = loaded({"l": 0.1, "r": 0.0}, ARM).chain.notes
+    assert "joint 'l' is locked at 0.1" in both
