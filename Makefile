@@ -63,8 +63,8 @@ test-accuracy: $(READY) ## accuracy of every robot's, function's and sine's C as
 	  tests/derivation/test_nearly_parallel.py tests/derivation/test_derived_torques.py tests/toolchain/test_footprint.py \
 	  tests/toolchain/test_target_machines.py tests/lower/test_expanded.py tests/bench/test_gate.py
 
-test-trees: $(READY) ## 20 whole robots, compiled, 300 random trees against Pinocchio and MuJoCo, with figures, and ten seconds of a trot; make test takes a few
-	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py tests/end_to_end/test_trotting.py tests/dynamics
+test-trees: $(READY) ## 20 whole robots on fixed and free bases, compiled, 300 random trees against extended precision, Pinocchio and MuJoCo, with figures, ten seconds of a trot and of free flight; make test takes a few
+	PSDMC_TREES=whole $(RUN)/python -m pytest -n $(JOBS) -q -rP tests/end_to_end/test_real_trees.py tests/end_to_end/test_random_trees.py tests/end_to_end/test_trotting.py tests/dynamics tests/functions/test_steps_of_free_robots.py tests/robot/test_floating.py tests/robot/test_errors.py
 
 TARGET_PROGRAMS := qemu-aarch64 qemu-s390x qemu-arm aarch64-linux-gnu-gcc s390x-linux-gnu-gcc arm-none-eabi-gcc
 test-targets: $(READY) ## self-tests of every function on 64-bit ARM, big-endian s390x and Cortex-M under qemu-user; minutes
