@@ -108,9 +108,13 @@ def _opened(folder: Path) -> int:
 
 
 def remove(entry: Path) -> None:
-    """Rename the entry in one step, so that no process finds half of it, then delete it."""
+    """Rename the entry in one step, so that no process finds half of it, then delete it. One that another process has
+    removed since it was listed is gone already."""
     gone = entry.parent / f".gone-{secrets.token_hex(8)}"
-    entry.rename(gone)
+    try:
+        entry.rename(gone)
+    except FileNotFoundError:
+        return
     if gone.is_symlink() or not gone.is_dir():
         gone.unlink()
     shutil.rmtree(gone, ignore_errors=True)

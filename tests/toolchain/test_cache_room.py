@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from psdmc.errors import InputError
+from psdmc.toolchain import cache_room
 from psdmc.toolchain.cache import cached
 from psdmc.toolchain.cache_place import cache_limit
 from psdmc.toolchain.cache_room import cache_contents, clear_cache
@@ -50,6 +54,31 @@ def test_what_was_just_used_stays_beyond_the_limit(cache: Path, monkeypatch: pyt
     assert letters(cache) == "abc"
 
 
+@pytest.mark.parametrize("removing", ["making room", "clearing"])
+def test_entries_that_another_process_removes_meanwhile(
+    removing: str, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It had the lock between the listing of entries and their removal."""
+    for letter, age in (("a", 3), ("b", 2)):
+        entry(letter, hours_ago=age)
+    held = cache_room.hold
+
+    @contextmanager
+    def hold_after_another(place: Path) -> Iterator[None]:
+        shutil.rmtree(cache / ("a" * 64), ignore_errors=True)
+        with held(place):
+            yield
+
+    monkeypatch.setattr(cache_room, "hold", hold_after_another)
+    if removing == "clearing":
+        clear_cache()
+        assert letters(cache) == ""
+        return
+    monkeypatch.setenv("PSDMC_CACHE_SIZE", "1500")
+    assert (entry("c") / "library.so").is_file()
+    assert letters(cache) == "c"
+
+
 def test_an_entry_larger_than_the_limit_is_served(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PSDMC_CACHE_SIZE", "500")
     entry("a", hours_ago=1)
@@ -73,6 +102,7 @@ def test_a_size_that_is_none(text: str, monkeypatch: pytest.MonkeyPatch, cache: 
 
 KILLED = """
 import os, signal, sys
+from psdmc.toolchain import cache_room
 from psdmc.toolchain.cache import cached
 
 def build(folder):
