@@ -28,7 +28,12 @@ from campaign_draw import FIRST_TREE, described, robot_of  # noqa: E402
 from campaign_journal import Outcome, append, read, report, summary  # noqa: E402
 from campaign_measure import failures, limit_of, measured  # noqa: E402
 
+from psdmc.toolchain.cache_room import cache_contents, clear_cache  # noqa: E402
+
 ROBOTS, TREES, STATES, LOWERED_EVERY = 10_000, 1_000, 1_000, 50
+
+MOST_ENTRIES = 300
+"""Of a process's compile cache."""
 
 CHUNK = 4
 """Robots handed to a process at once."""
@@ -37,6 +42,7 @@ CHUNK = 4
 def outcome(seed: int, states: int, every: int, commit: str) -> Outcome:
     """Errors of one robot, or what psdmc raised, as plain JSON values."""
     started = time.process_time()
+    _tidy_cache()
     lowered = is_lowered(seed, every)
     one: Outcome = {"seed": seed, "commit": commit, "count": states, "lowered": lowered}
     one["mixed"] = robot_of(seed).is_mixed
@@ -50,6 +56,17 @@ def outcome(seed: int, states: int, every: int, commit: str) -> Outcome:
     return one | {"cpu": round(time.process_time() - started, 3)}
 
 
+def _own_cache() -> None:
+    """Of this process, within the folder that is thrown away at the end."""
+    os.environ["PSDMC_CACHE_DIR"] += f"-{os.getpid()}"
+
+
+def _tidy_cache() -> None:
+    """Empty this process's cache now and then: no robot comes twice, and each build looks through all entries."""
+    if cache_contents().entries > MOST_ENTRIES:
+        clear_cache()
+
+
 def is_lowered(seed: int, every: int) -> bool:
     """One robot in `every`, at another place in each such block, so that robots of every kind are among them."""
     return every > 0 and seed % every == seed // every % every
@@ -60,7 +77,7 @@ def outcomes(seeds: Sequence[int], states: int, every: int, jobs: int, commit: s
     if jobs == 1:
         yield from map(one, seeds)
         return
-    with ProcessPoolExecutor(jobs) as pool:
+    with ProcessPoolExecutor(jobs, initializer=_own_cache) as pool:
         yield from pool.map(one, seeds, chunksize=CHUNK)
 
 
