@@ -124,27 +124,37 @@ def campaign(arm: Arm) -> Path:
     return write_campaign(arm.folder / "campaign", plan.runs, plan.found, "npz")
 
 
-def calibrated(arm: Arm, campaign: Path, name: str, **variant: bool) -> tuple[Path, Calibration]:
-    """The campaign's folder with logs of a variant of the plant, and what they calibrate."""
+def logged(arm: Arm, campaign: Path, name: str, **variant: bool) -> Path:
+    """The campaign's folder with logs of a variant of the plant."""
     folder = arm.folder / name
     shutil.copytree(campaign.parent, folder, dirs_exist_ok=True)
     simulate_campaign(arm.plant, folder, SimulateOptions(**variant))
+    return folder
+
+
+def calibrated(arm: Arm, folder: Path) -> tuple[Path, Calibration]:
+    """A folder with logs, and what they calibrate."""
     return folder, calibrate(arm.unknown, folder, regressor=arm.regressor)
 
 
 @pytest.fixture(scope="session")
-def ideal(arm: Arm, campaign: Path) -> tuple[Path, Calibration]:
-    return calibrated(arm, campaign, "ideal", ideal_sensors=True)
+def ideal_logs(arm: Arm, campaign: Path) -> Path:
+    return logged(arm, campaign, "ideal", ideal_sensors=True)
+
+
+@pytest.fixture(scope="session")
+def ideal(arm: Arm, ideal_logs: Path) -> tuple[Path, Calibration]:
+    return calibrated(arm, ideal_logs)
 
 
 @pytest.fixture(scope="session")
 def noisy(arm: Arm, campaign: Path) -> tuple[Path, Calibration]:
-    return calibrated(arm, campaign, "noisy")
+    return calibrated(arm, logged(arm, campaign, "noisy"))
 
 
 @pytest.fixture(scope="session")
 def harness(arm: Arm, campaign: Path) -> tuple[Path, Calibration]:
-    return calibrated(arm, campaign, "harness", harness=True)
+    return calibrated(arm, logged(arm, campaign, "harness", harness=True))
 
 
 def smooth_log(

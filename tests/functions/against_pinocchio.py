@@ -40,7 +40,7 @@ ROBOTS = ("two_link", "scara", *(("kr6", "Panda", "UR5") if WHOLE else ()), "sli
 SLIDING = {"sliding": (5, "RPRP"), "first slides": (8, "PRPR")}
 """Seed and joints of oblique chains with sliding joints."""
 
-SINGLE = ("scara", *(("kr6",) if WHOLE else ()), "sliding")
+SINGLE = (*(("scara", "kr6") if WHOLE else ()), "sliding")
 """Robots that are compiled in float32 too."""
 
 COMPILED = {("scara", "float64"), (ARM, "float64"), ("sliding", "float64"), ("sliding", "float32")}

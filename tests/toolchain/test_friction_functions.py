@@ -66,7 +66,7 @@ def package(model: DynamicsModel, real: str = "float64") -> PackageView:
 
 @pytest.mark.parametrize(("real", "limit"), [("float64", 1e-14), ("float32", 2e-6)])
 def test_c_is_the_formula(arm: DynamicsModel, real: str, limit: float, tmp_path: Path) -> None:
-    library = Direct(package(arm, real), shared_library(package(arm, real), tmp_path, ["-O1"]))
+    library = Direct(package(arm, real), shared_library(package(arm, real), tmp_path, ["-O0"]))
     for v in np.vstack([np.zeros(2), np.random.default_rng(0).normal(size=(20, 2)), [[1e-3, -1e-3]]]):
         qd, tau_f = v.astype(real), np.empty(2, real)
         library("friction", qd, tau_f)
@@ -95,7 +95,7 @@ def uneven(model: DynamicsModel) -> DynamicsModel:
 @pytest.mark.parametrize(("real", "limit"), [("float64", 1e-14), ("float32", 2e-6)])
 def test_asymmetry_and_stribeck_in_c(real: str, limit: float, tmp_path: Path) -> None:
     view = package(uneven(bundled_model("two_link_full")), real)
-    library = Direct(view, shared_library(view, tmp_path, ["-O1"]))
+    library = Direct(view, shared_library(view, tmp_path, ["-O0"]))
     peak = PEAK * [1.0, 0.0]
     for v in np.vstack([np.zeros(2), 0.02 * np.random.default_rng(0).normal(size=(20, 2)), [[1.0, -1.0]]]):
         qd, tau_f = v.astype(real), np.empty(2, real)

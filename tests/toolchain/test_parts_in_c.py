@@ -27,7 +27,7 @@ def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
         patch.setattr("psdmc.emit.parts.LONG", 30)
         patch.setattr("psdmc.emit.parts.PART", 40)
         package = arm_package(options=EmitOptions(real=real))
-    library = shared_library(package, tmp_path_factory.mktemp("parts"), ["-O1", *STRICT, *BUILDS[build]])
+    library = shared_library(package, tmp_path_factory.mktemp("parts"), ["-O0", *STRICT, *BUILDS[build]])
     return Direct(package, library)
 
 

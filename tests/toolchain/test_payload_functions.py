@@ -36,7 +36,7 @@ def kr6() -> DynamicsModel:
 
 @pytest.mark.parametrize("real", ["float64", "float32"])
 def test_c_adds_what_python_adds(kr6: DynamicsModel, real: str, tmp_path: Path) -> None:
-    library = Direct(package(kr6, real), shared_library(package(kr6, real), tmp_path, ["-O1"]))
+    library = Direct(package(kr6, real), shared_library(package(kr6, real), tmp_path, ["-O0"]))
     load = [np.asarray(values, real) for values in (COM, INERTIA)]
     limit = 1e-14 if real == "float64" else 1e-6
     for frame, name in ((None, None), (0, "link3"), (1, "link6"), (2, "tool")):
@@ -54,7 +54,7 @@ def test_c_adds_what_python_adds(kr6: DynamicsModel, real: str, tmp_path: Path) 
 
 def test_torques_are_pinocchios_with_the_body_and_taking_it_off_leaves_none(tmp_path: Path) -> None:
     model, robot = bundled_model("kr6"), reference(bundled_robot("kr6"))
-    library = Direct(package(model), shared_library(package(model), tmp_path, ["-O1"]))
+    library = Direct(package(model), shared_library(package(model), tmp_path, ["-O0"]))
     theta = np.array(model.theta_b)
     library("add_payload", MASS, COM, INERTIA, theta)
     tip = robot.model.frames[robot.model.getFrameId(robot.tip_name)]
@@ -70,7 +70,7 @@ def test_torques_are_pinocchios_with_the_body_and_taking_it_off_leaves_none(tmp_
 
 def test_without_an_inertia_it_is_a_point(tmp_path: Path) -> None:
     model = bundled_model("kr6")
-    library = Direct(package(model), shared_library(package(model), tmp_path, ["-O1"]))
+    library = Direct(package(model), shared_library(package(model), tmp_path, ["-O0"]))
     theta = np.array(model.theta_b)
     library("add_payload", MASS, COM, library.ffi.NULL, theta)
     expected = model.with_payload(MASS, COM).theta_b

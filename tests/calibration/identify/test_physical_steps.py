@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
 from psdmc.calibration.identify.lugre import PARAMETERS
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.model.mass_check import check_mass_matrix
 
@@ -26,12 +24,9 @@ LIGHTER = 0.9
 
 
 @pytest.fixture(scope="module")
-def runs(arm, campaign: Path) -> Runs:
+def runs(ideal_logs: Path) -> Runs:
     """Ideal sensors, but as if the shoulder accelerated more easily than bodies of its weights can."""
-    folder = arm.folder / "lighter"
-    shutil.copytree(campaign.parent, folder, dirs_exist_ok=True)
-    simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True))
-    found = read_campaign(folder)
+    found = read_campaign(ideal_logs)
     return replace(
         found,
         friction=[replace(run, log=lighter(run.log, HEAVIER)) for run in found.friction],
