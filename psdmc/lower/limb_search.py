@@ -29,6 +29,7 @@ from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, Search, distinct
 from psdmc.program.limb_cost import StageCost, stage_costs
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.limb_stages import staged
+from psdmc.program.passes.free_registers import free_registers
 from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
 from psdmc.recipes.recipe import Recipe
@@ -161,8 +162,10 @@ class LimbSearch:
 
     def _ordered(self, traced: TracedLimbs) -> LimbProgram:
         stages = staged(shortened(traced.program), traced.groups)
+        in_order = (free_registers(ordered(stage.program, self.costs)[0]) for stage in stages)
         return LimbProgram(
-            traced.groups, tuple(Stage(s.group, ordered(s.program, self.costs)[0]) for s in stages)
+            traced.groups,
+            tuple(Stage(s.group, program) for s, program in zip(stages, in_order, strict=True)),
         )
 
     def _admissible(self, start: Arrangement, groups: Sequence[Limbs]) -> Arrangement:

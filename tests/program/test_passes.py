@@ -15,6 +15,7 @@ from psdmc.program.passes.absorb_negations import absorb_negations
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.passes.factor_common import factor_common
 from psdmc.program.passes.fold_constants import fold_constants
+from psdmc.program.passes.free_registers import free_registers
 from psdmc.program.passes.fuse_sums import fuse_sums
 from psdmc.program.passes.merge_duplicates import merge_duplicates
 from psdmc.program.passes.schedule import live_values, schedule
@@ -23,7 +24,7 @@ from psdmc.program.program import Op, Program
 from psdmc.program.text import parse, show
 
 Outputs = Callable[[Program], np.ndarray]
-EXACT = (drop_unused, merge_duplicates, fold_constants, absorb_negations, schedule)
+EXACT = (drop_unused, merge_duplicates, fold_constants, absorb_negations, schedule, free_registers)
 LOADS = "a = load q[0]\nb = load q[1]\nc = load q[2]\nd = load qd[0]\n"
 
 
@@ -295,9 +296,35 @@ def test_scheduling_computes_values_where_they_are_used():
     assert (live_values(before), live_values(after)) == (4, 2)
 
 
-def test_scheduling_never_holds_more_values(some_program: Program):
+def test_values_are_read_for_the_last_time_soon_whatever_output_needs_them():
+    before = parse(
+        LOADS
+        + """
+        x = mul a b
+        y = mul c d
+        u = sub x y
+        v = mul u u
+        w = cos v
+        first = sin x
+        second = sin y
+        out tau[0] = w
+        out tau[1] = first
+        out tau[2] = second
+    """
+    )
+
+    after = free_registers(before)
+
+    expected = [Op.MUL, Op.SIN, Op.MUL, Op.SUB, Op.SIN, Op.MUL, Op.COS]
+    assert [instr.op for instr in after if instr.args] == expected
+    assert schedule(before) == before
+    assert (live_values(before), live_values(after)) == (5 + 5 + 1 + 1, 3 + 2 + 2 + 1)
+
+
+@pytest.mark.parametrize("order", [schedule, free_registers], ids=lambda apply: apply.__name__)
+def test_scheduling_never_holds_more_values(order: pipeline.Pass, some_program: Program):
     before = drop_unused(some_program)
-    after = schedule(before)
+    after = order(before)
 
     assert live_values(after) <= live_values(before)
     assert sorted(i.op for i in after) == sorted(i.op for i in before)

@@ -17,7 +17,7 @@ def schedule(program: Program) -> Program:
     Gives:  a sum of live values over all instructions that is no larger than before.
     """
     order = _depth_first(program)
-    candidate = _reordered(program, order)
+    candidate = reordered(program, order)
     return candidate if live_values(candidate) < live_values(program) else program
 
 
@@ -84,7 +84,8 @@ def _depth_first(program: Program) -> list[int]:
     return order
 
 
-def _reordered(program: Program, order: list[int]) -> Program:
+def reordered(program: Program, order: list[int]) -> Program:
+    """The instructions in this order of their numbers, in which every argument precedes its use."""
     new_index = {old: new for new, old in enumerate(order)}
     body = tuple(program.body[old].renumbered(new_index) for old in order)
     return Program(body, tuple((slot, new_index[i]) for slot, i in program.outputs))

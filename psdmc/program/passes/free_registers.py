@@ -1,0 +1,85 @@
+"""Put instructions in an order that ends values' lives soon, over the whole PROGRAM instead of output by output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from heapq import heappop, heappush
+
+from psdmc.program.passes.schedule import live_values, reordered
+from psdmc.program.program import Program
+
+Tie = Callable[[int, int], tuple[int, int]]
+"""Of an instruction and the time at which the newest of its arguments was computed: the smaller comes first."""
+
+TIES: tuple[Tie, ...] = (
+    lambda instruction, newest: (0, instruction),
+    lambda instruction, newest: (-newest, -instruction),
+)
+"""Among equals the first in the PROGRAM, or what goes on with what was computed last."""
+
+
+def free_registers(program: Program) -> Program:
+    """Compute next, of what can be computed, what leaves the fewest values alive: an instruction that reads two values for
+    the last time before one that reads values which others need, too.
+
+    Repeated while it helps; the order given is kept where this one would hold more values alive over the whole PROGRAM.
+    `schedule` takes outputs one after the other, and keeps alive what the later ones share with the first.
+
+    Needs:  every argument precedes its use; every instruction is needed.
+    Keeps:  output values, bit for bit; output names and order; the set of instructions.
+    Gives:  a sum of live values over all instructions that is no larger than before.
+    """
+    while True:
+        best = min((program, *(_Listing(program, tie).listed() for tie in TIES)), key=live_values)
+        if best is program:
+            return program
+        program = best
+
+
+class _Listing:
+    """One order. Loads and constants come first: they count for nothing."""
+
+    def __init__(self, program: Program, tie: Tie) -> None:
+        self.program, self.tie = program, tie
+        self.args = [tuple(dict.fromkeys(instr.args)) for instr in program.body]
+        self.users: list[list[int]] = [[] for _ in program.body]
+        for i, args in enumerate(self.args):
+            for a in args:
+                self.users[a].append(i)
+        self.unread = [len(users) for users in self.users]
+        self.unknown = [sum(bool(self.args[a]) for a in args) for args in self.args]
+        self.order = [i for i, args in enumerate(self.args) if not args]
+        self.time = [0] * len(program)
+        self.ready: list[tuple[int, int, int, int]] = []
+
+    def listed(self) -> Program:
+        placed = [not args for args in self.args]
+        for i, args in enumerate(self.args):
+            if args and not self.unknown[i]:
+                self._offer(i)
+        while self.ready:
+            i = heappop(self.ready)[-1]
+            if not placed[i]:
+                placed[i] = True
+                self._place(i)
+        return reordered(self.program, self.order)
+
+    def _offer(self, i: int) -> None:
+        """As an instruction that can come next; again where it has become one that ends a life."""
+        ended = sum(self.unread[a] == 1 for a in self.args[i] if self.args[a])
+        newest = max(self.time[a] for a in self.args[i])
+        heappush(self.ready, (bool(self.users[i]) - ended, *self.tie(i, newest), i))
+
+    def _place(self, i: int) -> None:
+        self.order.append(i)
+        self.time[i] = len(self.order)
+        for a in self.args[i]:
+            self.unread[a] -= 1
+            if self.unread[a] == 1:
+                for user in self.users[a]:
+                    if self.time[user] == 0 and not self.unknown[user]:
+                        self._offer(user)
+        for user in self.users[i]:
+            self.unknown[user] -= 1
+            if not self.unknown[user]:
+                self._offer(user)
