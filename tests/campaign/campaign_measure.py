@@ -90,7 +90,10 @@ def measured(seed: int, count: int, *, lowered: bool) -> Found:
             )
             if not robot.is_mixed:
                 found.errors |= _of_parameters(plain, name, own, reference)
-        except (DerivationError, InputError) as refusal:  # InputError: no forward dynamics in double precision
+        except (
+            DerivationError,
+            InputError,
+        ) as refusal:  # the latter where double precision has no accelerations
             if not robot.is_mixed:
                 raise
             found.refused[name] = str(refusal)
