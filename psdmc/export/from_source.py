@@ -22,6 +22,7 @@ from psdmc.robot.inertia import physical_fault
 from psdmc.robot.limits import shown
 from psdmc.robot.lock import locked
 from psdmc.robot.mechanism import Placement
+from psdmc.robot.source_words import DRIVE
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import place_of
 from psdmc.robot.xml_text import parse_xml
@@ -54,6 +55,7 @@ def urdf_with(what: Written, provenance: Mapping[str, Any]) -> tuple[Element, tu
     by_name = {joint.name: joint for joint in robot.joints}
     for element in root.findall("joint"):
         joint = by_name[element.get("name", "")]
+        _remove(element, (DRIVE,))
         if joint.name in moving:
             _move(element, moving[joint.name], places.of_moving(joint))
         else:

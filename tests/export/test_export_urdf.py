@@ -303,3 +303,16 @@ def test_a_calibrated_ur10_keeps_its_drives_and_friction(tmp_path: Path) -> None
     for joint in ET.parse(written.mjcf).iter("joint"):
         assert float(joint.get("frictionloss", "nan")) == rows[joint.get("name"), "coulomb"]
         assert float(joint.get("damping", "nan")) == rows[joint.get("name"), "viscous"]
+
+
+def test_an_mjcf_with_armature_is_written(tmp_path: Path) -> None:
+    """psdmc's own words for drives in the text made of an MJCF must not stay in the URDF: it was read back with them."""
+    pytest.importorskip("mujoco")
+    text = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0" armature=".3"/>
+    <geom size=".1" pos=".1 0 0"/></body></worldbody></mujoco>"""
+    (tmp_path / "arm.xml").write_text(text)
+
+    found = psdmc.export_urdf(psdmc.derive(tmp_path / "arm.xml"), tmp_path / "out.urdf")
+
+    assert found.readings[0].error < 1e-12
+    assert ":drive" not in found.urdf.read_text()
