@@ -57,7 +57,7 @@ def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> 
 def _refuse_far(held: Mapping[str, float], known: Mapping[str, UrdfJoint], source: str) -> None:
     """InputError where a position is none that sines are exact for, or no length of a robot."""
     for name, value in held.items():
-        fault = (LENGTH if known[name].type == "prismatic" else ANGLE).fault(value)
+        fault = (LENGTH if _is_moved_by_lengths(known[name]) else ANGLE).fault(value)
         if fault:
             raise InputError(
                 f"{source}: joint {shown(name)} is to be locked at {value:g}, which {fault}",
@@ -100,6 +100,10 @@ def _moved(joint: UrdfJoint, value: float) -> Placement:
 def _has_position(joint: UrdfJoint) -> bool:
     """Whether one number says where it is."""
     return joint.type in URDF_TYPES and URDF_TYPES[joint.type].about_z
+
+
+def _is_moved_by_lengths(joint: UrdfJoint) -> bool:
+    return joint.type in URDF_TYPES and URDF_TYPES[joint.type].length_order > 0
 
 
 def parsed(texts: Sequence[str]) -> dict[str, float]:
