@@ -28,20 +28,23 @@ EXACT = 1e-12
 
 
 def drawn(seed: int, bodies: int) -> RandomTree:
-    """Any parents, joints that turn, slide or screw, axes oblique, at right angles or parallel."""
+    """Any parents, axes oblique, at right angles or parallel; joints that turn, slide or screw, and, in every other tree,
+    those of several coordinates too: free, spherical, planar, translating."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, bodies + 1))
     parents = tuple(int(rng.integers(-1, i)) for i in range(n))
-    kinds = "".join(rng.choice(list("RRRPPH"), n))
+    kinds = "".join(rng.choice(list("RRRPPH" if seed % 2 == 0 else "RRRPHFSLT"), n))
     return RandomTree(seed, parents, kinds, parallel=float(rng.choice([0.0, 0.3, 0.7])))
 
 
 def rank(tree: RandomTree) -> int:
     """Of Pinocchio's regressor and the drive inertias beside, column by column of length one."""
-    factor = np.zeros((0, 11 * tree.n))
-    for q, qd, qdd in tree.states(4 * tree.n + 20, 3, seed=1).transpose(1, 0, 2):
-        own = pin.computeJointTorqueRegressor(tree.model, tree.data, *map(tree.theirs, (q, qd, qdd)))
-        rows = np.hstack([own, np.diag(tree.theirs(qdd))])
+    driven = np.flatnonzero(tree.model.armature)
+    factor = np.zeros((0, 10 * tree.n + len(driven)))
+    for q, qd, qdd in zip(*tree.motion(4 * tree.nv + 20, seed=1), strict=True):
+        state = tree.theirs_at(q), tree.theirs(qd), tree.theirs(qdd)
+        own = pin.computeJointTorqueRegressor(tree.model, tree.data, *state)
+        rows = np.hstack([own, np.diag(state[2])[:, driven]])
         factor = np.linalg.qr(np.vstack([factor, rows]), mode="r")
     sizes = np.linalg.norm(factor, axis=0)
     kept = factor[:, sizes > 1e-13 * sizes.max()]
@@ -78,7 +81,7 @@ def gravity_error(found: np.ndarray, expected: np.ndarray) -> float:
 def test_models_of_random_trees(seed: int) -> None:
     tree = drawn(seed, BODIES)
     model = derive_model(tree.mechanism(), expand=False)  # the tests' own screws have no E and P
-    q, qd, qdd = tree.states(STATES, 3)
+    q, qd, qdd = tree.motion(STATES)
     tau, bias = tree.each(pin.rnea, q, qd, qdd), tree.each(pin.nonLinearEffects, q, qd)
     gravity = tree.each(pin.computeGeneralizedGravity, q)
     assert error(model.inverse_dynamics(q, qd, qdd), tau) <= EXACT
@@ -94,9 +97,9 @@ def test_programs_of_random_trees(seed: int) -> None:
     tree = drawn(seed, BODIES_LOWERED)
     model: DynamicsModel = derive_model(tree.mechanism(), expand=False)
     made = lower(model, "factored", ("inverse_dynamics", "forward_dynamics", "mass_matrix"))
-    q, qd, qdd = tree.states(STATES, 3)
+    q, qd, qdd = tree.motion(STATES)
     tau, mass = tree.each(pin.rnea, q, qd, qdd), mass_matrices(tree, q)
-    n = tree.n
+    n = tree.nv
     given = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
     given["theta_b"] = np.broadcast_to(model.theta_b, (STATES, model.l))
     condition = float(np.linalg.cond(mass).max())

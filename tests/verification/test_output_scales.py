@@ -18,6 +18,7 @@ def error_of(found: dict[str, float], expected: dict[str, float]) -> float:
         times_theta=False,
         gradient=None,
         beside=None,
+        packs=None,
     )
     return _error(recipe, None, SimpleNamespace(follows=False, free=None), {}, np.zeros(0), 1e-9)
 
