@@ -186,6 +186,7 @@ def test_a_vertical_axis_that_hardly_accelerates_is_named_with_the_remedy(kr6: D
     assert rows["joint_2"].value == pytest.approx(40.3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_load_on_the_last_axis_is_named(kr6: DynamicsModel, tmp_path: Path):
     slow = Recording(11, quick=0.05, seconds=40.0, com=(0.0, 0.0, 0.08))
     empty = record(tmp_path / "empty.csv", slow)

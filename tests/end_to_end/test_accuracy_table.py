@@ -14,6 +14,7 @@ import pytest
 from answers import Questions, compiled_answers, errors, numpy_answers, program_answers, too_large
 from lowered import lowered
 from robots_at_hand import BUNDLED, FOREIGN, GENERIC, NAMES, loaded, subject
+from slow_cases import slow_but_for
 from unoptimised import compiled as library
 
 from psdmc.derivation.provenance import provenance
@@ -60,7 +61,9 @@ def test_the_model_in_numpy(name: str):
     assert not too_large(told(robot.label, found))
 
 
-@pytest.mark.parametrize("name", IN_C)
+@pytest.mark.parametrize(
+    "name", slow_but_for([name for name in IN_C if WHOLE or name not in ("two_link", "kr6")], IN_C)
+)
 def test_its_program_and_its_c(name: str):
     robot = subject(name, expand=name not in GENERIC)  # E and P of those are too large to be lowered
     questions = Questions(robot)

@@ -184,6 +184,7 @@ def drift(step: str, dt: float) -> tuple[float, float]:
     return float(lost), float((np.abs(robot.kinetic_energy(q1, qd1) - energy) / energy).max())
 
 
+@pytest.mark.slow
 def test_ten_seconds_of_free_flight_conserve_momentum_and_energy() -> None:
     lost, changed = drift("rk4_step", 2e-3)
     assert lost < 1e-10

@@ -197,7 +197,7 @@ def test_libraries_of_different_targets_are_kept_apart(two_link: DynamicsModel) 
     assert len(libraries) == 3
 
 
-@pytest.mark.parametrize("target", [CORTEX_M4F, X86_64_V3])
+@pytest.mark.parametrize("target", slow_but_for([CORTEX_M4F], [CORTEX_M4F, X86_64_V3]))
 def test_a_package_builds_and_tests_itself_on_the_machine_at_hand(
     two_link: DynamicsModel, target: Target, tmp_path: Path
 ) -> None:

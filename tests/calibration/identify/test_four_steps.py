@@ -24,6 +24,7 @@ from psdmc.model.load import load
 from psdmc.model.store import save
 
 
+@pytest.mark.slow
 def test_with_ideal_sensors_the_truth_comes_out(arm, ideal):
     found = compare(ideal[1], arm.model, load_virtual_robot(arm.plant, ideal_sensors=True))
 

@@ -189,6 +189,7 @@ def test_physical_is_the_default_of_the_command(
     assert "note: --physical is the default now" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_campaign_that_shows_little_keeps_the_files_values(
     arm, noisy, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
