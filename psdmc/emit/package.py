@@ -28,6 +28,7 @@ from psdmc.emit.tables import Table, tables
 from psdmc.emit.vectors_view import VectorsView
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
+from psdmc.garbage import collecting_rarely
 from psdmc.program.kernel import Kernel
 from psdmc.target.flags import ARITHMETIC, GCC_ONLY
 from psdmc.target.target import Target
@@ -227,6 +228,7 @@ class PackageView:
         return uses_frames(self.functions) or bool(self.info.payload)
 
 
+@collecting_rarely()
 def package_view(
     info: PackageInfo,
     kernels: Mapping[str, Kernel],

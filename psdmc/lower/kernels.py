@@ -10,6 +10,7 @@ from typing import Literal
 from psdmc.dynamics.solve import SingularMassMatrix
 from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, RECIPES, default_of
+from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
 from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.expanded.terms import COEFFICIENT_NOISE
@@ -42,6 +43,7 @@ EXPANDED_LIMIT = 600
 """Largest p for which `auto` tries the expanded lowering; beyond it, the factored one has always been cheaper."""
 
 
+@collecting_rarely()
 def lower(
     model: DynamicsModel,
     lowering: Lowering = "auto",
