@@ -21,20 +21,24 @@ class StoreGroups:
     """
 
     def __init__(self, sizes: Mapping[str, int]) -> None:
-        self._starts = {
-            vector: [*range(0, size - GROUP, GROUP), size - GROUP] for vector, size in sizes.items()
-        }
-        self._missing = {
-            Slot(vector, start): GROUP for vector, starts in self._starts.items() for start in starts
-        }
+        self._last = {vector: size - GROUP for vector, size in sizes.items()}
+        self._missing: dict[Slot, int] = {}
 
     def completed_by(self, slot: Slot) -> list[Slot]:
         """The first outputs of the groups that are complete with this output."""
         complete = []
-        for start in self._starts.get(slot.vector, []):
-            if start <= slot.index < start + GROUP:
-                first = Slot(slot.vector, start)
-                self._missing[first] -= 1
-                if self._missing[first] == 0:
-                    complete.append(first)
+        for start in self._starts(slot):
+            first = Slot(slot.vector, start)
+            left = self._missing[first] = self._missing.get(first, GROUP) - 1
+            if left == 0:
+                complete.append(first)
         return complete
+
+    def _starts(self, slot: Slot) -> list[int]:
+        """The first outputs of the groups that an output is in: one or two."""
+        last = self._last.get(slot.vector)
+        if last is None:
+            return []
+        own = slot.index - slot.index % GROUP
+        starts = [own] if own < last else []
+        return [*starts, last] if slot.index >= last else starts

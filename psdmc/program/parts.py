@@ -5,6 +5,7 @@ A part is a PROGRAM of its own. What later parts read of it, it stores into vect
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
@@ -83,12 +84,14 @@ class _Cut:
             sums.append(sums[-1] + each)
         ends: list[int] = []
         for k in range(1, count):
+            middle = k * total / count
+            first = max(1, *(end + 1 for end in ends[-1:]), bisect_left(sums, middle - reach - 1.0))
+            behind = min(len(self.order), bisect_right(sums, middle + reach + 1.0))
             near = [
                 b
-                for b in range(1, len(self.order))
-                if abs(sums[b] - k * total / count) <= reach and not self._is_within_angles(b)
+                for b in range(first, behind)
+                if abs(sums[b] - middle) <= reach and not self._is_within_angles(b)
             ]
-            near = [b for b in near if not ends or b > ends[-1]]
             if near:
                 ends.append(min(near, key=lambda b: (crossing[b], b)))
         return ends
