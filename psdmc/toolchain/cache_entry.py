@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import stat
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,9 @@ from psdmc.toolchain.cache_place import is_private
 
 SEAL = "entry.json"
 """Lists an entry's files with their SHA-256; its time is that of the entry's last use."""
+
+_PLAIN = re.compile(r"[\w-][\w.-]*")
+"""A file's name without a folder: most are."""
 
 LARGEST_SEAL = 1 << 20
 """Bytes; a six-joint arm's has 6 kB."""
@@ -58,7 +62,8 @@ def touch(folder: Path) -> None:
 def used_and_size(folder: Path) -> tuple[float, int]:
     """When an entry was last used (s since 1970) and its bytes; for one without seal, when it was made."""
     try:
-        return (folder / SEAL).lstat().st_mtime, int(_sealed(folder)["bytes"])
+        content, used = _seal_of(folder)
+        return used, int(content["bytes"])
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         sizes = (Path(top, name).lstat().st_size for top, _, names in os.walk(folder) for name in names)
         return folder.lstat().st_mtime, sum(sizes)
@@ -71,13 +76,28 @@ def _is_own(path: Path, kind: object) -> bool:
 
 
 def _sealed(folder: Path) -> dict[str, Any]:
-    path = folder / SEAL
-    if not _is_own(path, stat.S_ISREG) or path.lstat().st_size > LARGEST_SEAL:
+    return _seal_of(folder)[0]
+
+
+def _seal_of(folder: Path) -> tuple[dict[str, Any], float]:
+    """A seal's content, and when the entry was last used. A cache has thousands, all read at each build: paths are texts."""
+    path = os.path.join(folder, SEAL)
+    status = os.lstat(path)
+    if not stat.S_ISREG(status.st_mode) or not is_private(status) or status.st_size > LARGEST_SEAL:
         raise ValueError(f"{path} is no seal")
-    content = json.loads(path.read_bytes())
-    if any(Path(name).is_absolute() or ".." in Path(name).parts for name in content["files"]):
+    with open(path, "rb", buffering=0) as stream:
+        content = json.loads(stream.read())
+    if any(map(_is_elsewhere, content["files"])):
         raise ValueError(f"{path} names files elsewhere")
-    return dict(content)
+    return dict(content), status.st_mtime
+
+
+def _is_elsewhere(name: str) -> bool:
+    """Whether a name leads out of the folder."""
+    if _PLAIN.fullmatch(name):
+        return False
+    path = Path(name)
+    return path.is_absolute() or ".." in path.parts
 
 
 def _digest(path: Path) -> str:

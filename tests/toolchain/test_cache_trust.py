@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 from pathlib import Path
@@ -112,6 +113,22 @@ def test_a_link_to_another_entry_is_replaced(part: str, cache: Path, tmp_path: P
 
     assert found() == "ours"
     assert elsewhere.exists(), "psdmc deleted through a link"
+
+
+@pytest.mark.parametrize("named", ["../library.so", "here/../../library.so", "absolute"])
+def test_an_entry_whose_seal_names_files_elsewhere_is_replaced(named: str, cache: Path) -> None:
+    """With their right digests, so that nothing but the name is wrong."""
+    entry = plant(cache)
+    (entry / "here").mkdir(mode=0o700)
+    outside = cache / "library.so"
+    (entry / "library.so").rename(outside)
+    seal = json.loads((entry / "entry.json").read_text())
+    name = str(outside) if named == "absolute" else named
+    seal["files"] = {name: seal["files"]["library.so"]}
+    (entry / "entry.json").write_text(json.dumps(seal))
+
+    assert found() == "ours"
+    assert outside.read_text() == "theirs"
 
 
 def test_a_file_where_an_entry_belongs_is_replaced(cache: Path) -> None:
