@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, islice, product
+from itertools import accumulate, product
 
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Scalar
@@ -115,8 +115,9 @@ class _Trace:
 
     def _kind(self, index: int) -> int:
         """Number of the group that a value belongs to; -1: none."""
-        kinds = self.kinds
-        for op, a, b in islice(self.tracer.steps, len(kinds), index + 1):
+        kinds, steps = self.kinds, self.tracer.steps
+        for k in range(len(kinds), index + 1):
+            op, a, b = steps[k]
             if b is not None:
                 kinds.append(max(kinds[a], kinds[b]))
             elif op is Op.LOAD:

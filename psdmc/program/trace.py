@@ -121,30 +121,30 @@ class Tracer:
         for _, index in stored:
             uses[index] += 1
         mul = div = neg = fused = 0
-        sums: list[tuple[int, int]] = []
+        sums: list[Step] = []
         angles: set[int] = set()
-        for used, (op, a, b) in zip(
-            reversed(uses), reversed(steps), strict=True
-        ):  # `used` as the uses behind left it
-            if not used or op is _LOAD or op is _CONST:
+        for used, step in zip(reversed(uses), reversed(steps), strict=True):
+            if not used:  # by what lies behind: it has been counted
                 continue
-            uses[a] += 1
-            if b is None:
+            op, a, b = step
+            if b is not None:
+                uses[a] += 1
+                uses[b] += 1
+                if op is _MUL:
+                    mul += 1
+                elif op is _DIV:
+                    div += 1
+                else:
+                    sums.append(step)
+            elif op is not _LOAD and op is not _CONST:
+                uses[a] += 1
                 if op is _NEG:
                     neg += 1
                 elif op is _SQRT:
                     div += 1
                 else:
                     angles.add(a)
-                continue
-            uses[b] += 1
-            if op is _MUL:
-                mul += 1
-            elif op is _DIV:
-                div += 1
-            else:
-                sums.append((a, b))
-        for a, b in sums:
+        for _, a, b in sums:
             if (uses[a] == 1 and steps[a][0] is _MUL) or (uses[b] == 1 and steps[b][0] is _MUL):
                 fused += 1
         return Cost(mul, len(sums), div, neg, len(angles), fused)
