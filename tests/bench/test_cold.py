@@ -51,6 +51,7 @@ def test_parts_are_added_and_what_is_unknown_is_none() -> None:
 
 
 @needs_nm
+@pytest.mark.slow
 def test_a_run_has_both_where_one_state_is_a_call(two_link: Case) -> None:
     settings = Settings(rounds=1, states=2048, rivals=("psdmc factored",), functions=("gravity",), cold=True)
     result = run([two_link], settings)

@@ -153,6 +153,7 @@ def refused(kr6: DynamicsModel, empty: Path, loaded: Path, load: Path | str, **g
     return raised.value
 
 
+@pytest.mark.slow
 def test_exchanged_logs_and_a_load_that_is_not_there_are_refused(
     kr6: DynamicsModel, folder: Path, tmp_path: Path
 ):
@@ -163,6 +164,7 @@ def test_exchanged_logs_and_a_load_that_is_not_there_are_refused(
     assert "again.csv: the load does not show" in refused(kr6, empty, again, load).message
 
 
+@pytest.mark.slow
 def test_a_vertical_axis_that_hardly_accelerates_is_named_with_the_remedy(kr6: DynamicsModel, tmp_path: Path):
     """The first axis is along gravity: slow motion says nothing of its constant. With it given the rest is found."""
     slow = Recording(11, quick=0.05, seconds=40.0)

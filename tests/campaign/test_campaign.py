@@ -106,7 +106,7 @@ def test_robots_whose_programs_the_campaign_found_wrong(
     assert failing(seed, lowered=True) == {}
 
 
-@pytest.mark.parametrize("budget", [6, BUDGET])
+@pytest.mark.parametrize("budget", slow_but_for([6], [6, BUDGET]))
 def test_no_search_takes_an_arrangement_that_loses_digits(budget: int) -> None:
     """5867, of many scales: the cheapest arrangement is off by 1e-10, the lightest carriers by 1.3e-11."""
     robot = random_robot(5867)

@@ -182,7 +182,10 @@ def killed_at(operation: int, folder: Path, files: dict[str, str]) -> bool:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 0
 
 
-@pytest.mark.parametrize("before", [{}, FILES], ids=["empty", "another package"])
+@pytest.mark.parametrize(
+    "before",
+    [pytest.param({}, id="empty", marks=pytest.mark.slow), pytest.param(FILES, id="another package")],
+)
 def test_an_emission_killed_at_any_step_is_not_blamed_on_the_user(
     before: dict[str, str], tmp_path: Path
 ) -> None:

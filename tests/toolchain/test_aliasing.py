@@ -25,7 +25,7 @@ OPTIMISED = ("float64", "vectors")
 
 
 CASES = [("float64", "vectors"), ("float64", "plain"), ("float32", "vectors"), ("float64", "parts")]
-QUICK = [OPTIMISED, ("float64", "parts")]
+QUICK = [OPTIMISED]
 
 
 @pytest.fixture(scope="module", params=slow_but_for(QUICK, CASES), ids=" ".join)

@@ -58,7 +58,6 @@ CASES = [
 QUICK = [
     (LEGS, "2 lanes", "float64", "inline"),
     (LEGS, "no vectors", "float64", "inline"),
-    (FIVE, "4 lanes", "float64", "inline"),
     (FINGERS, "4 lanes", "float64", "inline"),
     (LEGS, "4 lanes", "float32", "inline"),
 ]

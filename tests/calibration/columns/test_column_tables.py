@@ -157,6 +157,7 @@ def calibration(folder: Path, description: str) -> list[str]:
     return ["calibrate", str(folder / "kr6.npz"), str(folder / "log.toml"), "-o", str(folder / "out.npz")]
 
 
+@pytest.mark.slow
 def test_a_description_s_springs_reach_the_calibrated_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

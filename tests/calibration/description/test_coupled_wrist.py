@@ -163,6 +163,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
     return capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_what_has_no_place_for_motors_says_so(folder: Path, capsys: pytest.CaptureFixture[str]):
     typed("calibrate", folder / "wrong.npz", folder / "log.toml", "-o", folder / "again.npz")
 

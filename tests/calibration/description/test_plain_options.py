@@ -99,6 +99,7 @@ def test_options_of_plain_logs_are_not_for_descriptions(folder: Path, capsys: py
     assert (code, "name the other logs in it, each as a [[log]]" in text) == (2, True)
 
 
+@pytest.mark.slow
 def test_joints_of_other_names(folder: Path, capsys: pytest.CaptureFixture[str]):
     text = (folder / "one.csv").read_text(encoding="utf-8")
     header, _, rows = text.partition("\n")

@@ -49,6 +49,7 @@ def test_with_sensors_the_truth_lies_within_the_standard_deviations(arm, noisy):
     assert record.warnings == ()
 
 
+@pytest.mark.slow
 def test_a_campaign_with_ideal_or_with_real_sensors_is_usable(ideal, noisy):
     for _, record in (ideal, noisy):
         assert record.verdict is not None
@@ -157,6 +158,7 @@ def test_currents_without_a_motor_step_are_refused(arm, noisy):
         calibrate_four_steps(arm.model.chain, arm.regressor, arm.model.l, runs)
 
 
+@pytest.mark.slow
 def test_a_joint_that_no_load_reaches_can_be_given_its_constant(arm, noisy):
     runs = read_campaign(noisy[0])
     only = replace(runs, motor=[run for run in runs.motor if run.joint == "elbow"])
