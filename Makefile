@@ -107,12 +107,16 @@ test-sanitize: $(READY) ## emitted C under sanitizers, valgrind, guard pages and
 
 FAST := tests/test_architecture.py tests/program tests/robot tests/dynamics tests/model
 
+# A fifth of the tests' time, for robot files and series that a change of code seldom touches: make test has them.
+LATER := tests/robot/test_mjcf.py tests/robot/test_limits.py tests/robot/test_against_pinocchio.py tests/robot/test_lock.py \
+  tests/dynamics/test_tangent_steps.py tests/model/test_forged_models.py
+
 check: $(READY) ## format, lint, types and the fast tests: seconds
 	$(RUN)/ruff format --check .
 	$(RUN)/ruff check .
 	$(RUN)/mypy
 	$(RUN)/reuse lint --quiet
-	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' $(FAST)
+	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' $(addprefix --ignore=,$(LATER)) $(FAST)
 
 golden: $(READY) ## rewrite the golden files; review their diff like code
 	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit tests/end_to_end/test_reference_robot.py

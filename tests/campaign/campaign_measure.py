@@ -39,6 +39,9 @@ CLEAR, UNCLEAR = 1e-7, 1e-11
 """Singular values of a regressor with columns of length one, relative to the largest: the rank is told where none is
 between these."""
 
+SPAN_ROUNDING = 1e-14
+"""Part of a regressor, relative to its largest column, that double precision does not tell from zero."""
+
 COLUMN_SIZE = 1e-12
 """Smallest column of a regressor, relative to the largest, that is more than rounding."""
 
@@ -202,7 +205,8 @@ def _of_rank(rows: Array, standard: Array, is_fine: bool) -> dict[str, float]:
 
     rows     (count, nv, l), standard (count, nv, 10 bodies)
     is_fine  whether angles or lengths are so small that a parameter's effect may be less than rounding: more of them than
-             doubles can tell apart are right then
+             doubles can tell apart are right then, and fewer where what these leave out is rounding (seed 7624: 27 of 29,
+             1.4e-15 of the largest column)
     """
     own, every = (matrix.reshape(-1, matrix.shape[-1]) for matrix in (rows, standard))
     triangle = np.linalg.qr(np.hstack([_unit_columns(own), every]), mode="r")
@@ -211,7 +215,8 @@ def _of_rank(rows: Array, standard: Array, is_fine: bool) -> dict[str, float]:
     rank, most = (int((values > share * values[0]).sum()) for share in (CLEAR, UNCLEAR))
     found = {"span": _longest(left) / _longest(every)}
     more = own.shape[1] - rank
-    return found if most > rank or (is_fine and more > 0) else found | {"number": float(abs(more))}
+    is_rounding = is_fine and (more > 0 or found["span"] <= SPAN_ROUNDING)
+    return found if most > rank or is_rounding else found | {"number": float(abs(more))}
 
 
 def _longest(matrix: Array) -> float:
