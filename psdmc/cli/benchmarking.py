@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from psdmc.bench.defaults import ROUNDS
-from psdmc.cli import interrupt
 from psdmc.cli.next_step import say_next
 from psdmc.cli.output import check_output
 from psdmc.cli.progress import steps
@@ -25,13 +24,12 @@ def bench(
     counts: Annotated[bool, typer.Option("--counts", help="count instructions too (valgrind)")] = False,
 ) -> None:
     """Time generated code against Pinocchio, CasADi and MuJoCo in the same run."""
-    with interrupt.at_once():
-        from psdmc.atomic import write_whole
-        from psdmc.bench.case import Case
-        from psdmc.bench.run import Settings, run
-        from psdmc.bench.table import as_text
-        from psdmc.model.load import load
-        from psdmc.report.bench_page import write_page
+    from psdmc.atomic import write_whole
+    from psdmc.bench.case import Case
+    from psdmc.bench.run import Settings, run
+    from psdmc.bench.table import as_text
+    from psdmc.model.load import load
+    from psdmc.report.bench_page import write_page
 
     check_output(report, *models)
     check_output(json, *models, *([report] if report else []))

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from psdmc.cli import interrupt
 from psdmc.cli.describing import describe_logs, fit_choice, parsed_joint_map, require_none
 from psdmc.cli.next_step import say_next
 from psdmc.cli.one_line import one_line
@@ -121,14 +120,13 @@ def calibrate(
         raise InputError(f"calibrate: {lacks}", "psdmc calibrate MODEL.npz LOG... -o CALIBRATED.npz")
     logs = given[1:]
     choice = fit_choice(cutoff, split, friction)
-    with interrupt.at_once():
-        from psdmc.calibration.calibrate import CalibrateOptions
-        from psdmc.calibration.identify.essential import EssentialOptions
-        from psdmc.calibration.sources import LogNaming
-        from psdmc.calibration.verdict.record import verdict_of
-        from psdmc.calibration.verdict.said_once import unsaid_warnings
-        from psdmc.cli.show_checks import print_accuracy, print_torque_constants, print_verdict
-        from psdmc.report.calibrate_commands import calibrate_command
+    from psdmc.calibration.calibrate import CalibrateOptions
+    from psdmc.calibration.identify.essential import EssentialOptions
+    from psdmc.calibration.sources import LogNaming
+    from psdmc.calibration.verdict.record import verdict_of
+    from psdmc.calibration.verdict.said_once import unsaid_warnings
+    from psdmc.cli.show_checks import print_accuracy, print_torque_constants, print_verdict
+    from psdmc.report.calibrate_commands import calibrate_command
 
     read = [*given, *(validate or []), *(loaded or [])]
     check_output(output, *read)

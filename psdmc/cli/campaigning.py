@@ -15,7 +15,6 @@ from psdmc.calibration.motions.excite_options import (
     ExciteOptions,
     chosen_objective,
 )
-from psdmc.cli import interrupt
 from psdmc.cli.joint_values import acceleration_limits, joint_numbers, joint_ranges, load_numbers
 from psdmc.cli.next_step import quoted, say_next_line
 from psdmc.cli.progress import steps
@@ -97,14 +96,13 @@ def excite(
     ] = False,
 ) -> None:
     """Plan a calibration campaign: gravity sweeps, friction sines, and an exciting motion within the limits."""
-    with interrupt.at_once():
-        from psdmc.calibration.campaign import CampaignOptions
-        from psdmc.calibration.campaign_summary import summary
-        from psdmc.calibration.identify.steps import Load
-        from psdmc.calibration.motions.given_limits import GivenLimits
-        from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
-        from psdmc.cli.tables import print_line
-        from psdmc.report.calibrate_commands import excite_command
+    from psdmc.calibration.campaign import CampaignOptions
+    from psdmc.calibration.campaign_summary import summary
+    from psdmc.calibration.identify.steps import Load
+    from psdmc.calibration.motions.given_limits import GivenLimits
+    from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
+    from psdmc.cli.tables import print_line
+    from psdmc.report.calibrate_commands import excite_command
 
     if one_log and (load or "none").strip() != "none":
         raise InputError("--load is of the motor runs, which --one-log leaves out", "leave one of them out")
@@ -166,9 +164,8 @@ def simulate(
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 1,
 ) -> None:
     """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
-    with interrupt.at_once():
-        from psdmc.calibration.simulate_campaign import SimulateOptions
-        from psdmc.report.calibrate_commands import simulate_command
+    from psdmc.calibration.simulate_campaign import SimulateOptions
+    from psdmc.report.calibrate_commands import simulate_command
 
     with steps() as progress:
         count = simulate_command(plant, campaign, SimulateOptions(ideal, harness, seed, workers), progress)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from psdmc.cli import interrupt
 from psdmc.cli.lists import assignments, names, numbers
 from psdmc.cli.next_step import say_next
 from psdmc.cli.one_line import one_line
@@ -21,8 +20,7 @@ DRAFT = Path("log.toml")
 
 def describe_logs(given: Sequence[Path], output: Path | None, topic: str | None) -> None:
     """Write the draft of a description of logs, the first path being a model where it is one; never over a file."""
-    with interrupt.at_once():
-        from psdmc.calibration.describe import describe_command
+    from psdmc.calibration.describe import describe_command
 
     output = output or DRAFT
     check_output(output, *given)
@@ -45,8 +43,7 @@ def require_none(flags: Sequence[str]) -> None:
 
 def fit_choice(cutoff: float | None, split: str | None, friction: Sequence[str] | None) -> FitChoice:
     """The options of the linear fit that the command line gives; InputError where one is none."""
-    with interrupt.at_once():
-        from psdmc.calibration.description.table_fit import FitChoice, friction_terms_of, split_of
+    from psdmc.calibration.description.table_fit import FitChoice, friction_terms_of, split_of
 
     exponents, offset = None, None
     if friction:

@@ -1,4 +1,4 @@
-"""Ctrl-C: exit at once while modules load, an error of one line afterwards; never a traceback."""
+"""Ctrl-C: exit at once while modules load, an error of one line at any other time; never a traceback."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from types import FrameType
 
 from psdmc.errors import INTERRUPTED_STATUS
 
+IMPORT_SYSTEM = "<frozen importlib."
+"""What the file names of the import system's own code begin with."""
+
 
 class Interrupted(BaseException):
     """Ctrl-C. Not a KeyboardInterrupt, which libraries turn into statuses and messages of their own."""
@@ -22,8 +25,8 @@ def at_once() -> contextlib.AbstractContextManager[None]:
 
 
 def as_error() -> contextlib.AbstractContextManager[None]:
-    """Raise Interrupted where Ctrl-C comes."""
-    return _handled(_raise)
+    """Raise Interrupted where Ctrl-C comes; exit at once where it comes while a command loads a module."""
+    return _handled(_raise_or_leave)
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
@@ -31,8 +34,19 @@ def _leave(number: int, frame: FrameType | None) -> None:
     os._exit(INTERRUPTED_STATUS)
 
 
-def _raise(number: int, frame: FrameType | None) -> None:
+def _raise_or_leave(number: int, frame: FrameType | None) -> None:
+    if _loads_a_module(frame):
+        _leave(number, frame)
     raise Interrupted
+
+
+def _loads_a_module(frame: FrameType | None) -> bool:
+    """Whether an import is under way: a compiled module replaces any exception by an ImportError of its own."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(IMPORT_SYSTEM):
+            return True
+        frame = frame.f_back
+    return False
 
 
 @contextlib.contextmanager

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from psdmc.cli import interrupt
 from psdmc.cli.next_step import say_next
 from psdmc.cli.output import check_output
 from psdmc.cli.progress import steps
@@ -42,11 +41,10 @@ def payload(
     ] = False,
 ) -> None:
     """Identify a load's mass, centre of mass and inertia from logs with it; the verdict comes first, exit 6: not usable."""
-    with interrupt.at_once():
-        from psdmc.calibration.payload import identify_payload
-        from psdmc.cli.show_checks import print_verdict
-        from psdmc.cli.tables import print_line
-        from psdmc.model.load import load
+    from psdmc.calibration.payload import identify_payload
+    from psdmc.cli.show_checks import print_verdict
+    from psdmc.cli.tables import print_line
+    from psdmc.model.load import load
 
     check_output(output, model, *logs)
     check_output(loaded, model, *logs, *([output] if output else []))

@@ -61,6 +61,16 @@ def test_ctrl_c_while_modules_load_is_one_line(command: list[str], tmp_path: Pat
     assert 130 in seen
 
 
+def test_ctrl_c_while_a_command_loads_a_module_is_one_line(tmp_path: Path):
+    """As NumPy's compiled parts do, the module puts an error of its own in the place of whatever it meets."""
+    (tmp_path / "swallowing.py").write_text(
+        "import signal\ntry:\n    signal.raise_signal(signal.SIGINT)\nexcept BaseException:\n    raise ImportError\n"
+    )
+    code = "from psdmc.cli.interrupt import as_error\nwith as_error():\n    import swallowing"
+    ended = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    assert (ended.returncode, ended.stderr) == (130, INTERRUPTED)
+
+
 def test_ctrl_c_while_it_works_is_one_line(model: Path, tmp_path: Path):
     """The compiler hangs; Ctrl-C reaches the whole group, as a terminal sends it."""
     hanging = tmp_path / "cc"
