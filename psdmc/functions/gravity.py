@@ -40,6 +40,7 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     polynomials=Polynomials.GRAVITY,
+    in_limbs=True,
     default=True,
     benched=True,
 )

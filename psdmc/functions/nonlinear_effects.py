@@ -45,6 +45,7 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     polynomials=Polynomials.BIAS,
+    in_limbs=True,
     default=True,
     benched=True,
 )

@@ -16,7 +16,7 @@ from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.expanded.terms import COEFFICIENT_NOISE
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
 from psdmc.lower.geometry import Geometry
-from psdmc.lower.limb_search import LimbSearch
+from psdmc.lower.limb_search import LimbArrangement, LimbSearch
 from psdmc.lower.loops import in_loops
 from psdmc.lower.packed import packed
 from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
@@ -140,6 +140,7 @@ class _Lowered:
         self.geometry = Geometry(model.mechanism, model.representative)
         self._searches: dict[bool, Search] = {}
         self._arrangements: dict[tuple[str, bool], Arrangement] = {}
+        self._limbs: dict[str, LimbArrangement | None] = {}
         self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
         self._kernels: dict[tuple[str, bool], Kernel] = {}
 
@@ -182,9 +183,22 @@ class _Lowered:
         """With limbs of equal structure in lanes, where that is worth while."""
         if self.model.mechanism.is_serial or self.lowering == "expanded":
             return kernel
-        start = self._arrangement(recipe, False)
-        limbs = LimbSearch(self._search(False), recipe, self.costs).best(start, kernel.single)
+        shared = RECIPES[recipe.shares] if recipe.shares else recipe
+        found = self._limb_arrangement(shared)
+        if found is None:
+            return kernel
+        search = self._limb_search(recipe)
+        limbs = search.lowered(found if shared is recipe else search.within(found), kernel.single)
         return kernel if limbs is None else replace(kernel, limbs=limbs)
+
+    def _limb_arrangement(self, recipe: Recipe) -> LimbArrangement | None:
+        if recipe.name not in self._limbs:
+            start = self._arrangement(recipe, False)
+            self._limbs[recipe.name] = self._limb_search(recipe).best(start)
+        return self._limbs[recipe.name]
+
+    def _limb_search(self, recipe: Recipe) -> LimbSearch:
+        return LimbSearch(self._search(False), recipe, self.costs)
 
     def _expanded(self, recipe: Recipe, theta: bool) -> Program | None:
         """By the expanded lowering, with fewer coefficients left out or made one where that loses digits; None where they

@@ -73,7 +73,9 @@ def weight_of_stages(
 
 
 @dataclass(frozen=True, slots=True)
-class _Candidate:
+class LimbArrangement:
+    """An arrangement, the groups of limbs that run in lanes, and what one call costs then (`weight`)."""
+
     arrangement: Arrangement
     groups: tuple[Limbs, ...]
     weight: float
@@ -87,15 +89,21 @@ class LimbSearch:
         self.lanes = min(USUAL, costs.angles_per_sincos)
         self._parts: dict[tuple[Reframed, tuple[int, ...], Choices, tuple[Limbs, ...]], float] = {}
 
-    def best(self, start: Arrangement, straight: Program) -> LimbProgram | None:
-        """The function with limbs in lanes; None where no width makes it worth while against the straight line."""
+    def best(self, start: Arrangement) -> LimbArrangement | None:
+        """The cheapest arrangement with limbs in lanes; None where there is none."""
         if not self.costs.has_vectors or self._is_eliminated(start):
             return None
         found = [self._descended(start, groups) for groups in possible_groups(start.reframed.frames)]
-        if not found:
-            return None
-        least = min(found, key=lambda each: each.weight)
-        limbs = self._ordered(self._traced(least.arrangement, least.groups))
+        return min(found, key=lambda each: each.weight) if found else None
+
+    def within(self, shared: LimbArrangement) -> LimbArrangement:
+        """The cheapest choices of this function within an arrangement that was found for another one."""
+        own = self._weighed(shared.arrangement, shared.groups)
+        return self._cheapest(own, self._rearranged(shared.arrangement))
+
+    def lowered(self, found: LimbArrangement, straight: Program) -> LimbProgram | None:
+        """The function so arranged; None where no width makes it worth while against the straight line."""
+        limbs = self._ordered(self._traced(found.arrangement, found.groups))
         limit = for_one_state(self.costs).score(straight) / self.costs.worth_limbs
         paying = [lanes for lanes in WIDTHS if weight(limbs, lanes, self.costs) < limit]
         return limbs.with_least(paying[0]) if paying else None
@@ -104,7 +112,7 @@ class LimbSearch:
         """Whether accelerations cannot go by articulated bodies: joints follow others."""
         return self.recipe.accelerates and any_follows(start.reframed.frames)
 
-    def _descended(self, start: Arrangement, groups: tuple[Limbs, ...]) -> _Candidate:
+    def _descended(self, start: Arrangement, groups: tuple[Limbs, ...]) -> LimbArrangement:
         best = self._weighed(self._admissible(start, groups), groups)
         best = self._cheapest(best, self._alike(best.arrangement, groups))
         best = self._cheapest(best, self._rearranged(best.arrangement))
@@ -123,19 +131,19 @@ class LimbSearch:
         return best
 
     def _cheapest(
-        self, best: _Candidate, arrangements: Sequence[Arrangement] | Iterator[Arrangement]
-    ) -> _Candidate:
+        self, best: LimbArrangement, arrangements: Sequence[Arrangement] | Iterator[Arrangement]
+    ) -> LimbArrangement:
         for arrangement in arrangements:
             candidate = self._weighed(arrangement, best.groups)
             if candidate.weight < best.weight and self._is_accurate(arrangement, best.arrangement):
                 best = candidate
         return best
 
-    def _weighed(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> _Candidate:
+    def _weighed(self, arrangement: Arrangement, groups: tuple[Limbs, ...]) -> LimbArrangement:
         found, stages = cost_of_limbs(self.recipe, arrangement, self.search.robot, groups)
-        return _Candidate(arrangement, groups, weight_of_stages(found, stages, self.lanes, self.costs))
+        return LimbArrangement(arrangement, groups, weight_of_stages(found, stages, self.lanes, self.costs))
 
-    def _expected(self, best: _Candidate, candidate: Arrangement) -> float:
+    def _expected(self, best: LimbArrangement, candidate: Arrangement) -> float:
         """The weight of an exchange, told from the branches that it changes; -inf where it is not told."""
         found, groups, branches = best.arrangement, best.groups, self.search.branches
         kept = branches.changed(self.recipe, found, candidate, groups)
