@@ -8,7 +8,20 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from psdmc.emit.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
-from psdmc.emit.lines import BETWEEN, Angle, Body, GroupStore, Line, Load, Section, Step, Store, spread
+from psdmc.emit.cleared import cleared, without_zeros
+from psdmc.emit.lines import (
+    BETWEEN,
+    Angle,
+    Body,
+    Cleared,
+    GroupStore,
+    Line,
+    Load,
+    Section,
+    Step,
+    Store,
+    spread,
+)
 from psdmc.emit.products import Entry, Multiplication, multiplication
 from psdmc.emit.store_groups import GROUP, StoreGroups
 from psdmc.program.angles import angle_groups, cone
@@ -72,10 +85,12 @@ def sections_of(
     with_zeros: bool = True,
 ) -> tuple[Section, ...]:
     """The sections of a PROGRAM; `with_zeros`: entries of the vectors in `sizes` that it does not store become zero."""
+    runs = cleared(program, sizes) if with_zeros and not products else ()
+    program = without_zeros(program, runs) if runs else program
     groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
     beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
     apart = frozenset(beside.difference(in_groups))
-    writer = _Writer(program, suffix, stores_early, groups, apart, products, uniform)
+    writer = _Writer(program, suffix, stores_early, groups, apart, products, uniform, runs)
     return writer.sections(sizes if with_zeros else {})
 
 
@@ -91,9 +106,10 @@ class _Writer:
         beside: frozenset[str],
         products: Sequence[Multiplication],
         uniform: Collection[str],
+        runs: Sequence[Cleared],
     ) -> None:
         self.program, self.suffix, self.stores_early = program, suffix, stores_early
-        self.groups, self.beside = groups, beside
+        self.groups, self.beside, self.runs = groups, beside, runs
         self.left = {product.left: product.shape for product in products}
         self.right = {product.right: product.shape for product in products}
         self.stored: dict[Slot, Store] = {}
@@ -112,7 +128,7 @@ class _Writer:
             sections.append(Section(loads, steps, tuple(self._angle(a) for a in group), number))
         everything = range(len(self.program))
         loads, steps = self._loads(everything), self._steps(everything, self.stores_early)
-        rest = (*steps, *self._late_stores(), *self._zeros(sizes))
+        rest = (*steps, *self._late_stores(), *self._zeros(sizes), *self.runs)
         return (*sections, Section(loads, rest, (), len(sections)))
 
     def _loads(self, wanted: range | list[int]) -> tuple[Load, ...]:
@@ -163,13 +179,18 @@ class _Writer:
 
     def _zeros(self, sizes: Mapping[str, int]) -> list[Line]:
         taken = {slot for slot, _ in self.program.outputs}
+        in_runs = {slot for run in self.runs for slot in run.slots}
         zero = literal(0.0, self.suffix).text
         return [
             line
             for vector, size in sizes.items()
             for index in range(size)
-            if Slot(vector, index) not in taken
-            for line in self._stored(self._store_of(Slot(vector, index), zero, True))
+            if (slot := Slot(vector, index)) not in taken
+            for line in self._stored(
+                Store(vector, index, zero, True, "STORE_ZERO")
+                if slot in in_runs
+                else self._store_of(slot, zero, True)
+            )
         ]
 
     def _stored(self, store: Store) -> list[Line]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from psdmc.emit.products import Entry, Multiplication
+from psdmc.program.program import Slot
 
 KEPT, KEPT_REALS = "kept", "kept_reals"
 """Vectors between the parts of a long body: of values, and of those that are the same for all states."""
@@ -80,6 +81,23 @@ class Zeros:
 
 
 @dataclass(frozen=True, slots=True)
+class Cleared:
+    """A statement that makes `count` outputs from the first on zero in code for one state; other code stores each."""
+
+    vector: str
+    first: int
+    count: int
+
+    @property
+    def line(self) -> str:
+        return f"CLEAR({self.vector}, {self.first}, {self.count})"
+
+    @property
+    def slots(self) -> tuple[Slot, ...]:
+        return tuple(Slot(self.vector, self.first + k) for k in range(self.count))
+
+
+@dataclass(frozen=True, slots=True)
 class GroupStore:
     """A statement `vector[index ...] = texts`: a group of outputs that are also stored one by one, for the form that
     writes rows."""
@@ -93,7 +111,7 @@ class GroupStore:
         return f"STORE_GROUP({self.vector}, {self.index}, {', '.join(self.texts)})"
 
 
-Line = Step | Store | Zeros | GroupStore | Entry | Multiplication
+Line = Step | Store | Zeros | Cleared | GroupStore | Entry | Multiplication
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +154,11 @@ class Body:
     has_roots: bool = False
     parts: tuple[Part, ...] = ()
     kept: tuple[str, ...] = ()
+
+    @property
+    def has_clears(self) -> bool:
+        """Whether runs of zeros are cleared."""
+        return any(isinstance(line, Cleared) for section in self.sections for line in section.steps)
 
 
 @dataclass(frozen=True, slots=True)

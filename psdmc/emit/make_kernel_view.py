@@ -110,6 +110,7 @@ TAKEN = {
         "angles",
     ),
     *("DIRECT", "KEEP_DIRECT", "STORE_ZEROS", "PART", "NOT_INLINE", "kept", "kept_reals", "zero"),
+    *("STORE_ZERO", "CLEAR", "cleared"),
     *("theta_b", "count", "block", "blocks", "lane", "first", "row", "rows", "failed", "bad", "two", "four"),
 }
 """Names that mean something else in the emitted C where a quantity's name would stand."""

@@ -200,6 +200,11 @@ class PackageView:
         return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels)
 
     @property
+    def has_clears(self) -> bool:
+        """Whether some body clears runs of zeros."""
+        return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self.kernels)
+
+    @property
     def has_roots(self) -> bool:
         """Whether some kernel takes square roots."""
         bodies = (body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body))

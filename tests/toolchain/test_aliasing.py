@@ -19,12 +19,19 @@ AS_LONG_AS_AN_INPUT = [
     name for name, kernel in KERNELS.items() if SIZES.size(kernel.function.outputs[0]) == N
 ]
 BUILDS = {"vectors": ["-march=native"], "plain": ["-Dtest_arm_NO_VECTORS"], "parts": ["-march=native"]}
-"""`parts`: bodies are cut into functions of some thirty operations."""
+BUILDS |= {"clears": ["-march=native"]}
+"""`parts`: bodies are cut into functions of some thirty operations; `clears`: runs of two zeros are cleared."""
 OPTIMISED = ("float64", "vectors")
 """The build that shows what a compiler makes of it; the others show in which order the C reads and writes."""
 
 
-CASES = [("float64", "vectors"), ("float64", "plain"), ("float32", "vectors"), ("float64", "parts")]
+CASES = [
+    ("float64", "vectors"),
+    ("float64", "plain"),
+    ("float32", "vectors"),
+    ("float64", "parts"),
+    ("float64", "clears"),
+]
 QUICK = [OPTIMISED]
 
 
@@ -35,8 +42,11 @@ def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
         if build == "parts":
             patch.setattr("psdmc.emit.parts.LONG", 30)
             patch.setattr("psdmc.emit.parts.PART", 30)
+        if build == "clears":
+            patch.setattr("psdmc.emit.cleared.LEAST", 1)
+            patch.setattr("psdmc.emit.cleared.SHORTEST", 2)
         package = arm_package(options=EmitOptions(real=real))
-    assert package.has_parts == (build == "parts")
+    assert (package.has_parts, package.has_clears) == (build == "parts", build == "clears")
     flags = ["-O1" if request.param == OPTIMISED else "-O0", *BUILDS[build]]
     return Direct(package, shared_library(package, tmp_path_factory.mktemp("aliasing"), flags))
 
