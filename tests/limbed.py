@@ -24,7 +24,7 @@ from psdmc.program.limb_stages import staged
 from psdmc.program.pipeline import shortened
 from psdmc.robot.mechanism import BASE
 
-FUNCTIONS = ("inverse_dynamics", "nonlinear_effects", "gravity", "mass_matrix", "forward_dynamics")
+FUNCTIONS = ("inverse_dynamics", "nonlinear_effects", "mass_matrix", "forward_dynamics")
 
 
 def limbed(seed: int, trunk: str, limbs: Sequence[tuple[int, str, int]], parallel: float = 0.5) -> RandomTree:

@@ -40,7 +40,6 @@ RECIPE = Recipe(
     pinocchio,
     shares="inverse_dynamics",
     polynomials=Polynomials.GRAVITY,
-    in_limbs=True,
     default=True,
     benched=True,
 )
