@@ -85,11 +85,12 @@ def sections_of(
     with_zeros: bool = True,
 ) -> tuple[Section, ...]:
     """The sections of a PROGRAM; `with_zeros`: entries of the vectors in `sizes` that it does not store become zero."""
-    runs = cleared(program, sizes) if with_zeros and not products else ()
-    program = without_zeros(program, runs) if runs else program
     groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
     beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
     apart = frozenset(beside.difference(in_groups))
+    whole = {vector: size for vector, size in sizes.items() if vector not in apart}
+    runs = cleared(program, whole) if with_zeros and not products else ()
+    program = without_zeros(program, runs) if runs else program
     writer = _Writer(program, suffix, stores_early, groups, apart, products, uniform, runs)
     return writer.sections(sizes if with_zeros else {})
 

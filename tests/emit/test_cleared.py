@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from psdmc.emit.body import make_body
 from psdmc.emit.cleared import LEAST, cleared, without_zeros
 from psdmc.emit.lines import Cleared
 from psdmc.program.program import Instr, Op, Program, Slot
@@ -35,3 +36,11 @@ def test_runs_end_with_a_vector() -> None:
 @pytest.mark.parametrize(("size", "count"), [(LEAST, 0), (LEAST + 1, 1)])
 def test_few_zeros_are_stored_one_by_one(size: int, count: int) -> None:
     assert len(cleared(storing(0), {"y": size})) == count
+
+
+def test_outputs_that_rows_take_from_a_block_are_stored_there() -> None:
+    """Beside a matrix in groups, STORE_BLOCK stores a vector's entries in every form; STORE_ZERO would not in rows."""
+    body = make_body(storing(0), (), {"M": LEAST, "y": SIZE}, "", stores_early=True, in_groups=("M",))
+    lines = [line.line for section in body.sections for line in section.steps]
+    assert [line for line in lines if line.startswith("CLEAR")] == [f"CLEAR(M, 0, {LEAST})"]
+    assert sum(line.startswith("STORE_BLOCK(y, ") for line in lines) == SIZE
