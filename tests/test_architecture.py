@@ -40,6 +40,7 @@ MAY_IMPORT |= {
 
 OUTSIDE = {
     "real_arrays": {"numpy"},
+    "reproducible": {"numpy"},
     "model_functions": {"numpy"},
     "robot": {"numpy", "pinocchio", "defusedxml", "mujoco", "xacro"},
     "dynamics": {"numpy"},
@@ -98,7 +99,7 @@ ROOMS = {
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
-SHARED = {"errors", "version", "atomic", "garbage", "processes", "progress", "real_arrays"}
+SHARED = {"errors", "version", "atomic", "garbage", "processes", "progress", "real_arrays", "reproducible"}
 ENTRY_POINTS = {"__init__", "__main__"}
 
 

@@ -12,9 +12,9 @@ from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.signature import Sizes
+from psdmc.reproducible import times
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism
-from psdmc.robot.small import times
 
 LONGEST_INPUT = 256
 """Positions of the largest robot that the loops take: LONGEST_INPUT of rivals/loops.hpp."""

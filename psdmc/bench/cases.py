@@ -13,10 +13,10 @@ import numpy as np
 from psdmc.bench.case import FLOOR_MOUNT, Case, generic_chain
 from psdmc.bench.fresh import derive_fresh
 from psdmc.errors import InputError
+from psdmc.reproducible import length
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Array, Joint, Mechanism, Placement
-from psdmc.robot.small import length
 
 SEED = 4
 """Seed of generic inertias and geometry; printed with every result."""

@@ -15,6 +15,7 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.errors import DerivationError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
@@ -191,5 +192,5 @@ def _parameters(model: DynamicsModel, rng: np.random.Generator) -> tuple[Array, 
     if model.theta_b is not None:
         return np.nan_to_num(model.mechanism.parameters.reshape(-1)), np.asarray(model.theta_b)
     span = model.mechanism.parameter_span
-    x: Array = span @ rng.normal(size=span.shape[1])
-    return x, model.B @ x
+    x: Array = times(span, rng.normal(size=span.shape[1]))
+    return x, times(model.B, x)

@@ -28,9 +28,9 @@ from psdmc.derivation.units import Scaled, length_unit, parameter_units, scaled
 from psdmc.errors import DerivationError, InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
+from psdmc.reproducible import times
 from psdmc.robot.derivable import require_derivable
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism
-from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from psdmc.derivation.units import Scaled
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
-from psdmc.robot.small import times
+from psdmc.reproducible import times
 
 Long = NDArray[Any]
 """An array of np.longdouble: 64 bits of mantissa on x86, 113 on most Arm, 53 where the C library has no more."""

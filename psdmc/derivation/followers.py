@@ -22,7 +22,7 @@ from psdmc.derivation.sampled import is_plain, reduction_of, sampled_regressor
 from psdmc.derivation.units import Scaled
 from psdmc.dynamics.following import any_follows
 from psdmc.dynamics.torque_rows import echelon_rows
-from psdmc.robot.small import times
+from psdmc.reproducible import times
 
 STATES = 32
 """Sampled motions: three for each of the eleven columns that a joint's own link has to tell apart."""
@@ -39,7 +39,7 @@ def _of_followers(scaled: Scaled) -> Reduction:
     if is_plain(scaled):
         own = reduced(_flat(_seen(scaled, tree.pivots)))
         if own.is_clear:
-            return Reduction(tree.pivots[own.pivots], own.echelon @ tree.echelon, True)
+            return Reduction(tree.pivots[own.pivots], times(own.echelon, tree.echelon), True)
     rows = echelon_rows(_flat(_to_own_torque(_seen(extended(scaled), tree.pivots))))
     own = reduced_to_digits(rows, np.zeros(rows.shape[1], dtype=np.int64))
     return Reduction(tree.pivots[own.pivots], times(own.echelon, tree.echelon), False)

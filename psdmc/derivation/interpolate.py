@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.reproducible import cosine, inverse, sine, times
 from psdmc.robot.joints import JointType
-from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def nodes(joint: JointType) -> Array:
 
 def quadratic_basis(joint: JointType, q: Array) -> Array:
     """(len(q), size) values of the joint's factors at each q."""
-    rows = (q, np.sin(q), np.cos(q))
+    rows = (q, sine(q), cosine(q))
     return np.stack([_product(powers, rows) for powers in joint.basis.exponents], axis=-1)
 
 
@@ -61,14 +61,7 @@ def evaluation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
 @cache
 def interpolation(joint: JointType, precision: np.dtype[Any] = DOUBLE) -> Array:
     """(size, size) matrix: values at the nodes to coefficients of degree two."""
-    inverse: Array = np.asarray(np.linalg.inv(quadratic_basis(joint, nodes(joint))), dtype=np.float64)
-    if precision == DOUBLE:
-        return inverse
-    basis = quadratic_basis(joint, nodes(joint).astype(precision))
-    twice = 2.0 * np.eye(len(basis), dtype=precision)
-    for _ in range(2):  # each step squares the error
-        inverse = times(inverse, twice - times(basis, inverse))
-    return inverse
+    return inverse(quadratic_basis(joint, nodes(joint).astype(precision)))
 
 
 def along_axes(matrices: Sequence[Array], values: Array) -> Array:
@@ -81,6 +74,6 @@ def along_axes(matrices: Sequence[Array], values: Array) -> Array:
     """
     for matrix in matrices:
         turned = values.reshape(matrix.shape[1], -1).T
-        values = turned @ matrix.T if values.dtype == DOUBLE else times(turned, matrix.T)
+        values = times(turned, matrix.T)
     size = int(np.prod([matrix.shape[0] for matrix in matrices], dtype=np.int64))
     return values.reshape(-1, size)

@@ -18,8 +18,8 @@ from psdmc.dynamics.body import body_from_parameters
 from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.parameters import moving_map
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, Placement
-from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 Long = NDArray[Any]

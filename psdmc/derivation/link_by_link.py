@@ -16,7 +16,8 @@ from psdmc.derivation.units import Scaled
 from psdmc.dynamics.frames import BASE
 from psdmc.dynamics.torque_rows import EFFECT as EFFECT
 from psdmc.dynamics.torque_rows import torque_rows
-from psdmc.robot.graded import graded_pivots, halving_shares, lengths
+from psdmc.reproducible import lengths, triangle_solved
+from psdmc.robot.graded import graded_pivots, halving_shares
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK
 
 EXACT = 1e-16
@@ -66,20 +67,9 @@ def reduced_to_digits(rows: Long, links: NDArray[np.int64]) -> Reduction:
     found, _, _ = graded_pivots(work, np.ones(work.shape[1]), halving_shares(last), links)
     pivots = np.array(found, dtype=np.int64)
     others = np.setdiff1d(np.arange(work.shape[1]), pivots)
-    shares = _solved(work[: len(pivots), pivots], work[: len(pivots), others])
+    shares = triangle_solved(work[: len(pivots), pivots], work[: len(pivots), others])
     echelon = np.zeros((len(pivots), work.shape[1]))
     echelon[:, pivots] = np.eye(len(pivots))
     echelon[:, others] = np.where(np.abs(shares) < EXACT, 0.0, shares)
     order = np.argsort(pivots)
     return Reduction(pivots[order], echelon[order], False)
-
-
-def _solved(triangle: Long, right: Long) -> Long:
-    """The solution x of triangle @ x = right. Entries below the diagonal of `triangle` (l, l) are not exactly zero but
-    rounding, which is nothing in a row of length one and much in a row of 1e-13."""
-    solution = right.copy()
-    for r in reversed(range(len(triangle))):
-        solution[r] /= triangle[r, r]
-        above = np.flatnonzero(triangle[:r, r])
-        solution[above] -= triangle[above, r, None] * solution[r]
-    return solution

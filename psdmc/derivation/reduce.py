@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from psdmc.derivation.terms import Terms
+from psdmc.reproducible import lengths, triangle_solved
 from psdmc.robot.graded import graded_pivots, halving_shares
 
 Array = NDArray[np.float64]
@@ -90,7 +90,7 @@ def reduced(rows: Array) -> Reduction:
     The largest residual is not taken first: between equal residuals rounding would decide.
     """
     work = np.array(rows, order="C")
-    norms = np.linalg.norm(work, axis=0)
+    norms = lengths(work)
     small = norms <= PIVOT_TOLERANCE * norms.max(initial=0.0)
     dropped = norms[small].max(initial=0.0) / (norms.max(initial=0.0) or 1.0)
     work[:, small] = 0.0
@@ -100,9 +100,7 @@ def reduced(rows: Array) -> Reduction:
 
 
 def _back_substituted(rows: Array, pivots: NDArray[np.int64], is_clear: bool) -> Reduction:
-    echelon = np.zeros(rows.shape)
-    if len(pivots):
-        echelon[:] = solve_triangular(rows[:, pivots], rows)
+    echelon = triangle_solved(rows[:, pivots], rows)
     largest = np.abs(echelon).max(axis=1, keepdims=True, initial=0.0)
     echelon[np.abs(echelon) < ECHELON_TOLERANCE * largest] = 0.0
     echelon[:, pivots] = np.eye(len(pivots))

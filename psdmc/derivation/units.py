@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from psdmc.dynamics.frames import BASE, Frame, frames_of
 from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
+from psdmc.reproducible import length
 from psdmc.robot.inertia import LENGTH_ORDER
 from psdmc.robot.joints import JointType
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement
@@ -102,7 +103,7 @@ def scaled(chain: Mechanism) -> Scaled:
     units = parameter_units(chain.types, unit)
     leads = leading_rows(chain.parameter_span)
     span = chain.parameter_span / units[:, None] * units[leads]
-    strength = float(np.linalg.norm(chain.gravity))
+    strength = length(np.asarray(chain.gravity))
     x, y, z = (-float(g) / strength if strength else 0.0 for g in chain.gravity)
     return Scaled(
         chain.types,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.dynamics.body import Body, body_from_parameters
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, Placement
-from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 

@@ -27,9 +27,9 @@ from psdmc.dynamics.regressor import Placed, unit_wrench
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.dynamics.slices import normalized, rates
 from psdmc.dynamics.twist import efforts
-from psdmc.robot.graded import graded_pivots, halving_shares, lengths
+from psdmc.reproducible import cosine, lengths, sine, times
+from psdmc.robot.graded import graded_pivots, halving_shares
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK
-from psdmc.robot.small import times
 
 Long = NDArray[Any]
 """An array of np.longdouble."""
@@ -74,7 +74,7 @@ def torque_rows(frames: Sequence[Frame], link_frames: Sequence[Placed], up: Vect
 def _axes_at_rest(frame: Frame) -> Long:
     """(3, 3): a frame's axes in its parent's where its joint has not moved. Only what slides shows its turn there: about a
     joint that turns, all directions are alike to what its torque does not depend on."""
-    s, c = np.sin(np.longdouble(frame.offset)), np.cos(np.longdouble(frame.offset))
+    s, c = sine(np.longdouble(frame.offset)), cosine(np.longdouble(frame.offset))
     for _ in range(frame.quarters):
         s, c = c, -s
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], np.longdouble)

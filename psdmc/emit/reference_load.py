@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from psdmc.emit.tables import number
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.payload import body_parameters, load_parameters
+from psdmc.reproducible import times
 from psdmc.robot.inertia import six_of
-from psdmc.robot.small import times
 
 Array = NDArray[np.float64]
 

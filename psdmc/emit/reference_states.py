@@ -20,7 +20,7 @@ from psdmc.model.random_states import on_joints
 from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Needs, Recipe
-from psdmc.robot.small import times
+from psdmc.reproducible import times
 
 Array = NDArray[np.float64]
 

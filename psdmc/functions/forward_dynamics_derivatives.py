@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
@@ -15,6 +13,8 @@ from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
 from psdmc.recipes.accelerations import PIVOTS
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
+from psdmc.reproducible import inverse as inverted
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -64,8 +64,13 @@ def _torque_derivatives(g: Ingredients, qdd: Sequence[Scalar]) -> Derivatives:
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     by_q, by_qd, by_qdd = robot.torque_derivatives(given["q"], given["qd"], given["qdd"])
-    by_tau = np.linalg.inv(by_qdd).astype(np.float64)
-    return {"qdd": given["qdd"], "dqdd_dq": -by_tau @ by_q, "dqdd_dqd": -by_tau @ by_qd, "dqdd_dtau": by_tau}
+    by_tau = inverted(by_qdd)
+    return {
+        "qdd": given["qdd"],
+        "dqdd_dq": -times(by_tau, by_q),
+        "dqdd_dqd": -times(by_tau, by_qd),
+        "dqdd_dtau": by_tau,
+    }
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc import reproducible
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.solve import factorize, inverse
 from psdmc.program.signature import Q, Quantity, Signature
@@ -25,7 +26,7 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    return {"Minv": np.linalg.inv(robot.mass_matrix(given["q"])).astype(np.float64)}
+    return {"Minv": reproducible.inverse(robot.mass_matrix(given["q"]))}
 
 
 def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:

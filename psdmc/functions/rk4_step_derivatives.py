@@ -18,6 +18,7 @@ from psdmc.recipes.coordinate_maps import CoordinateMaps
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.steps import DT, A, B, step_on_arrays
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -149,12 +150,12 @@ def _on_arrays(
     count, step = len(q0), dt[..., None]
     unit = np.broadcast_to(np.eye(2 * n, 3 * n), (count, 2 * n, 3 * n))
     push = np.broadcast_to(np.eye(3 * n)[2 * n :], (count, n, 3 * n))
-    first = maps.rates(q0) @ unit[:, :n]
+    first = times(maps.rates(q0), unit[:, :n])
 
     def moved(share: float, slopes: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array]:
         way, kick, turn, pushed = slopes
         coordinates = q0 + share * dt * way
-        along = maps.tangents(coordinates) @ (first + share * step * turn)
+        along = times(maps.tangents(coordinates), first + share * step * turn)
         by = np.concatenate([along, unit[:, n:] + share * step * pushed], axis=-2)
         return maps.restored(coordinates), given["qd"] + share * dt * kick, by
 
@@ -164,10 +165,10 @@ def _on_arrays(
         qdd, by_q, by_qd, by_tau = at(q, qd)
         rates, bent = maps.rates(q), maps.bent(q, qd)
         slopes = (
-            (rates @ qd[..., None])[..., 0],
+            times(rates, qd[..., None])[..., 0],
             qdd,
-            rates @ by[:, n:] + bent @ by[:, :n],
-            np.concatenate([by_q, by_qd], axis=-1) @ by + by_tau @ push,
+            times(rates, by[:, n:]) + times(bent, by[:, :n]),
+            times(np.concatenate([by_q, by_qd], axis=-1), by) + times(by_tau, push),
         )
         shares = [weight / 6.0 * x for x in slopes]
         total = shares if total is None else [x + y for x, y in zip(total, shares, strict=True)]

@@ -17,9 +17,9 @@ from psdmc.lower.carriers import EFFECT, Careful, CarrierSpace, lightest
 from psdmc.lower.link_parameters import LENGTH_ORDER, PSEUDO_NAMES, WEIGHTS, link_map, pseudo_map
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.tableau import Long, Tableau
+from psdmc.reproducible import times
 from psdmc.robot.graded import graded_pivots, halving_shares, lengths
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Placement
-from psdmc.robot.small import times
 
 FAIR_GROWTH = 1e3
 """Largest ratio of the carriers' values to theta_b, lengths in the chain's unit. Where it is exceeded the carriers are

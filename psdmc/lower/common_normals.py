@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from psdmc.lower.without_rounding import EXACT, clean_direction
+from psdmc.reproducible import cross, length, times
 from psdmc.robot.mechanism import Array
-from psdmc.robot.small import cross, length, times
 
 NEARLY_PARALLEL = 2e-2
 """Sine of the angle below which two axes are treated as parallel but for the rotation between them: their common

@@ -9,8 +9,8 @@ import numpy as np
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.dynamics.scalar import Scalar
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Array, Placement
-from psdmc.robot.small import times
 
 PSEUDO_NAMES = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz", "Im")
 """A link's parameters in pseudo-inertia form, in the order of carriers."""

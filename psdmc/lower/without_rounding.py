@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from psdmc.reproducible import length
 from psdmc.robot.mechanism import Array, Placement
-from psdmc.robot.small import length
 
 EXACT = 4e-15
 """Lengths (relative to the chain's reach) and direction cosines below this are rounding of an exact zero: some units in the

@@ -16,6 +16,7 @@ from psdmc.model.answers import Answers
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK, Mechanism, Placement, frozen_array, made_again
 from psdmc.robot.zeros import leading_rows
 
@@ -169,7 +170,7 @@ class DynamicsModel(Answers):
 
     def standard_parameters(self) -> Array:
         """(11n,) standard parameters that have the model's theta_b: `representative @ theta_b`, one choice of many."""
-        found: Array = self.representative @ self.known_theta_b()
+        found: Array = times(self.representative, self.known_theta_b())
         return found
 
     def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -186,7 +187,7 @@ class DynamicsModel(Answers):
             )
         shape, arrays = evaluate.states(self.mechanism, q=q, qd=qd, qdd=qdd)
         if self.expansion is None:
-            found = recursive.torques(self.mechanism, self.representative @ theta, arrays)
+            found = recursive.torques(self.mechanism, times(self.representative, theta), arrays)
         else:
             found = evaluate.torques(self.expansion, self.mechanism, theta, arrays)
         return found.reshape(*shape, self.nv)
@@ -276,4 +277,4 @@ class DynamicsModel(Answers):
                 "calibrate before adding a load",
             )
         index = payload.body_parameters(body)
-        return replace(self, theta_b=self.theta_b + self.B[:, index] @ load, mechanism=chain)
+        return replace(self, theta_b=self.theta_b + times(self.B[:, index], load), mechanism=chain)

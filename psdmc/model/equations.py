@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.model.terms import Power, Symbol, Term, equation
+from psdmc.reproducible import times
 from psdmc.robot.inertia import LENGTH_ORDER
 from psdmc.robot.mechanism import PARAMETER_NAMES, PARAMETERS_PER_LINK, Joint, Mechanism
 
@@ -101,7 +102,10 @@ def _row_lengths(joint: Joint, convention: str) -> list[tuple[str, float]]:
         return [("a", x), ("d", z)]
     if convention == "modified":
         place = joint.placement
-        return [("a", float(place.translation[0])), ("d", float(place.rotation[:, 2] @ place.translation))]
+        return [
+            ("a", float(place.translation[0])),
+            ("d", float(times(place.rotation[:, 2], place.translation))),
+        ]
     return []
 
 

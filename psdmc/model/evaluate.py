@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.model.expansion import Expansion, RowBlocks
 from psdmc.real_arrays import real_array
+from psdmc.reproducible import cosine, length, sine
 from psdmc.robot.mechanism import Mechanism
 from psdmc.robot.unit_lengths import refuse_other_lengths, units_of
 
@@ -61,13 +62,13 @@ class _Monomials:
         moving = exponents[rows.rates].any(axis=0)
         self.part, first = _alike(np.vstack([exponents[rows.position], moving]))
         self.parts = exponents[rows.position, first]
-        self.strength = np.where(moving, 1.0, np.linalg.norm(chain.gravity))[first]
+        self.strength = np.where(moving, 1.0, length(np.asarray(chain.gravity)))[first]
         self.factors = tuple(_factors(exponents[rows.rates]))
 
     def values(self, q: Array, qd: Array, qdd: Array) -> Array:
         """(p, states) from (states, n) arrays; each monomial's factors in the order of E's rows."""
         placed = np.repeat(self.strength[:, None], q.shape[0], axis=1)
-        for powers, row in zip(self.parts, np.concatenate([q.T, np.sin(q).T, np.cos(q).T]), strict=True):
+        for powers, row in zip(self.parts, np.concatenate([q.T, sine(q).T, cosine(q).T]), strict=True):
             for power in (1, 2):
                 chosen = powers == power
                 if chosen.any():

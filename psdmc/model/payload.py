@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.dynamics.parameters import moved, moving_map, standard_parameters
 from psdmc.errors import InputError
+from psdmc.reproducible import times
 from psdmc.robot import limits
 from psdmc.robot.inertia import physical_fault, six_of
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, NamedFrame, Placement
-from psdmc.robot.small import times
 from psdmc.robot.zeros import leading_rows
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def load_parameters(
     DynamicsModel.with_payload."""
     centre, about_com = _checked(mass, com, inertia)
     kilograms = float(mass)
-    about_frame = about_com + kilograms * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    about_frame = about_com + kilograms * (times(centre, centre) * np.eye(3) - np.outer(centre, centre))
     own = standard_parameters(kilograms, kilograms * centre, about_frame)
     place = carrying_frame(chain, frame)
     return moved(own, chain.joints[place.joint].link_frame.inverse() @ place.placement)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism
 from psdmc.robot.zeros import leading_rows
 
@@ -21,10 +22,10 @@ def random_parameters(chain: Mechanism) -> Array:
     for link in x:
         mass, centre = rng.uniform(1.0, 5.0), rng.uniform(-0.1, 0.1, size=3)
         shape = rng.normal(scale=0.1, size=(3, 3))
-        second = mass * (shape @ shape.T + np.outer(centre, centre))
+        second = mass * (times(shape, shape.T) + np.outer(centre, centre))
         link[:BODY_PARAMETERS] = standard_parameters(mass, mass * centre, inertia_of(second))
         link[BODY_PARAMETERS] = rng.uniform(0.1, 0.5)
     span = chain.parameter_span
     leads = leading_rows(span)
-    admitted: Array = span @ x.reshape(-1)[leads]
+    admitted: Array = times(span, x.reshape(-1)[leads])
     return admitted

@@ -13,6 +13,7 @@ from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor as standard_regressor
 from psdmc.dynamics.scalar import Scalar
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
@@ -45,7 +46,7 @@ def regressor(chain: Mechanism, representative: Array, arrays: list[Array]) -> A
     )
     count = len(arrays[0])
     full = np.stack([_columns([row.get(c, 0.0) for c in wanted], count) for row in rows], axis=1)
-    result: Array = full @ representative[wanted]
+    result: Array = times(full, representative[wanted])
     return result
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.reproducible import times
 
 BELONGS = 1e-9
 """Share of the largest base parameter by which B x may differ from theta_b: both were rounded."""
@@ -18,7 +19,7 @@ def lack_of_standard_parameters(model: DynamicsModel) -> str | None:
         return "it needs mass and inertia of every link, and some are unknown"
     if not parameters[:, 0].sum() > 0.0:
         return "it needs mass, and the links have none"
-    theta = model.B @ parameters.reshape(-1)
+    theta = times(model.B, parameters.reshape(-1))
     if model.theta_b is None or np.abs(theta - model.theta_b).max() > BELONGS * np.abs(theta).max():
         return (
             "it needs mass and inertia of every link, which torques do not show, and the model's base parameters are "

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from psdmc.errors import InputError, ToolchainError
 from psdmc.model.expansion import Expansion, RowBlocks
+from psdmc.reproducible import length
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Mechanism
 
@@ -48,7 +49,7 @@ def torque_expression(
     for k, entry in zip(place.tolist(), own.tolist(), strict=True):
         weights[k].append(_number(sp, float(entries.value[entry])) * thetas[entries.column[entry]])
     factors = _factors(sp, len(robot))
-    strength = _number(sp, float(np.linalg.norm(robot.gravity)))
+    strength = _number(sp, length(np.asarray(robot.gravity)))
     terms = (
         sp.Add(*weight) * _monomial(sp, expansion, int(column), factors, strength)
         for column, weight in zip(used, weights, strict=True)

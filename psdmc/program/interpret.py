@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.program.program import Op, Program
+from psdmc.reproducible import cosine, sine
 
 Array = NDArray[np.float64]
 
@@ -17,8 +18,8 @@ _FUNCTIONS: dict[Op, Callable[..., Array]] = {
     Op.MUL: np.multiply,
     Op.DIV: np.divide,
     Op.NEG: np.negative,
-    Op.SIN: np.sin,
-    Op.COS: np.cos,
+    Op.SIN: sine,
+    Op.COS: cosine,
     Op.SQRT: np.sqrt,
 }
 

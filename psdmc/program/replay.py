@@ -9,6 +9,7 @@ from psdmc.errors import InternalError
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.trace import Number, Symbol, Tracer
+from psdmc.reproducible import cosine, sine
 
 Value = Symbol | Number
 
@@ -54,4 +55,4 @@ def _value(instr: Instr, values: Sequence[Value]) -> Value:
 
 
 def _sincos(angle: Value) -> tuple[Value, Value]:
-    return angle.sincos() if isinstance(angle, Symbol) else (math.sin(angle), math.cos(angle))
+    return angle.sincos() if isinstance(angle, Symbol) else (float(sine(angle)), float(cosine(angle)))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psdmc import reproducible
 from psdmc.dynamics.manifold import coordinate_rates, pulled_back
 from psdmc.dynamics.scalar import Scalar
 from psdmc.program.replay import substituted
@@ -16,6 +17,7 @@ from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.recipes.torques import torques
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -73,17 +75,17 @@ def _free(g: Ingredients) -> list[Scalar]:
 
 def solved(matrices: Array, right: Array) -> Array:
     """(k, n) matrix^-1 right, state by state."""
-    return np.linalg.solve(matrices, right[..., None])[..., 0].astype(np.float64)
+    return reproducible.solved(matrices, right[..., None])[..., 0]
 
 
 def weighted(weights: Array, matrices: Array) -> Array:
     """(k, n) weights^T matrix, state by state."""
-    return np.asarray(np.einsum("ki,kij->kj", weights, matrices))
+    return np.asarray(times(weights[:, None], matrices)[:, 0])
 
 
 def along(matrices: Array, direction: Array) -> Array:
     """(k, n) matrix direction, state by state."""
-    return np.asarray(np.einsum("kij,kj->ki", matrices, direction))
+    return np.asarray(times(matrices, direction[..., None])[..., 0])
 
 
 def with_parameter_gradient(

@@ -16,8 +16,8 @@ from psdmc.dynamics.frames import Frame, base_acceleration, frames_of
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, inverse_dynamics
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.scalar import Scalar, Vector
+from psdmc.reproducible import solved, times
 from psdmc.robot.mechanism import Array, Mechanism
-from psdmc.robot.small import times
 
 if TYPE_CHECKING:
     from psdmc.model.dynamics_model import DynamicsModel
@@ -98,8 +98,7 @@ class RobotOnArrays:
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
         """(k, n) joint accelerations."""
         bias = self.torques(q, qd, np.zeros_like(qd), self.base_acceleration)
-        found = np.linalg.solve(self.mass_matrix(q), (tau - bias)[..., None])[..., 0]
-        return np.asarray(found, dtype=np.float64)
+        return solved(self.mass_matrix(q), (tau - bias)[..., None])[..., 0]
 
     def mass_matrix(self, q: Array) -> Array:
         """(k, nv, nv)"""

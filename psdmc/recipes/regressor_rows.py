@@ -10,8 +10,8 @@ from psdmc.dynamics.regressor import regressor
 from psdmc.dynamics.scalar import Scalar
 from psdmc.recipes.on_arrays import RobotOnArrays, columns
 from psdmc.recipes.recipe import Ingredients
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
-from psdmc.robot.small import times
 
 
 def traced_rows(

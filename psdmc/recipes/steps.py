@@ -15,6 +15,7 @@ from psdmc.dynamics.solve import inner_product
 from psdmc.dynamics.tangent_steps import StepSlopes, step_slopes
 from psdmc.program.signature import Quantity
 from psdmc.recipes.on_arrays import columns, matrix
+from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 
 DT = Quantity("dt", (), 0.01)
@@ -99,7 +100,7 @@ def semi_implicit_on_arrays(
     kick = np.block([[unit, none], [h * by_q, unit + h * by_qd]])
     drift = np.block([[by_start, h * by_way], [none, unit]])
     push = np.concatenate([none, h * by_tau], axis=-2)
-    return drift @ kick, drift @ push
+    return times(drift, kick), times(drift, push)
 
 
 def slopes_on_arrays(frames: Sequence[Frame], way: Array) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.reproducible import times
 from psdmc.robot.joints import JointType
 
 
@@ -82,15 +83,15 @@ class Following:
 
     def positions(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
         """All joints' (..., n) from (..., nq)."""
-        return np.asarray(q @ self.shares.T + self.offsets)
+        return np.asarray(times(q, self.shares.T) + self.offsets)
 
     def rates(self, qd: NDArray[np.float64]) -> NDArray[np.float64]:
         """All joints' (..., n) from (..., nv)."""
-        return np.asarray(qd @ self.ratios.T)
+        return np.asarray(times(qd, self.ratios.T))
 
     def summed(self, values: NDArray[np.float64], axis: int = -1) -> NDArray[np.float64]:
         """Torques of the joints, or whatever has an axis of them, summed onto the coordinates."""
-        return np.moveaxis(np.moveaxis(values, axis, -1) @ self.ratios, -1, axis)
+        return np.moveaxis(times(np.moveaxis(values, axis, -1), self.ratios), -1, axis)
 
 
 def _shares(coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> NDArray[np.float64]:

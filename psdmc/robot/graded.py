@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.reproducible import combined, lengths
+
 
 def halving_shares(last: float) -> tuple[float, ...]:
     """1/2, 1/4, ... down to `last`. The parameters are gone through once for each of these shares, in their own order,
@@ -45,7 +47,7 @@ def graded_pivots(
                 columns, measured = columns[others[columns]], len(pivots)
                 residuals = lengths(work[measured:, columns])
             for column in columns[residuals > 0.5 * share * norms[columns]].tolist():
-                residual = np.linalg.norm(work[len(pivots) :, column])
+                residual = lengths(work[len(pivots) :, column, None])[0]
                 if residual > share * norms[column]:
                     _reflect(work[len(pivots) :], column, residual)
                     pivots.append(column)
@@ -55,28 +57,21 @@ def graded_pivots(
     return pivots, taken, float(left[others].max(initial=0.0))
 
 
-def lengths(rows: NDArray[Any]) -> NDArray[Any]:
-    """(k,) lengths of the columns of (m, k) rows, in their precision and without BLAS."""
-    return np.asarray(np.sqrt(np.einsum("ij,ij->j", rows, rows)))
-
-
 def _reflect(rows: NDArray[Any], column: int, length: Any) -> None:
     """Reflect the rows, in place, so that the column keeps its first entry only (Householder). Rows in which the column
     is zero stay as they are: a long chain's rows are zero for all links before their own. So do columns at right angles
     to the mirror: other branches'.
-
-    einsum instead of BLAS: its sums do not depend on the number of threads.
     """
     mirror = rows[:, column].copy()
     mirror[0] += np.copysign(length, mirror[0])
-    mirror /= np.linalg.norm(mirror)
+    mirror /= lengths(mirror[:, None])
     used = np.flatnonzero(mirror)
     if len(used) == len(mirror):
-        rows -= np.outer(mirror, 2.0 * np.einsum("i,ij->j", mirror, rows))
+        rows -= np.outer(mirror, 2.0 * combined(mirror, rows))
         return
     part, mirror = rows[used], mirror[used]
     first = int(np.argmax(part.any(axis=0)))
-    weights = 2.0 * np.einsum("i,ij->j", mirror, part[:, first:])
+    weights = 2.0 * combined(mirror, part[:, first:])
     turned = np.flatnonzero(weights)
     columns = first + turned
     rows[np.ix_(used, columns)] = part[:, columns] - np.outer(mirror, weights[turned])

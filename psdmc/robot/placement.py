@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.robot.small import times
+from psdmc.reproducible import times
 
 Array = NDArray[np.float64]
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from psdmc.reproducible import cosine, sine, times
 from psdmc.robot.mechanism import Array
-from psdmc.robot.small import times
 from psdmc.robot.snap import snap_rotation
 
 
@@ -15,8 +13,8 @@ def about(axis: int, angle: float) -> Array:
     """(3, 3) rotation by `angle` (rad) about coordinate axis 0, 1 or 2."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     rotation = np.eye(3)
-    rotation[i, i] = rotation[j, j] = math.cos(angle)
-    rotation[j, i] = math.sin(angle)
+    rotation[i, i] = rotation[j, j] = cosine(angle)
+    rotation[j, i] = sine(angle)
     rotation[i, j] = -rotation[j, i]
     return rotation
 

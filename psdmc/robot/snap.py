@@ -13,6 +13,7 @@ from itertools import permutations
 
 import numpy as np
 
+from psdmc.reproducible import length
 from psdmc.robot.mechanism import Array
 
 ROUNDING = 1e-14
@@ -43,9 +44,9 @@ def snap_rotation(rotation: Array, tolerance: float) -> tuple[Array, float]:
 
 def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
     """A near unit vector (3,) with exact zeros, within `tolerance` (rad), and how far away it is (rad)."""
-    unit = axis / np.linalg.norm(axis)
+    unit = axis / length(axis)
     kept = np.where(np.abs(unit) > max(tolerance, ROUNDING) / math.sqrt(2.0), unit, 0.0)
-    snapped = np.sign(kept) if np.count_nonzero(kept) == 1 else kept / np.linalg.norm(kept)
+    snapped = np.sign(kept) if np.count_nonzero(kept) == 1 else kept / length(kept)
     return snapped + 0.0, float(np.linalg.norm(snapped - unit))
 
 
@@ -125,5 +126,5 @@ def link_rotation(axis: Array) -> Array:
     """
     k = int(np.argmin(np.abs(axis)))
     x = np.eye(3)[k] - axis[k] * axis
-    x /= np.linalg.norm(x)
+    x /= length(x)
     return np.array([x, np.cross(axis, x), axis]) + 0.0

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from psdmc.errors import InputError
+from psdmc.reproducible import times
 from psdmc.robot.inertia import inertia_matrix, six_of, standard_parameters, without_noise
 from psdmc.robot.joints import REVOLUTE
 from psdmc.robot.mechanism import Array, Placement
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
 from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
-from psdmc.robot.small import times
 from psdmc.robot.snap import snap_rotation
 from psdmc.robot.tree import Route
 from psdmc.robot.urdf import LOCKABLE, Origin, UrdfInertial, UrdfJoint, UrdfRobot

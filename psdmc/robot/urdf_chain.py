@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psdmc.reproducible import times
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.joints import URDF_TYPES, JointType
@@ -17,7 +18,6 @@ from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 from psdmc.robot.mimic import mimic_coordinates
 from psdmc.robot.right_angles import coarse_right_angles
-from psdmc.robot.small import times
 from psdmc.robot.snap import (
     ROUNDING,
     angle_between,

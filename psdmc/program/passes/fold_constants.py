@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from psdmc.program.program import Instr, Op, Program
+from psdmc.reproducible import cosine, sine
 
 _FUNCTIONS: dict[Op, Callable[..., float]] = {
     Op.ADD: lambda a, b: a + b,
@@ -13,8 +14,8 @@ _FUNCTIONS: dict[Op, Callable[..., float]] = {
     Op.MUL: lambda a, b: a * b,
     Op.DIV: lambda a, b: a / b,
     Op.NEG: lambda a: -a,
-    Op.SIN: math.sin,
-    Op.COS: math.cos,
+    Op.SIN: sine,
+    Op.COS: cosine,
     Op.SQRT: math.sqrt,
 }
 

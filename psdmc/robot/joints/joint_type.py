@@ -6,12 +6,12 @@ distinguishes types; it uses the properties below.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
+from psdmc.reproducible import cosine, sine
 from psdmc.robot.joints.basis import Basis
 from psdmc.robot.joints.scalars import Scalar as Scalar
 from psdmc.robot.joints.scalars import unit
@@ -114,7 +114,7 @@ class JointType:
                 np.zeros(3) if moved is None else np.array(moved),
             )
         angle, way = self.turn(values[0]), self.slide(values[0])
-        c, s = (1.0, 0.0) if angle is None else (math.cos(angle), math.sin(angle))
+        c, s = (1.0, 0.0) if angle is None else (cosine(angle), sine(angle))
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return Placement(rotation, np.array([0.0, 0.0, 0.0 if way is None else way]))
 

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from psdmc.reproducible import cosine, sine
+
 Scalar = Any
 """A float, an array of states, or an object with arithmetic, `sincos()` and `root()`."""
 
@@ -29,9 +31,9 @@ FAINTER = 1e-54
 def sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
     """(sin, cos) of an angle in rad; symbols have a method for it."""
     if hasattr(angle, "sincos"):
-        sine, cosine = angle.sincos()
-        return sine, cosine
-    return np.sin(angle), np.cos(angle)
+        s, c = angle.sincos()
+        return s, c
+    return sine(angle), cosine(angle)
 
 
 def root(value: Scalar) -> Scalar:

@@ -1,0 +1,116 @@
+"""Arithmetic that gives the same digits on every processor and with any number of threads.
+
+BLAS, LAPACK and einsum choose the order of their sums, and whether products and sums are fused, by the processor. Vectorised
+elementary functions choose their approximations by it. What is written into a model or a package is computed by the
+functions of this module instead: each is made of NumPy's elementwise operations, which IEEE 754 defines to the last bit, in
+an order that shapes alone decide. Arrays keep their precision.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+def times(a: Array, b: Array) -> Any:
+    """a @ b for matrices, vectors and stacks of matrices (..., m, n) and (..., n, k), terms added one after the other."""
+    if b.ndim == 1:
+        total = a[..., 0] * b[0]
+        for k in range(1, b.shape[0]):
+            total += a[..., k] * b[k]
+        return total
+    if b.ndim == 2:
+        total = a[..., 0, None] * b[0]
+        for k in range(1, b.shape[0]):
+            total += a[..., k, None] * b[k]
+        return total
+    total = a[..., 0, None] * b[..., None, 0, :]
+    for k in range(1, b.shape[-2]):
+        total += a[..., k, None] * b[..., None, k, :]
+    return total
+
+
+def combined(weights: Array, rows: Array) -> Array:
+    """(k,) sum of (m, k) rows times their weights (m,), one after the other; for many rows."""
+    return np.asarray(np.add.reduce(weights[:, None] * rows, axis=0))
+
+
+def lengths(rows: Array) -> Array:
+    """(k,) Euclidean lengths of the columns of (m, k) rows."""
+    return np.asarray(np.sqrt(np.add.reduce(rows * rows, axis=0)))
+
+
+def length(v: Array) -> float:
+    """Euclidean norm of a vector."""
+    return math.sqrt(times(v, v))
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b of two vectors: NumPy's takes ten times as long, for it asks which way arrays lie."""
+    (a0, a1, a2), (b0, b1, b2) = a, b
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
+def solved(matrices: Array, right: Array) -> Array:
+    """(..., n, k) solutions x of matrices (..., n, n) @ x = right (..., n, k), by elimination with partial pivoting.
+
+    A singular matrix gives numbers that are not finite.
+    """
+    n = matrices.shape[-1]
+    shape = np.broadcast_shapes(matrices.shape[:-2], right.shape[:-2])
+    wide = [np.broadcast_to(part, (*shape, *part.shape[-2:])) for part in (matrices, right)]
+    work = np.concatenate(wide, axis=-1).reshape(-1, n, n + right.shape[-1])
+    each = np.arange(len(work))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for j in range(n):
+            best = j + np.argmax(np.abs(work[:, j:, j]), axis=1)
+            work[each, best], work[:, j] = work[:, j].copy(), work[each, best]
+            shares = work[:, j + 1 :, j] / work[:, j, j, None]
+            work[:, j + 1 :, j:] -= shares[..., None] * work[:, j, None, j:]
+        for j in reversed(range(n)):
+            work[:, j, n:] /= work[:, j, j, None]
+            work[:, :j, n:] -= work[:, :j, j, None] * work[:, j, None, n:]
+    return work[:, :, n:].reshape(*shape, n, -1)
+
+
+def inverse(matrices: Array) -> Array:
+    """(..., n, n) inverses of matrices; numbers that are not finite where one is singular."""
+    unit = np.eye(matrices.shape[-1], dtype=matrices.dtype)
+    return solved(matrices, np.broadcast_to(unit, matrices.shape))
+
+
+def triangle_solved(triangle: Array, right: Array) -> Array:
+    """(l, k) solution x of triangle (l, l) @ x = right (l, k). What is below the diagonal of `triangle` is not read: it is
+    rounding, which is nothing in a row of length one and much in a row of 1e-13."""
+    solution = right.copy()
+    for r in reversed(range(len(triangle))):
+        solution[r] /= triangle[r, r]
+        above = np.flatnonzero(triangle[:r, r])
+        solution[above] -= triangle[above, r, None] * solution[r]
+    return solution
+
+
+def sine(angle: Any) -> Any:
+    """sin of a float or an array in rad, in its precision.
+
+    Doubles are rounded from the C library's long double, which no instruction set decides.
+    """
+    return _rounded(np.sin, angle)
+
+
+def cosine(angle: Any) -> Any:
+    """cos of a float or an array in rad, as `sine`."""
+    return _rounded(np.cos, angle)
+
+
+def _rounded(function: Any, angle: Any) -> Any:
+    given = np.asarray(angle)
+    found = function(given.astype(np.longdouble))
+    if given.dtype == np.longdouble:
+        return found
+    return found.astype(np.float64) if given.ndim else float(found)
