@@ -1,4 +1,5 @@
-"""Model files: one .npz that numpy.load(..., allow_pickle=False) reads, the same bytes for the same model.
+"""Model files: one .npz that numpy.load(..., allow_pickle=False) reads, the same bytes for the same model. Members are not
+compressed, because compressed bytes differ between versions of zlib.
 
 Arrays: E (5n, p); theta_b (l,), all NaN while unknown; P as P_joint, P_row, P_col, P_value, one entry each,
 joint by joint and row by row; B (l, 11n); manifest, JSON text: format, schema, what the arrays hold, chain,
@@ -73,7 +74,7 @@ def file_bytes(model: Model) -> bytes:
             member.external_attr = 0o644 << 16
             content = io.BytesIO()
             np.lib.format.write_array(content, array, allow_pickle=False)
-            archive.writestr(member, content.getvalue(), zipfile.ZIP_DEFLATED)
+            archive.writestr(member, content.getvalue(), zipfile.ZIP_STORED)
     return stream.getvalue()
 
 

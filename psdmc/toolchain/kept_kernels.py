@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
+from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,7 @@ from psdmc.toolchain.cache import cache_key, cached
 KERNELS = "kernels.json"
 
 DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "robot", "target")
-"""Folders of psdmc whose sources the result of a lowering depends on."""
+"""Folders of psdmc whose files the result of a lowering depends on, beside the modules at psdmc's top level."""
 
 
 def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -> dict[str, Kernel]:
@@ -44,13 +46,24 @@ def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -
 
 @cache
 def sources_digests() -> tuple[str, ...]:
-    """NumPy's version and the digests of the sources that lowering runs, so that an edited psdmc lowers again."""
-    return (np.__version__, *digests(DECIDES))
+    """NumPy's version and the digest of the files that lowering runs, so that an edited psdmc lowers again."""
+    root = resources.files("psdmc")
+    modules = [file for file in root.iterdir() if file.name.endswith(".py")]
+    return (np.__version__, digest([*modules, *(root / folder for folder in DECIDES)]))
 
 
-def digests(folders: Sequence[str]) -> Iterator[str]:
-    """The digests of the sources in psdmc's folders of these names."""
-    root = Path(__file__).parent.parent
-    for folder in folders:
-        for path in sorted((root / folder).rglob("*.py")):
-            yield hashlib.sha256(path.read_bytes()).hexdigest()
+def digest(places: Iterable[Traversable]) -> str:
+    """SHA-256 of the names and contents of these files, and of all files in these folders and the folders within them."""
+    found = hashlib.sha256()
+    for name, content in _files("", places):
+        found.update(repr((name, content)).encode())
+    return found.hexdigest()
+
+
+def _files(within: str, places: Iterable[Traversable]) -> Iterator[tuple[str, bytes]]:
+    for place in sorted(places, key=lambda place: place.name):
+        name = f"{within}/{place.name}"
+        if place.is_file():
+            yield name, place.read_bytes()
+        elif place.name != "__pycache__":
+            yield from _files(name, place.iterdir())

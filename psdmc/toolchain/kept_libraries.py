@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib import resources
@@ -16,7 +15,7 @@ from psdmc.toolchain.cache import cache_key, cached, found
 from psdmc.toolchain.compile import LIBRARY, compile_library
 from psdmc.toolchain.compiler_command import find_compiler
 from psdmc.toolchain.interface import Interface, interface_from_json, interface_of, interface_to_json
-from psdmc.toolchain.kept_kernels import digests, sources_digests
+from psdmc.toolchain.kept_kernels import digest, sources_digests
 from psdmc.version import psdmc_version
 
 INTERFACE = "interface.json"
@@ -49,16 +48,12 @@ def compiled_once(
 
 @cache
 def _emission() -> tuple[str, ...]:
-    """psdmc's version and the digests of the sources that turn kernels into C and C into a library."""
+    """psdmc's version and the digest of the files that turn kernels into C and C into a library."""
     from importlib.metadata import version  # here: emission, which compiles nothing, does not wait for it
 
-    texts = sorted(
-        (file.name, file.read_bytes())
-        for file in resources.files("psdmc.templates").iterdir()
-        if file.is_file()
-    )
-    templates = hashlib.sha256(repr(texts).encode()).hexdigest()
-    return (psdmc_version(), version("jinja2"), templates, *digests(("emit", "toolchain")))
+    root = resources.files("psdmc")
+    files = digest([root / "emit", root / "toolchain", resources.files("psdmc.templates")])
+    return (psdmc_version(), version("jinja2"), files)
 
 
 def _opened(entry: Path) -> tuple[Interface, Path] | None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +17,14 @@ import psdmc
 from psdmc import compiler
 from psdmc.emit.package import PackageView
 from psdmc.errors import InputError, InternalError
-from psdmc.toolchain import kept_libraries
+from psdmc.toolchain import kept_kernels, kept_libraries
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import LIBRARY
 from psdmc.toolchain.interface import interface_from_json, interface_of, interface_to_json
 from psdmc.toolchain.kept_libraries import INTERFACE, compiled_once
 
 PARTS = ("hash", "auto", "float64")
+TRIG = [file.name for file in (resources.files("psdmc.templates") / "trig").iterdir()]
 
 
 @pytest.fixture
@@ -62,11 +65,45 @@ def test_another_model_or_option_makes_one(own_cache: Path, parts: tuple[str, ..
     assert calls(parts) == 2
 
 
-def test_edited_sources_make_one(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def edit() -> None:
-        monkeypatch.setattr(kept_libraries, "_emission", lambda: ("edited",))
+@pytest.fixture
+def editable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A copy of everything that decides a package's bytes, which the cache's key is made of in place of psdmc's own."""
+    copies = {}
+    for package in ("psdmc", "psdmc.templates"):
+        copies[package] = tmp_path / "sources" / package
+        shutil.copytree(
+            str(resources.files(package)), copies[package], ignore=shutil.ignore_patterns("__pycache__")
+        )
+    monkeypatch.setattr(resources, "files", copies.__getitem__)
+    yield tmp_path / "sources"
+    forget_digests()
 
-    assert calls(then=edit) == 2
+
+def forget_digests() -> None:
+    kept_libraries._emission.cache_clear()
+    kept_kernels.sources_digests.cache_clear()
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "psdmc.templates/trig/" + min(TRIG),
+        "psdmc.templates/header.h.jinja",
+        "psdmc/emit/reserved/libraries.txt",
+        "psdmc/reproducible.py",
+        "psdmc/lower/factored.py",
+        "psdmc/toolchain/direct_call.c",
+    ],
+)
+def test_an_edited_source_makes_one(own_cache: Path, editable: Path, file: str) -> None:
+    def edit() -> None:
+        with (editable / file).open("a") as source:
+            source.write("\n")
+        forget_digests()
+
+    forget_digests()
+    assert calls(then=forget_digests) == 1
+    assert calls(then=edit) == 1  # the first of its two calls finds what the line above has made
 
 
 def test_another_compiler_makes_one(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
