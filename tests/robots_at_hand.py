@@ -49,7 +49,7 @@ class Subject:
 def loaded(name: str) -> LoadedRobot:
     if name in FOREIGN:
         file, tip = FOREIGN[name]
-        return load_robot(_in_wheel(file), tip=tip)
+        return load_robot(in_wheel(file), tip=tip)
     return load_robot(robot_path(name))
 
 
@@ -70,7 +70,7 @@ def drawn(seed: int, kinds: str, *, tidy: bool = False, expand: bool = True) -> 
     return Subject(label, derive_model(chain, expand=expand), Reference(Oracle(chain).model, "tip"))
 
 
-def _in_wheel(file: str) -> Path:
+def in_wheel(file: str) -> Path:
     try:
         wheel = importlib.metadata.distribution("example-robot-data")
     except importlib.metadata.PackageNotFoundError:
