@@ -108,8 +108,18 @@ def cosine(angle: Any) -> Any:
     return _rounded(np.cos, angle)
 
 
-def _rounded(function: Any, angle: Any) -> Any:
-    given = np.asarray(angle)
+def arcsine(value: Any) -> Any:
+    """asin of a float or an array in rad, as `sine`."""
+    return _rounded(np.arcsin, value)
+
+
+def angle_of(y: float, x: float) -> float:
+    """atan2 in rad, rounded as `sine`."""
+    return float(np.arctan2(np.longdouble(y), np.longdouble(x)))
+
+
+def _rounded(function: Any, value: Any) -> Any:
+    given = np.asarray(value)
     found = function(given.astype(np.longdouble))
     if given.dtype == np.longdouble:
         return found

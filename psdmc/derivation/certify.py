@@ -192,5 +192,5 @@ def _parameters(model: DynamicsModel, rng: np.random.Generator) -> tuple[Array, 
     if model.theta_b is not None:
         return np.nan_to_num(model.mechanism.parameters.reshape(-1)), np.asarray(model.theta_b)
     span = model.mechanism.parameter_span
-    x: Array = times(span, rng.normal(size=span.shape[1]))
+    x: Array = times(span, np.asarray(rng.normal(size=span.shape[1])))
     return x, times(model.B, x)

@@ -17,8 +17,8 @@ from psdmc.lower.carriers import EFFECT, Careful, CarrierSpace, lightest
 from psdmc.lower.link_parameters import LENGTH_ORDER, PSEUDO_NAMES, WEIGHTS, link_map, pseudo_map
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.tableau import Long, Tableau
-from psdmc.reproducible import times
-from psdmc.robot.graded import graded_pivots, halving_shares, lengths
+from psdmc.reproducible import lengths, times
+from psdmc.robot.graded import graded_pivots, halving_shares
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Placement
 
 FAIR_GROWTH = 1e3

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from psdmc.lower.tableau import Long, Tableau
-from psdmc.robot.graded import graded_pivots, halving_shares, lengths
+from psdmc.reproducible import lengths
+from psdmc.robot.graded import graded_pivots, halving_shares
 from psdmc.robot.mechanism import Array
 
 INDEPENDENT = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12)

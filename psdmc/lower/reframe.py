@@ -44,7 +44,7 @@ from psdmc.lower.without_rounding import (
     exact_rotation,
     without_rounding,
 )
-from psdmc.reproducible import cross, length, times
+from psdmc.reproducible import angle_of, cross, length, times
 from psdmc.robot.mechanism import BASE, Array, Mechanism, NamedFrame, Placement
 
 Foot = Literal["previous", "next"]
@@ -269,4 +269,4 @@ def _constant(chain: Mechanism, i: int, rotation: Array) -> Array:
 
 
 def _angle_about_z(rotation: Array) -> float:
-    return float(np.arctan2(np.longdouble(rotation[1, 0]), rotation[0, 0]))
+    return angle_of(rotation[1, 0], rotation[0, 0])

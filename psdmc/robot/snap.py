@@ -13,7 +13,7 @@ from itertools import permutations
 
 import numpy as np
 
-from psdmc.reproducible import length
+from psdmc.reproducible import arcsine, length
 from psdmc.robot.mechanism import Array
 
 ROUNDING = 1e-14
@@ -47,7 +47,7 @@ def snap_axis(axis: Array, tolerance: float) -> tuple[Array, float]:
     unit = axis / length(axis)
     kept = np.where(np.abs(unit) > max(tolerance, ROUNDING) / math.sqrt(2.0), unit, 0.0)
     snapped = np.sign(kept) if np.count_nonzero(kept) == 1 else kept / length(kept)
-    return snapped + 0.0, float(np.linalg.norm(snapped - unit))
+    return snapped + 0.0, length(snapped - unit)
 
 
 def snap_translation(translation: Array, chain_length: float) -> Array:
@@ -57,7 +57,7 @@ def snap_translation(translation: Array, chain_length: float) -> Array:
 
 def angle_between(a: Array, b: Array) -> float:
     """Angle of the rotation from a to b, rad; accurate for tiny angles."""
-    return 2.0 * math.asin(min(1.0, float(np.linalg.norm(a - b)) / math.sqrt(8.0)))
+    return float(2.0 * arcsine(min(1.0, length((a - b).reshape(-1)) / math.sqrt(8.0))))
 
 
 def _six_zeros(rotation: Array) -> list[Array]:
