@@ -17,7 +17,7 @@ from psdmc.lower.carriers import EFFECT, Careful, CarrierSpace, lightest
 from psdmc.lower.link_parameters import LENGTH_ORDER, PSEUDO_NAMES, WEIGHTS, link_map, pseudo_map
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.tableau import Long, Tableau
-from psdmc.reproducible import lengths, times
+from psdmc.reproducible import combined, lengths, times
 from psdmc.robot.graded import graded_pivots, halving_shares
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Placement
 
@@ -95,16 +95,16 @@ def _in_their_span(columns: Array) -> Array:
     rest, order = columns.copy(), np.arange(columns.shape[1])
     rank, least = 0, 0.0
     for j in range(min(columns.shape)):
-        squares = np.einsum("ij,ij->j", rest[j:, j:], rest[j:, j:])
-        pivot = j + int(np.argmax(squares))
-        left = math.sqrt(squares[pivot - j])
+        remaining = lengths(rest[j:, j:])
+        pivot = j + int(np.argmax(remaining))
+        left = remaining[pivot - j]
         least = least or RANK * left
         if left <= least:
             break
         rest[:, [j, pivot]], order[[j, pivot]] = rest[:, [pivot, j]], order[[pivot, j]]
         normal = rest[j:, j].copy()
         normal[0] += math.copysign(left, normal[0])
-        along = np.einsum("i,ij->j", normal, rest[j:, j:]) * (2.0 / np.einsum("i,i", normal, normal))
+        along = combined(normal, rest[j:, j:]) * (2.0 / times(normal, normal))
         rest[j:, j:] -= normal[:, None] * along
         rank = j + 1
     coordinates = np.zeros((rank, len(order)))

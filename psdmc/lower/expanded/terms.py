@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import Entries, Expansion, RowBlocks
+from psdmc.reproducible import length
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
@@ -147,7 +148,7 @@ def with_gravity(terms: Terms, chain: Mechanism) -> Terms:
     """The terms with gravity's multiplied by |g| (m/s^2), which E leaves to the monomials y."""
     n = len(chain)
     at_rest = ~terms.exponents[RowBlocks.of(n).rates].any(axis=0)
-    factor = np.where(at_rest, np.linalg.norm(chain.gravity), 1.0)
+    factor = np.where(at_rest, length(np.asarray(chain.gravity)), 1.0)
     return Terms(terms.output, terms.exponents, terms.coefficient * factor, terms.uncertainty * factor)
 
 
