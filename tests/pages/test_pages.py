@@ -1,6 +1,7 @@
 """The pages that psdmc makes, in Chromium: nothing scrolls sideways, no table is cut, no legend hides a curve and no first
-screen is empty at 400, 800 and 1280 px, light and dark, and axe-core finds no serious fault. `make test-pages` runs it and keeps the screenshots in generated/pages; `make test`, where Chromium and
-Playwright are installed, takes the two pages that psdmc's commands write, at the narrowest width."""
+screen is empty at 400, 800 and 1280 px, light and dark, and axe-core finds no serious fault. `make test-pages` runs it and
+keeps the screenshots in generated/pages; `make test`, where Chromium and Playwright are installed, takes the pages that
+psdmc's commands write, at the narrowest width."""
 
 from __future__ import annotations
 
