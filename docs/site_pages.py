@@ -20,6 +20,9 @@ SITE = ROOT / "generated/site"
 BESIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "examples/README.md")
 """Documents from outside docs/ that are pages of the same path."""
 
+TABLES = ("tables.css", "tables.js")
+"""What makes wide tables fit, here and in the reports' pages."""
+
 LANDING = {"README.md": "index.md"}
 """Documents whose links lead to another page."""
 
@@ -86,6 +89,8 @@ def gather(to: Path) -> None:
     shutil.rmtree(to, ignore_errors=True)
     shutil.copytree(ROOT / "docs", to, ignore=shutil.ignore_patterns("__pycache__", "*.py"))
     shutil.copy(ROOT / "docs/conf.py", to)
+    for name in TABLES:
+        shutil.copy(ROOT / f"templates/report/{name}.jinja", to / "static" / name)
     for path in BESIDE:
         _write(to / path, (ROOT / path).read_text(encoding="utf-8"))
     pages = {"cli": command_line(), "python": python(), "c": c_header()}

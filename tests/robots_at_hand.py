@@ -29,7 +29,8 @@ FOREIGN = {
 GENERIC = {"generic 6R": (61, "RRRRRR"), "generic 7R": (71, "RRRRRRR")}
 """Seed and joints of chains with oblique axes."""
 
-BUNDLED = tuple(sorted(path.stem for path in ROBOTS.iterdir()))
+BUNDLED = tuple(sorted(path.stem for path in ROBOTS.iterdir() if not path.stem.endswith("_published")))
+"""Published files differ from those of the same name by the inertias of a link or two."""
 NAMES = (*BUNDLED, *FOREIGN, *GENERIC)
 
 

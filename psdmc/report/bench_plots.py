@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import SCALED
 from psdmc.report.bench_view import FUNCTION_TITLES, OURS, PINOCCHIO
-from psdmc.report.drawing import Figure, svg
+from psdmc.report.drawing import Figure, legend_below, svg
 
 WIDTH = 5.2
 """inches: narrow, so that labels stay readable on a phone."""
@@ -50,7 +50,8 @@ def scaling(result: BenchResult, function: str) -> str:
         axes.set_xlabel("joints")
         axes.set_ylabel("ns per call")
         axes.set_title(f"{FUNCTION_TITLES[function]} of the LBR7, cut to n joints", loc="left", fontsize=11)
-        axes.legend(frameon=False)
+        axes.set_xticks(sorted({case.n for case in result.scaling}))
+        legend_below(axes, 3)
 
     return svg(draw, (WIDTH, 3.2), f"times of {FUNCTION_TITLES[function]} by number of joints")
 

@@ -11,7 +11,7 @@ import numpy as np
 from psdmc.calibration.identify.steps import Sample, StepQuality
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite import Excitation
-from psdmc.report.drawing import Axes, Figure, svg
+from psdmc.report.drawing import Axes, Figure, legend_below, svg
 from psdmc.robot.mechanism import Limits
 
 POINTS = 600
@@ -61,7 +61,7 @@ def _sample(axis: Axes, sample: Sample) -> None:
     axis.set_title(sample.joint, fontsize=11, loc="left")
     axis.set_xlabel(sample.abscissa)
     axis.set_ylabel("torque [N m]")
-    axis.legend(loc="upper right", fontsize=8, framealpha=0.8)
+    legend_below(axis, 4)
 
 
 def _thin(count: int) -> Array:
@@ -127,7 +127,7 @@ def _excitation(
             axis.set_xlabel("time [s]" + ("; dashed: limits" if lines else ""))
             axis.set_ylabel(label)
             if values is motion.q:
-                axis.legend(fontsize=7, ncols=3)
+                legend_below(axis, 3, 7)
 
         return draw
 
@@ -136,6 +136,7 @@ def _excitation(
         axis.hist(np.minimum(random, 50 * found.condition), bins=40, color=RESIDUAL)
         axis.axvline(found.condition, color=PREDICTED, linewidth=1.5)
         axis.set_xlabel("condition number: random motions (grey), the one found (line)")
+        axis.set_ylabel("random motions")
 
     return [
         ("positions", curves("position [rad]", motion.q, positions)),

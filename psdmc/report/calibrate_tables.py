@@ -26,7 +26,7 @@ def verdict_table(verdict: Verdict) -> str:
     head = [
         "Joint",
         "R² held out",
-        "RMSE held out",
+        "RMSE held out [N m]",
         "Gain against the file",
         "Power of friction [W]",
         "Residual / noise",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 else:
     Axes = Figure = object
 
-__all__ = ["Axes", "Figure", "svg"]
+__all__ = ["Axes", "Figure", "legend_below", "svg"]
 
 INK = "#010203"
 """Placeholder for the page's own text colour, which replaces it after drawing."""
@@ -50,6 +50,11 @@ def svg(draw: Callable[[Figure], None], size: tuple[float, float], says: str) ->
         metadata: dict[str, Any] = {"Date": None, "Creator": None}
         figure.savefig(text, format="svg", transparent=True, metadata=metadata)
     return _inline(text.getvalue(), says)
+
+
+def legend_below(axis: Axes, columns: int, size: int = 8) -> None:
+    """The legend under the picture, where it hides no curve."""
+    axis.figure.legend(loc="outside lower center", ncols=columns, fontsize=size, frameon=False)
 
 
 def _inline(document: str, says: str) -> str:

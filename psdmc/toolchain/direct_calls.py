@@ -63,7 +63,7 @@ def _found() -> DirectCalls:
     headers = Path(sysconfig.get_path("include"))
     if sys.implementation.name != "cpython" or sys.platform == "win32":
         reason = f"not made for {sys.implementation.name} on {sys.platform}"
-        return DirectCalls(None, reason, "use CPython on Linux or macOS")
+        return DirectCalls(None, reason, "use CPython on Linux")
     if not (headers / "Python.h").is_file():
         return DirectCalls(None, f"no Python.h in {headers}", "apt install python3-dev")
     try:

@@ -1,6 +1,7 @@
-"""The pages that psdmc makes, in Chromium: no sideways scrolling at 400, 800 and 1280 px, light and dark, and no serious
-fault by axe-core. `make test-pages` runs it and keeps the screenshots in generated/pages; `make test`, where Chromium and
-Playwright are installed, takes the two pages that psdmc's commands write, at the narrowest width."""
+"""The pages that psdmc makes, in Chromium: nothing scrolls sideways, no table is cut, no legend hides a curve and no first
+screen is empty at 400, 800 and 1280 px, light and dark, and axe-core finds no serious fault. `make test-pages` runs it and
+keeps the screenshots in generated/pages; `make test`, where Chromium and Playwright are installed, takes the pages that
+psdmc's commands write, at the narrowest width."""
 
 from __future__ import annotations
 
@@ -35,7 +36,17 @@ KEPT = os.environ.get("PSDMC_SCREENSHOTS")
 WIDTHS = (400, 800, 1280) if KEPT else (400,)
 SCHEMES = ("light", "dark")
 SITE = (
-    ("index", "functions", "reference/cli", "decisions/index", "tutorials/controller", "benchmarks")
+    (
+        "index",
+        "functions",
+        "reference/cli",
+        "decisions/index",
+        "tutorials/controller",
+        "benchmarks",
+        "reliability",
+        "calibration",
+        "mutation",
+    )
     if KEPT
     else ()
 )
@@ -128,6 +139,104 @@ def test_nothing_scrolls_sideways(browser: Any, pages: dict[str, Path], name: st
     page.close()
 
     assert found <= width
+
+
+CUT = """() => {
+  for (const details of document.querySelectorAll("details")) details.open = true;
+  dispatchEvent(new Event("resize"));
+  const cut = [];
+  for (const table of document.querySelectorAll("main table, article table")) {
+    const over = table.getBoundingClientRect().right - table.parentElement.getBoundingClientRect().right;
+    const cells = [...table.tBodies].flatMap((body) => [...body.rows]).flatMap((row) => [...row.cells]);
+    const hidden = cells.find((cell) => cell.scrollWidth > cell.clientWidth + 1);
+    if (over > 1 || hidden) cut.push(`${Math.round(over)} px: ${(hidden ?? table).textContent.trim().slice(0, 60)}`);
+  }
+  return cut;
+}"""
+"""Tables that reach beyond what holds them, or one of whose cells does."""
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", NAMES)
+def test_no_table_is_cut(browser: Any, pages: dict[str, Path], name: str, width: int):
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto(pages[name].as_uri())
+    found = page.evaluate(CUT)
+    page.close()
+
+    assert found == []
+
+
+def test_a_table_that_became_a_list_names_each_value(browser: Any, pages: dict[str, Path]):
+    page = browser.new_page(viewport={"width": 400, "height": 900})
+    page.goto(pages["bench"].as_uri())
+    heads = page.eval_on_selector_all("table.stacked tr:first-child > td", "e => e.map(c => c.dataset.head)")
+    role = page.eval_on_selector("table.stacked td", "e => e.getAttribute('role')")
+    page.close()
+
+    assert heads[:4] == [
+        "robot",
+        "inverse dynamics: ns per call",
+        "inverse dynamics: × Pinocchio",
+        "inverse dynamics: × CasADi",
+    ]
+    assert role == "cell"
+
+
+HIDING = """() => {
+  const hiding = [];
+  for (const svg of document.querySelectorAll("svg")) {
+    const legend = svg.querySelector("g[id^=legend]")?.getBoundingClientRect();
+    if (!legend) continue;
+    for (const curve of svg.querySelectorAll("g[id^=axes] > g[id^=line2d]")) {
+      const box = curve.getBoundingClientRect();
+      if (box.left < legend.right && legend.left < box.right && box.top < legend.bottom && legend.top < box.bottom)
+        hiding.push(svg.getAttribute("aria-label"));
+    }
+  }
+  return hiding;
+}"""
+"""Pictures whose legend lies on a curve's box."""
+
+
+@pytest.mark.parametrize("name", ["bench", "calibration"])
+def test_no_legend_hides_a_curve(browser: Any, pages: dict[str, Path], name: str):
+    page = browser.new_page(viewport={"width": 800, "height": 900})
+    page.goto(pages[name].as_uri())
+    found, legends = page.evaluate(HIDING), page.locator("svg g[id^=legend]").count()
+    page.close()
+
+    assert legends > 0
+    assert found == []
+
+
+GAP = """() => {
+  const main = document.querySelector("article") ?? document.body, shown = [];
+  const words = document.createTreeWalker(main, NodeFilter.SHOW_TEXT);
+  while (words.nextNode()) {
+    if (!words.currentNode.textContent.trim()) continue;
+    const range = document.createRange();
+    range.selectNodeContents(words.currentNode);
+    shown.push(...range.getClientRects());
+  }
+  for (const picture of main.querySelectorAll("img, svg")) shown.push(picture.getBoundingClientRect());
+  const ends = shown.filter((box) => box.width > 0 && box.top < innerHeight).sort((a, b) => a.top - b.top);
+  let reached = 0, gap = 0;
+  for (const box of ends) { gap = Math.max(gap, box.top - reached); reached = Math.max(reached, box.bottom); }
+  return Math.max(gap, Math.min(innerHeight, main.getBoundingClientRect().bottom) - reached);
+}"""
+"""px: the tallest stretch of the first screen with neither text nor picture."""
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", NAMES)
+def test_no_first_screen_is_empty(browser: Any, pages: dict[str, Path], name: str, width: int):
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto(pages[name].as_uri())
+    found = page.evaluate(GAP)
+    page.close()
+
+    assert found < 200
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 
 import numpy as np
 import pinocchio as pin
-from bundled import robot_path
+from bundled import bundled_robot
 
 from psdmc.calibration.logs.log import Log
-from psdmc.compiler import derive
-from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.robot.load import load_robot
 from psdmc.robot.reference import Reference, reference
 
 NAMES = tuple(f"joint_{k}" for k in range(1, 7))
@@ -38,27 +33,8 @@ STRIBECK_SPEED = 0.15
 LOADED = np.array([0.0, 0.06, 0.05, 0.0, 0.0, 0.0])
 """N m of friction per N m of the rigid bodies' torque."""
 
-NO_BODY = "inertia_com = { xx = 0.0009, yy = 0.001, zz = 0.0006, xy = 0.0001, xz = 0.001, yz = 0.0001 }"
-"""Of the published link 5, which is no distribution of mass: a physical fit could not find it."""
-A_BODY = "inertia_com = { xx = 0.0016, yy = 0.0014, zz = 0.0012, xy = 0.0001, xz = -0.0001, yz = 0.0002 }"
-
 State = tuple[np.ndarray, np.ndarray, np.ndarray]
 Torque = Callable[[Reference, State], np.ndarray]
-
-
-@cache
-def physical_robot() -> Path:
-    """The KR6's file with a link 5 that can be."""
-    text = robot_path("kr6").read_text(encoding="utf-8")
-    assert text.count(NO_BODY) == 1
-    path = Path(mkdtemp(prefix="psdmc_")) / "kr6.toml"
-    path.write_text(text.replace(NO_BODY, A_BODY), encoding="utf-8")
-    return path
-
-
-@cache
-def physical_model() -> DynamicsModel:
-    return derive(physical_robot())
 
 
 def gas_spring(robot: Reference, state: State) -> np.ndarray:
@@ -125,7 +101,7 @@ def recorded(path: Path, effects: tuple[Torque, ...], how: Run = Run()) -> Log:
     turning = np.einsum("t,kj->tkj", time, rates) + starts
     q, qd = how.amplitude * np.sin(turning).sum(axis=1), how.amplitude * (rates * np.cos(turning)).sum(axis=1)
     qdd = -how.amplitude * (rates**2 * np.sin(turning)).sum(axis=1)
-    robot, state = reference(load_robot(physical_robot())), (q, qd, qdd)
+    robot, state = reference(bundled_robot("kr6")), (q, qd, qdd)
     torque = robot.inverse_dynamics(*state) + np.tanh(qd / SIGN_SPEED) * (COULOMB + VISCOUS * np.abs(qd))
     torque = torque + (OFFSET if how.offset else 0.0)
     torque = torque + sum(effect(robot, state) for effect in effects)

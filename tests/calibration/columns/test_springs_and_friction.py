@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bundled import bundled_model
 from sprung_plant import (
     ARM_POINT,
     ASYMMETRY,
@@ -28,7 +29,6 @@ from sprung_plant import (
     cable,
     gas_spring,
     loaded,
-    physical_model,
     recorded,
     stribeck,
     torsional_spring,
@@ -82,7 +82,7 @@ def truth() -> dict[tuple[str, str], float]:
 
 
 def calibrated(log: Log, tables: dict[str, Any], known: bool = True, physical: bool = True) -> Calibration:
-    model = physical_model() if known else replace(physical_model(), theta_b=None)
+    model = bundled_model("kr6") if known else replace(bundled_model("kr6"), theta_b=None)
     options = CalibrateOptions(linear=LinearOptions(tables=tables), physical=physical)
     return calibrate_logs(model, [log], options, ChainRegressor(model), None, lambda step: None)
 
@@ -90,7 +90,7 @@ def calibrated(log: Log, tables: dict[str, Any], known: bool = True, physical: b
 def in_sigmas(found: Calibration) -> dict[str, float]:
     """How far everything with a standard deviation is from the truth."""
     right = truth()
-    theta = physical_model().theta_b
+    theta = bundled_model("kr6").theta_b
     assert theta is not None
     own = {row.name: (row.value - t) / row.std for row, t in zip(found.parameters, theta, strict=True)}
     rows = (*found.springs, *found.friction)
@@ -110,7 +110,7 @@ def sprung(tmp_path_factory: pytest.TempPathFactory) -> tuple[Log, Calibration]:
 def test_springs_friction_and_parameters_come_out(sprung: tuple[Log, Calibration]) -> None:
     _, found = sprung
     off = in_sigmas(found)
-    assert len(off) == physical_model().l + 12 + 5 + 2 + 3
+    assert len(off) == bundled_model("kr6").l + 12 + 5 + 2 + 3
     assert max(map(abs, off.values())) < 3.0, off
     assert found.verdict is not None
     assert found.verdict.word == "usable", found.verdict.lines()
