@@ -40,8 +40,8 @@ from psdmc.target.native import COSTS
 BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
 
-OPERATIONS = 500_000
-"""Of all PROGRAMs on which one function compares the choices of an arrangement that another function found: eight times the
+OPERATIONS = 800_000
+"""Of all PROGRAMs on which one function compares the choices of an arrangement that another function found: ten times the
 Coriolis matrix of a robot with a hundred joints. A longer function compares fewer."""
 
 LARGEST_TRANSFER = 1e4
