@@ -1,4 +1,5 @@
-"""How long the compiler itself takes: prints the table of docs/pipeline.md. Run: python docs/compile_time.py [ROBOT ...]
+"""How long the compiler itself takes: prints the tables of docs/pipeline.md. Run: python docs/compile_time.py [ROBOT ...],
+or python docs/compile_time.py --large [--floating] FILE.urdf ...
 
 User CPU time on one core, the least of several runs, each with a compile cache of its own; of whole processes, imports
 included, but for the rows that name a call. The C compiler's own time is not in it. What Python and psdmc keep of modules
@@ -17,6 +18,7 @@ from pathlib import Path
 ROBOTS = Path(__file__).resolve().parents[1] / "examples" / "robots"
 DEFAULT = ("kr6", "lbr7")
 RUNS = 4
+LISTS = ("default", "all")
 FUNCTIONS = "inverse_dynamics"
 """What `compile` is timed with where the C compiler runs too: all that is timed there is the second call."""
 
@@ -44,6 +46,36 @@ def main(robots: tuple[str, ...]) -> None:
     print("|---|" + "---|" * len(columns))
     for row in next(iter(columns.values())):
         print(f"| {row} |", " | ".join(f"{times[row]:.2f}" for times in columns.values()), "|")
+
+
+def large(words: list[str]) -> None:
+    """Of robot files, each command once: user CPU time and the largest memory."""
+    options = [word for word in words if word.startswith("--")]
+    print(
+        "| robot | joints | derive | emit-c, default functions | emit-c, all functions |\n|---|---|---|---|---|"
+    )
+    for file in (Path(word).resolve() for word in words if word not in options):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            model, psdmc = folder / "model.npz", (sys.executable, "-m", "psdmc")
+            runs = [with_memory(folder, *psdmc, "derive", str(file), "-o", str(model), *options)]
+            for number, functions in enumerate(LISTS):
+                command = (*psdmc, "emit-c", str(model), "-o", f"package{number}", "--functions", functions)
+                runs.append(with_memory(folder, *command))
+            joints = "import psdmc, sys; print(psdmc.load(sys.argv[1]).n)"
+            count = subprocess.check_output([sys.executable, "-c", joints, str(model)], text=True).strip()
+        cells = " | ".join(f"{seconds:.1f} s, {megabytes:.0f} MB" for seconds, megabytes in runs)
+        print(f"| {file.stem} | {count} | {cells} |", flush=True)
+
+
+def with_memory(folder: Path, *words: str) -> tuple[float, float]:
+    """User CPU time of a command in s, and its largest memory in MB."""
+    with subprocess.Popen(words, cwd=folder, env=surroundings(folder), stdout=subprocess.DEVNULL) as process:
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        sys.exit(process.returncode)
+    return used.ru_utime, used.ru_maxrss / 1024
 
 
 def measured(robot: Path) -> dict[str, float]:
@@ -96,4 +128,7 @@ def surroundings(folder: Path) -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    main(tuple(sys.argv[1:]) or DEFAULT)
+    if sys.argv[1:2] == ["--large"]:
+        large(sys.argv[2:])
+    else:
+        main(tuple(sys.argv[1:]) or DEFAULT)

@@ -147,6 +147,29 @@ def frames_of(chain: Mechanism) -> tuple[Frame, ...]:
     )
 
 
+def with_carriers(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
+    """These joints, those that they follow, and all that carry them, ascending."""
+    kept: set[int] = set()
+    left = list(joints)
+    while left:
+        joint = left.pop()
+        if joint != BASE and joint not in kept:
+            kept.add(joint)
+            follows = frames[joint].follows
+            left += [frames[joint].parent] if follows is None else [frames[joint].parent, follows[0]]
+    return tuple(sorted(kept))
+
+
+def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
+    """The frames of some joints, with which all that carry them and that they follow are kept, numbered anew."""
+    number = {joint: i for i, joint in enumerate(kept)} | {BASE: BASE}
+    own = (frames[joint] for joint in kept)
+    return tuple(
+        replace(f, parent=number[f.parent], follows=f.follows and (number[f.follows[0]], *f.follows[1:]))
+        for f in own
+    )
+
+
 def what_follows(chain: Mechanism, i: int) -> tuple[int, float, float] | None:
     """A frame's `follows`; None where joint i has a coordinate of its own."""
     coordinate = chain.coordinates[i]

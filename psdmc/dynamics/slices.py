@@ -42,6 +42,11 @@ def normalized(frames: Sequence[Frame], q: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([f.joint.normalized(part) for f, part in zip(own, np.split(q, ends), strict=True)])
 
 
+def joints_of_rates(frames: Sequence[Frame]) -> tuple[int, ...]:
+    """Of each rate the joint that it is of."""
+    return tuple(i for i, f in enumerate(frames) if f.follows is None for _ in range(f.joint.nv))
+
+
 def flat(values: Iterable[Sequence[Scalar]]) -> list[Scalar]:
     """What joints have several of, in a row."""
     return [x for own in values for x in own]

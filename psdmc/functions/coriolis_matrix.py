@@ -11,7 +11,7 @@ from psdmc.dynamics.scalar import ZERO, Scalar
 from psdmc.program.signature import QD, Q, Quantity, Signature
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.recipes.torques import torques
+from psdmc.recipes.torques import moved_by, torques
 from psdmc.robot.mechanism import Array
 
 if TYPE_CHECKING:
@@ -19,12 +19,17 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """Column j is the Slotine-Li torque of a unit reference rate of joint j, without gravity."""
+    """Column j is the Slotine-Li torque of a unit reference rate of joint j, without gravity. It takes the bodies that this
+    joint moves and those that carry them; the first column takes all, as what later ones share is in their order then."""
     nv = len(g.still)
     columns = []
     for j in range(nv):
-        unit: list[Scalar] = [1.0 if i == j else 0.0 for i in range(nv)]
-        columns.append(torques(g, g.inputs["qd"], g.still, ZERO, unit))
+        part, rates = moved_by(g, j) if j else (g, tuple(range(nv)))
+        unit: list[Scalar] = [1.0 if i == j else 0.0 for i in rates]
+        column: list[Scalar] = [0.0] * nv
+        for i, torque in zip(rates, torques(part, part.inputs["qd"], part.still, ZERO, unit), strict=True):
+            column[i] = torque
+        columns.append(column)
     return {"C": list(zip(*columns, strict=True))}
 
 

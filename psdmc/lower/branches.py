@@ -11,8 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from psdmc.dynamics.following import any_follows
-from psdmc.dynamics.frames import BASE, Frame
+from psdmc.dynamics.frames import BASE, Frame, part_of, with_carriers
 from psdmc.lower.factored import Arrangement, RobotConstants
 from psdmc.lower.geometry import LARGE
 from psdmc.lower.reframe import Reframed
@@ -41,18 +40,18 @@ class Branches:
         """Joints of the branches that two arrangements of one geometry differ in, and of the bodies that carry them; None
         where that is most of the robot, or of a small one, or where a part of it is no robot for the function.
 
-        groups   limbs that are kept together
+        groups   limbs of which the same joints are kept
         """
         frames = before.reframed.frames
         is_told = self.robot.theta_b is not None or len(frames) >= MANY
-        if len(frames) <= LARGE or not is_told or not recipe.in_limbs or any_follows(frames):
+        if len(frames) <= LARGE or not is_told or not recipe.in_limbs:
             return None
         carriers = set(before.carriers) ^ set(behind.carriers)
         found = around(frames, {carrier // PARAMETERS_PER_LINK for carrier in carriers})
         for limbs in groups:
-            joints = {joint for limb in limbs for joint in limb}
-            if not joints.isdisjoint(found):
-                found = tuple(sorted(joints.union(found)))
+            places = {k for limb in limbs for k, joint in enumerate(limb) if joint in found}
+            found = tuple(sorted({*found, *(limb[k] for limb in limbs for k in places)}))
+        found = with_carriers(frames, found)
         return found if len(found) <= WORTH * len(frames) else None
 
     def part(self, whole: Arrangement, kept: tuple[int, ...]) -> tuple[Arrangement, RobotConstants]:
@@ -62,7 +61,7 @@ class Branches:
         rows = [row for row, (joint, _) in enumerate(links) if joint in number]
         carriers = tuple(PARAMETERS_PER_LINK * number[links[row][0]] + links[row][1] for row in rows)
         reframed = _part_of(whole.reframed, kept)
-        joints = [frame.joint for frame in reframed.frames]
+        joints = [frame.joint for frame in reframed.frames if frame.follows is None]
         old = self.robot.sizes
         sizes = Sizes(len(kept), sum(j.nq for j in joints), sum(j.nv for j in joints), old.l, old.frames)
         arrangement = replace(whole, reframed=reframed, carriers=carriers, transfer=whole.transfer[rows])
@@ -86,18 +85,15 @@ def around(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
 
 
 def limbs_in(groups: Sequence[Limbs], kept: tuple[int, ...]) -> tuple[Limbs, ...]:
-    """The groups whose limbs all are among these joints, which are numbered anew."""
+    """The groups as far as their limbs are among these joints, which are numbered anew."""
     number = {joint: i for i, joint in enumerate(kept)}
-    return tuple(
-        tuple(tuple(number[joint] for joint in limb) for limb in limbs)
-        for limbs in groups
-        if all(joint in number for limb in limbs for joint in limb)
+    left = (
+        tuple(tuple(number[joint] for joint in limb if joint in number) for limb in limbs) for limbs in groups
     )
+    return tuple(limbs for limbs in left if limbs[0])
 
 
 @lru_cache(maxsize=256)
 def _part_of(whole: Reframed, kept: tuple[int, ...]) -> Reframed:
-    number = {joint: i for i, joint in enumerate(kept)} | {BASE: BASE}
-    frames = tuple(replace(whole.frames[joint], parent=number[whole.frames[joint].parent]) for joint in kept)
     places = tuple(whole.link_frames[joint] for joint in kept)
-    return replace(whole, frames=frames, link_frames=places, named=(), tip_body=0)
+    return replace(whole, frames=part_of(whole.frames, kept), link_frames=places, named=(), tip_body=0)

@@ -14,6 +14,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.lower.tableau import Long, Tableau
 from psdmc.reproducible import lengths
@@ -76,7 +77,10 @@ class CarrierSpace:
     whole: Array
     careful: Careful | None = None
     lengths: Array = field(init=False, repr=False)
-    _transfers: dict[tuple[int, ...], Array] = field(default_factory=dict, init=False, repr=False)
+    _transfers: dict[tuple[int, ...], tuple[tuple[NDArray[np.intp], ...], Array]] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    """What is not zero of each, by its place: of a tree, one entry in fifty."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lengths", np.linalg.norm(self.columns, axis=0))
@@ -108,9 +112,15 @@ class CarrierSpace:
         whole.
         """
         key = tuple(carriers)
-        if key not in self._transfers:
-            self._transfers[key] = self._transfer(key)
-        return self._transfers[key]
+        if key in self._transfers:
+            entries, values = self._transfers[key]
+            out = np.zeros((len(key), len(self.whole)))
+            out[entries] = values
+            return out
+        out = self._transfer(key)
+        entries = np.nonzero(out)
+        self._transfers[key] = entries, out[entries]
+        return out
 
     def _transfer(self, carriers: tuple[int, ...]) -> Array:
         out = self._coordinates(carriers, slice(self.count, None))

@@ -108,24 +108,6 @@ def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> I
     )
 
 
-def _kernel(
-    recipe: Recipe, theta: bool, single: Program, batch: Program, lowering: str, costs: Costs, n: int
-) -> Kernel:
-    function, score = recipe.signature, for_lanes(costs).score
-    if in_loops(single, function.products, n, costs):
-        before = ordered(shortened(single), costs)[0]
-        whole = written_out(before, function.products)
-        return Kernel(function, theta, whole, whole, lowering, before)
-    single, batch = (written_out(each, function.products) for each in (single, batch))
-    one, shared = ordered(shortened(single), costs)
-    if batch == single:
-        return Kernel(function, theta, one, shared, lowering)
-    lanes = ordered(shortened(batch), costs)[1]
-    if shared == one and not _is_worth_two_bodies(score(one), score(lanes), theta, costs):
-        lanes = shared
-    return Kernel(function, theta, one, lanes, lowering)
-
-
 def _is_worth_two_bodies(shared: float, own: float, theta: bool, costs: Costs) -> bool:
     """Whether lanes get a body of their own, at cost `own`, instead of the one for one state, at cost `shared`."""
     return shared > costs.worth_two_bodies * own and not (theta and own > costs.longest_of_two)
@@ -143,6 +125,7 @@ class _Lowered:
         self._limbs: dict[str, LimbArrangement | None] = {}
         self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
         self._kernels: dict[tuple[str, bool], Kernel] = {}
+        self._short: list[tuple[Program, Program]] = []
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
         """The kernel of one function, made once: another one may be a part of it."""
@@ -166,18 +149,40 @@ class _Lowered:
             program = trace_dynamics(recipe, arranged, self._search(theta).robot)
             return Kernel(recipe.signature, theta, program, program, "factored")
         candidates: list[Kernel] = []
-        n = self.model.nv
         expanded = self._expanded(recipe, theta) if self._may_expand(recipe) else None
         if expanded is not None:
-            candidates.append(_kernel(recipe, theta, expanded, expanded, "expanded", self.costs, n))
+            candidates.append(self._kernel(recipe, theta, expanded, expanded, "expanded"))
         if self.lowering != "expanded" or not candidates:
             single = self._factored(recipe, theta, self.single)
             batch = self._factored(recipe, theta, self.batch)
             if batch != single and self._serves_both(single, batch):
                 single = batch
-            candidates.append(_kernel(recipe, theta, single, batch, "factored", self.costs, n))
+            candidates.append(self._kernel(recipe, theta, single, batch, "factored"))
         kernel = min(candidates, key=lambda kernel: self.single.score(kernel.single))
         return kernel if theta or not recipe.in_limbs else self._in_limbs(recipe, kernel)
+
+    def _kernel(self, recipe: Recipe, theta: bool, single: Program, batch: Program, lowering: str) -> Kernel:
+        function, score, costs = recipe.signature, self.batch.score, self.costs
+        if in_loops(single, function.products, self.model.nv, costs):
+            before = ordered(self._shortened(single), costs)[0]
+            whole = written_out(before, function.products)
+            return Kernel(function, theta, whole, whole, lowering, before)
+        is_same = batch == single
+        one, shared = ordered(self._shortened(written_out(single, function.products)), costs)
+        if is_same:
+            return Kernel(function, theta, one, shared, lowering)
+        lanes = ordered(self._shortened(written_out(batch, function.products)), costs)[1]
+        if shared == one and not _is_worth_two_bodies(score(one), score(lanes), theta, costs):
+            lanes = shared
+        return Kernel(function, theta, one, lanes, lowering)
+
+    def _shortened(self, program: Program) -> Program:
+        """By the passes: once for a PROGRAM that is scored so first and taken then."""
+        found = next((short for known, short in self._short if known is program), None)
+        if found is None:
+            found = shortened(program)
+            self._short = [*self._short[-1:], (program, found)]
+        return found
 
     def _in_limbs(self, recipe: Recipe, kernel: Kernel) -> Kernel:
         """With limbs of equal structure in lanes, where that is worth while."""
@@ -224,7 +229,7 @@ class _Lowered:
         own, costs = self.single.score(single), self.costs
         if not costs.has_vectors or own < costs.shared_from:
             return False
-        one, lanes = (self.single.score(shortened(each)) for each in (single, batch))
+        one, lanes = (self.single.score(self._shortened(each)) for each in (single, batch))
         return lanes <= costs.worth_sharing * one
 
     def _candidates(self, recipe: Recipe, theta: bool) -> tuple[Program, ...]:

@@ -43,8 +43,12 @@ WIDTHS = (2, 4, 8)
 USUAL = 4
 """Lanes for which an arrangement is chosen: doubles of AVX2, and of one state's vectors on most machines with AVX-512."""
 
-BUDGET = 80
-"""Exchanges tried per function and way to see limbs, at some 10 ms each."""
+BUDGET, JOINTS = 80, 40
+"""Exchanges tried per function and way to see limbs, at some 10 ms each, and joints from which on fewer are tried:
+with the square of their number, as in search.py."""
+
+LIKELY = 1.1
+"""Ways to see limbs that cost this much more than another one are left before exchanges, which save 3 % at most."""
 
 
 def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
@@ -93,7 +97,9 @@ class LimbSearch:
         """The cheapest arrangement with limbs in lanes; None where there is none."""
         if not self.costs.has_vectors or self._is_eliminated(start):
             return None
-        found = [self._descended(start, groups) for groups in possible_groups(start.reframed.frames)]
+        ways = [self._arranged(start, groups) for groups in possible_groups(start.reframed.frames)]
+        limit = LIKELY * min((each.weight for each in ways), default=0.0)
+        found = [self._descended(each) for each in ways if each.weight <= limit]
         return min(found, key=lambda each: each.weight) if found else None
 
     def within(self, shared: LimbArrangement) -> LimbArrangement:
@@ -112,14 +118,18 @@ class LimbSearch:
         """Whether accelerations cannot go by articulated bodies: joints follow others."""
         return self.recipe.accelerates and any_follows(start.reframed.frames)
 
-    def _descended(self, start: Arrangement, groups: tuple[Limbs, ...]) -> LimbArrangement:
+    def _arranged(self, start: Arrangement, groups: tuple[Limbs, ...]) -> LimbArrangement:
+        """The cheapest before exchanges."""
         best = self._weighed(self._admissible(start, groups), groups)
         best = self._cheapest(best, self._alike(best.arrangement, groups))
-        best = self._cheapest(best, self._rearranged(best.arrangement))
-        budget = BUDGET
+        return self._cheapest(best, self._rearranged(best.arrangement))
+
+    def _descended(self, best: LimbArrangement) -> LimbArrangement:
+        """The cheapest that exchanges lead to."""
+        budget = BUDGET * JOINTS**2 // max(JOINTS, best.arrangement.n) ** 2
         while budget > 0:
             improved = best
-            for candidate in self._exchanged(best.arrangement, groups):
+            for candidate in self._exchanged(best.arrangement, best.groups):
                 budget -= 1
                 if self._expected(best, candidate) < improved.weight - ROUNDING:
                     improved = self._cheapest(improved, [candidate])

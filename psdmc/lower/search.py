@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -39,6 +39,10 @@ from psdmc.target.native import COSTS
 
 BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
+
+OPERATIONS = 800_000
+"""Of all PROGRAMs on which one function compares the choices of an arrangement that another function found: ten times the
+Coriolis matrix of a robot with a hundred joints. A longer function compares fewer."""
 
 LARGEST_TRANSFER = 1e4
 """Carriers whose values would be larger multiples of theta_b (lengths in the chain's unit) are not considered: torques
@@ -159,11 +163,15 @@ class Search:
         self, firsts: Sequence[Arrangement], error_of: Callable[[Arrangement], float]
     ) -> Arrangement:
         """The most accurate of several arrangements; one within LIMIT where exchanges of its carriers lead to it, else where
-        nothing is carried by other parameters than its own, on their frames or on the robot's."""
+        nothing is carried by other parameters than its own, on their frames or on the robot's. Of a large robot as many
+        exchanges are measured as the search traces: a finger that moves next to no inertia is helped by none."""
         best = min(firsts, key=error_of)
         error = error_of(best)
+        left = self.budget if self.is_large else None
         while error > LIMIT:
-            others = {error_of(each): each for each in self._exchanges(best)}
+            tried = list(islice(self._exchanges(best), left))
+            left = None if left is None else left - len(tried)
+            others = {error_of(each): each for each in tried}
             least = min(others, default=error)
             if least >= error:
                 frames = [*(each.reframed for each in firsts), self.geometry.unmoved]
@@ -218,12 +226,20 @@ class Search:
 
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
         """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes. All
-        others are only counted."""
-        tried = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
-        costs = [self.cost(recipe, arrangement) for arrangement in tried]
-        weights = [[scoring.weight(each) for each in costs] for scoring in (self.single, self.batch)]
-        for best in sorted({each.index(min(each)) for each in weights}):
-            yield trace_dynamics(recipe, tried[best], self.robot)
+        others are only counted, the found one's choices first, and no more than have OPERATIONS together."""
+        choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
+        costs: dict[int, Cost] = {}
+        left = OPERATIONS
+        for k in sorted(range(len(choices)), key=lambda k: choices[k].choices != found.choices):
+            costs[k] = self.cost(recipe, choices[k])
+            left -= costs[k].total
+            if left < costs[k].total:
+                break
+        tried = sorted(costs)
+        for best in sorted(
+            {min(tried, key=lambda k: scoring.weight(costs[k])) for scoring in (self.single, self.batch)}
+        ):
+            yield trace_dynamics(recipe, choices[best], self.robot)
 
     def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
         reframed = self.geometry.reframed(feet)

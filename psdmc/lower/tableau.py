@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 Long = NDArray[Any]
 """An array of np.longdouble: 64 bits of mantissa on x86, 113 on most Arm, 53 where the C library has no more."""
 
+SPARSE = 3
+"""How many times as long an entry takes that is picked by its row and column."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tableau:
@@ -34,12 +37,13 @@ class Tableau:
 
         The other columns are needed in the pivots' rows only: what the basis's ask of those is done to them afterwards.
         """
-        others = [j for j in range(columns.shape[1]) if j not in basis]
+        inside = set(basis)
+        others = [j for j in range(columns.shape[1]) if j not in inside]
         rows, factors = _row_pivots(columns[:, list(basis)])
         rest = columns[rows][:, others]
         for k, factor in enumerate(factors[rows].T):
             behind = rest[k] / factor[k]
-            rest -= factor[:, None] * behind
+            _subtract(rest, factor, behind)
             rest[k] = behind
         entries = np.zeros((len(basis), columns.shape[1]), columns.dtype)
         entries[:, others] = rest
@@ -55,7 +59,7 @@ class Tableau:
         entries = np.concatenate([self.entries[:, entering], self.entries[:, wanted]], axis=1)
         places = list(range(len(entering)))
         while places:
-            block = np.abs(entries[leaving][:, places])
+            block = np.abs(entries[np.ix_(leaving, places)])
             row, column = divmod(int(np.argmax(block)), len(places))
             i, place = leaving.pop(row), places.pop(column)
             _pivot(entries, i, place)
@@ -75,9 +79,19 @@ def _row_pivots(rest: Long) -> tuple[list[int], Long]:
         row = int(np.argmax(free))
         rows.append(row)
         behind = rest[row, k + 1 :] / rest[row, k]
-        rest[:, k + 1 :] -= rest[:, k, None] * behind
+        _subtract(rest[:, k + 1 :], rest[:, k], behind)
         rest[row, k + 1 :] = behind
     return rows, rest
+
+
+def _subtract(rest: Long, factor: Long, behind: Long) -> None:
+    """rest -= factor[:, None] * behind, in place, where neither is zero: a tree's rows are zero in the columns of other
+    branches. Zeros would change nothing."""
+    used, filled = np.flatnonzero(factor), np.flatnonzero(behind)
+    if SPARSE * len(used) * len(filled) > rest.size:
+        rest -= factor[:, None] * behind
+    else:
+        rest[used[:, None], filled] -= factor[used, None] * behind[filled]
 
 
 def _pivot(entries: Long, row: int, column: int) -> None:

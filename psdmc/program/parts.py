@@ -128,7 +128,7 @@ class _Cut:
         return crossing
 
     def _part_at(self, position: int) -> int:
-        return sum(end <= position for end in self.ends)
+        return bisect_right(self.ends, position)
 
     def _outputs(self) -> list[list[tuple[Slot, int]]]:
         outputs: list[list[tuple[Slot, int]]] = [[] for _ in range(len(self.ends) + 1)]
@@ -169,11 +169,10 @@ class _Cut:
         slots: dict[int, Slot] = {}
         lengths: dict[str, int] = {}
         free: dict[str, list[int]] = {}
-        until: list[tuple[int, Slot]] = []
+        until: dict[int, list[Slot]] = {}
         for p in range(len(self.outputs)):
-            for last, slot in until:
-                if last == p - 1:
-                    free.setdefault(slot.vector, []).append(slot.index)
+            for slot in until.pop(p - 1, []):
+                free.setdefault(slot.vector, []).append(slot.index)
             for i in self.leaving[p]:
                 vector = self.kept_in[i]
                 places = free.get(vector, [])
@@ -181,7 +180,7 @@ class _Cut:
                     places = [lengths.setdefault(vector, 0)]
                     lengths[vector] += 1
                 slots[i] = Slot(vector, places.pop())
-                until.append((max(self.read_in[i]), slots[i]))
+                until.setdefault(max(self.read_in[i]), []).append(slots[i])
         return slots, lengths
 
     def _leaving(self) -> list[list[int]]:

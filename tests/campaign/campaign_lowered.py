@@ -79,7 +79,8 @@ def _lowered_once() -> Iterator[None]:
     with (
         mock.patch.object(kernels, "_Lowered", lowered),
         mock.patch.object(kernels, "lower_expanded", _once(kernels.lower_expanded)),
-        mock.patch.object(kernels, "_kernel", _once(kernels._kernel)),
+        mock.patch.object(kernels, "shortened", _once(kernels.shortened)),
+        mock.patch.object(kernels, "ordered", _once(kernels.ordered)),
     ):
         yield
 
