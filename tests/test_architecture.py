@@ -98,7 +98,7 @@ ROOMS = {
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
-SHARED = {"errors", "version", "atomic", "garbage", "processes", "progress", "real_arrays"}
+SHARED = {"errors", "version", "atomic", "reading", "garbage", "processes", "progress", "real_arrays"}
 ENTRY_POINTS = {"__init__", "__main__"}
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.errors import InputError
+from psdmc.reading import in_words, read_file
 from psdmc.robot import limits
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
@@ -116,7 +117,7 @@ def _loaded(text: str, source_format: SourceFormat, source: str, options: LoadOp
 def _refuse_size(size: int, source: str) -> None:
     if size > limits.MAX_BYTES:
         raise InputError(
-            f"{source}: more than {limits.MAX_BYTES // 2**20} MiB, which is the most that psdmc reads",
+            f"{source}: more than {in_words(limits.MAX_BYTES)}, which is the most that psdmc reads",
             "give a URDF or a DH .toml file",
         )
 
@@ -124,9 +125,7 @@ def _refuse_size(size: int, source: str) -> None:
 def robot_text(file: Path) -> str:
     """The file's text; InputError where it cannot be read, is no text, or is larger than robot files are."""
     try:
-        with file.open("rb") as opened:
-            data = opened.read(limits.MAX_BYTES + 1)
-        _refuse_size(len(data), str(file))
+        data = read_file(file, limits.MAX_BYTES, "give a URDF or a DH .toml file")
         if data.startswith(PACKED):
             raise InputError(
                 f"{file}: a packed file, as models are, and no robot's", "give a URDF or a DH .toml file"
