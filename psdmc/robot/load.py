@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
+from psdmc.robot.ros_packages import checked_packages
 from psdmc.robot.source_words import with_source_words
 from psdmc.robot.tool import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
@@ -67,18 +69,21 @@ def load_robot(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    root: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
+    packages: Mapping[str, str | PathLike[str]] | None = None,
 ) -> LoadedRobot:
     """The robot in a URDF, MJCF, xacro or DH TOML file (told apart by the suffixes .toml and .xacro, and by the root
-    element). Options as in LoadOptions.
+    element). Options as in LoadOptions; `packages` are folders of ROS packages, by name, that a xacro file may look for.
 
     InputError where the file or an option is wrong, naming what and where.
     """
     file = Path(path)
     text = robot_text(file)
     options = checked_options(
-        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
+        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating, root, xacro_args
     )
-    text, source_format, options = as_source(file, text, options)
+    text, source_format, options = as_source(file, text, options, checked_packages(packages))
     _refuse_size(len(text.encode(errors="replace")), file.name)
     return _loaded(text, source_format, file.name, options)
 
@@ -98,11 +103,13 @@ def load_robot_text(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    root: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
     options = checked_options(
-        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
+        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating, root, xacro_args
     )
     return _loaded(text, source_format, source_name, options)
 
