@@ -10,6 +10,7 @@ from typing import Literal
 
 from psdmc.errors import InputError
 from psdmc.robot.load_options import LoadOptions
+from psdmc.robot.xml_text import root_tag
 
 ROBOT_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf", ".toml")
 """Endings of files that `psdmc show` reads as a robot; all others are models."""
@@ -33,7 +34,7 @@ def as_source(
     files of another format.
     """
     suffix = file.suffix.lower()
-    tag = "" if suffix == ".toml" else _root_tag(text)
+    tag = "" if suffix == ".toml" else root_tag(text)
     is_xacro = (
         tag != "mujoco" and suffix != ".toml" and (suffix == ".xacro" or MACRO in COMMENT.sub("", text))
     )
@@ -67,12 +68,6 @@ def _refuse_options(source: str, options: LoadOptions, is_mjcf: bool, is_xacro: 
             f"{source}: no xacro file, and {next(iter(options.xacro_args))!r} is given as an argument of one",
             "leave it out",
         )
-
-
-def _root_tag(text: str) -> str:
-    from psdmc.robot.mjcf import root_tag
-
-    return root_tag(text)
 
 
 def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, LoadOptions]:

@@ -6,7 +6,6 @@ then holds for it, and a model file has a source that can be read again without 
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,9 +25,6 @@ from psdmc.robot.mjcf_terms import gravity
 from psdmc.robot.mjcf_text import tree_text
 from psdmc.robot.mujoco_warnings import kept_warnings
 
-ROOT = re.compile(r"\s*(?:<\?xml.*?\?>|<!--.*?-->|\s+)*<\s*([\w:.-]+)", re.DOTALL)
-"""Up to the name of an XML text's root element."""
-
 NOT_A_NUMBER = "NaN"
 """What MuJoCo's warning of such a number has in it."""
 
@@ -43,12 +39,6 @@ class MjcfRobot:
     text: str
     gravity: tuple[float, float, float]
     is_free: bool
-
-
-def root_tag(text: str) -> str:
-    """Name of the root element of an XML text; '' where there is none."""
-    found = ROOT.match(text.lstrip("\ufeff"))
-    return found[1] if found else ""
 
 
 def read_mjcf(path: Path, source: str) -> MjcfRobot:

@@ -106,7 +106,7 @@ def _root(path: Path, source: str) -> Element | None:
     """A file's root element; None where it is none and has nothing to count."""
     text = _text(path, source)
     try:
-        root: Element = defusedxml.ElementTree.fromstring(text)
+        root: Element = defusedxml.ElementTree.fromstring(text.lstrip())
     except (ParseError, DefusedXmlException, ValueError, LookupError) as error:
         if WORD.search(text) is None:
             return None

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from psdmc.robot.limits import TINIEST
 from psdmc.robot.mjcf_faults import Follows
-from psdmc.robot.mjcf_names import Names, free_name
+from psdmc.robot.mjcf_names import Names
 from psdmc.robot.mjcf_terms import armatures
+from psdmc.robot.names import free_name
 from psdmc.robot.source_words import BALL, DRIVE, NOTE
 
 Array = NDArray[np.float64]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 from xml.etree.ElementTree import Element
@@ -178,7 +178,18 @@ def _notes(
         notes.append(
             "quat_xyzw is read as a rotation, though the file does not say version 1.1: others ignore it"
         )
-    return (*notes, *unread_words(root))
+    return (*notes, *_reversed_limits(root), *unread_words(root))
+
+
+def _reversed_limits(root: Element) -> Iterator[str]:
+    """A note for each joint whose lower position limit is above its upper one."""
+    for joint in root.findall("joint"):
+        element = only(joint, "limit")
+        lower, upper = (number(element, name, 0.0, limits.ANY) for name in ("lower", "upper"))
+        kind = joint.get("type", "")
+        if lower > upper and kind in MOVABLE and URDF_TYPES[kind].about_z and kind != "continuous":
+            name = limits.shown(joint.get("name", ""))
+            yield f"joint {name}: <limit> lower {lower:g} is above upper {upper:g}: taken as no position limit"
 
 
 def _scale_faults(inertials: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]) -> list[str]:
@@ -277,7 +288,8 @@ def _mimic(joint: Element) -> Mimic | None:
 
 def _limits(joint: Element, kind: str) -> Limits:
     """The joint's limits; position limits only where the file gives one, as URDF's default, 0 to 0, would be a joint
-    that cannot move. A joint of several coordinates has none: a URDF does not say which of them it means."""
+    that cannot move. A joint of several coordinates has none: a URDF does not say which of them it means; and none
+    where the lower one is above the upper one, which _reversed_limits notes."""
     element = only(joint, "limit")
     if element is None:
         return Limits()
@@ -292,5 +304,5 @@ def _limits(joint: Element, kind: str) -> Limits:
     if kind == "continuous" or not written:
         return Limits(speed=speed, effort=effort, acceleration=acceleration)
     if lower > upper:
-        raise ValueError(f"<limit> lower {lower:g} is above upper {upper:g}")
+        return Limits(speed=speed, effort=effort, acceleration=acceleration)
     return Limits(lower=lower, upper=upper, speed=speed, effort=effort, acceleration=acceleration)
