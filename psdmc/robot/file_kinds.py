@@ -73,7 +73,7 @@ def _refuse_options(source: str, options: LoadOptions, is_mjcf: bool, is_xacro: 
 def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, LoadOptions]:
     from psdmc.robot.mjcf import read_mjcf
 
-    found = read_mjcf(file, file.name)
+    found = read_mjcf(file, file.name, options.root)
     if found.is_free and (options.base is not None or options.tip is not None):
         raise InputError(
             f"{file.name}: its root moves freely, --base and --tip cut a chain out of a robot that stands",

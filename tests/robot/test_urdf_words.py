@@ -222,7 +222,7 @@ LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
 OUTSIDE = {
     "a prefix that nothing declares": (
         '<robot name="r"><!-- <robot> --><sensor:camera name="c" sensor:rate="3"><a:b/></sensor:camera>'
-        f"{BODY}{TURN % '<x:y/>'}</robot>"
+        f"{BODY}{TURN % (LIMIT + '<x:y/>')}</robot>"
     ),
     "one of two prefixes declared": (
         f'<robot name="r" xmlns:a="urn:a"><a:b/><sensor:camera a:x="1"/>{BODY}{TURN % LIMIT}</robot>'
