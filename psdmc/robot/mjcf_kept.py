@@ -6,11 +6,11 @@ MuJoCo's arrays to the attribute that MuJoCo fills that array from.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import ArrayLike
 
 from psdmc.robot.mjcf_names import Names
 from psdmc.robot.mjcf_terms import armatures
@@ -65,7 +65,6 @@ def _joint(element: Element, mujoco: Any, model: Any, j: int, name: str, drive: 
         joint.set("ref", _numbers(model.qpos0[model.jnt_qposadr[j]]))
 
 
-def _numbers(values: NDArray[Any] | Sequence[float] | float) -> str:
+def _numbers(values: ArrayLike) -> str:
     """All digits of one or several numbers."""
-    several = values if hasattr(values, "__len__") else [values]
-    return " ".join(repr(float(value)) for value in several)
+    return " ".join(repr(float(value)) for value in np.atleast_1d(values))

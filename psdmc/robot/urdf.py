@@ -95,6 +95,7 @@ class UrdfRobot:
 
     notes      contents of the file that no chain holds, one sentence each
     free_root  the joint that was put above the file's root link, if any
+    shapes     links that are shapes for collisions alone: neither inertia nor looks
     """
 
     name: str
@@ -103,6 +104,7 @@ class UrdfRobot:
     joints: tuple[UrdfJoint, ...]
     notes: tuple[str, ...]
     free_root: str | None = None
+    shapes: tuple[str, ...] = ()
 
     def joints_below(self, link: str) -> tuple[UrdfJoint, ...]:
         return tuple(joint for joint in self.joints if joint.parent == link)
@@ -132,8 +134,14 @@ def read_urdf(text: str, source: str) -> UrdfRobot:
     _refuse(_scale_faults(inertials, joints), source, "lengths are in metres")
     children = {joint.child for joint in joints}
     base = next(name for name in inertials if name not in children)
-    return UrdfRobot(
-        root.get("name") or "robot", base, inertials, tuple(joints), _notes(root, inertials, joints)
+    notes = _notes(root, inertials, joints)
+    shapes = tuple(link.get("name", "") for link in root.findall("link") if _is_shape(link))
+    return UrdfRobot(root.get("name") or "robot", base, inertials, tuple(joints), notes, shapes=shapes)
+
+
+def _is_shape(link: Element) -> bool:
+    return (
+        link.find("collision") is not None and link.find("inertial") is None and link.find("visual") is None
     )
 
 
