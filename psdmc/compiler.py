@@ -59,6 +59,9 @@ def derive(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    root: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
+    packages: Mapping[str, str | Path] | None = None,
 ) -> DynamicsModel:
     """The certified model (E, P, theta_b) of a robot file: URDF, or DH table in TOML.
 
@@ -75,6 +78,9 @@ def derive(
     lock           joints that are held: their positions by name, rad or m
     floating       the root link of a URDF is on a free joint: q = position, quaternion xyzw, then the joints; rates are
                    linear and angular velocity along the root link's own axes, then the joints'
+    root           the body under the world of an MJCF that the robot begins with, where several move
+    xacro_args     values of a xacro file's arguments, by name
+    packages       folders of ROS packages, by name, which a xacro file finds; also by ROS_PACKAGE_PATH, AMENT_PREFIX_PATH
 
     Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.
     """
@@ -101,6 +107,9 @@ def derive(
         tool=tool,
         lock=lock,
         floating=floating,
+        root=root,
+        xacro_args=xacro_args,
+        packages=packages,
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
 

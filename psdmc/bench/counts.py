@@ -14,9 +14,12 @@ from psdmc.bench.case import Case
 from psdmc.bench.rivals import psdmc_c
 from psdmc.errors import InputError, ToolchainError
 from psdmc.program.cost import cost
+from psdmc.reading import read_file
 from psdmc.toolchain.compiler_command import find_compiler
 
 SCHEMA = 1
+LARGEST_BASELINE = 16 << 20
+"""Bytes of a baseline: that of all robots has 0.1 MB."""
 
 Counts = dict[str, dict[str, dict[str, float]]]
 """robot -> function -> what is counted -> how many"""
@@ -38,7 +41,7 @@ class Baseline:
     def read(path: Path) -> Baseline:
         """InputError where the file is missing or not a baseline."""
         try:
-            content = json.loads(path.read_text())
+            content = json.loads(read_file(path, LARGEST_BASELINE, "make it anew with: make bench-save"))
             return Baseline(content["compiler"], content["counts"])
         except OSError as error:
             raise InputError(f"{path}: {error.strerror}", "make it with: make bench-save") from None

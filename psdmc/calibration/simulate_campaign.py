@@ -10,6 +10,7 @@ from pathlib import Path
 
 from psdmc.atomic import make_folder, write_whole
 from psdmc.calibration.campaign_file import ListedRun, listed_runs
+from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER
 from psdmc.calibration.logs.log_bag import is_folder
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.logs.wording import listed
@@ -20,8 +21,11 @@ from psdmc.calibration.plant.virtual_robot import Payload, VirtualRobot, load_vi
 from psdmc.errors import InputError
 from psdmc.processes import in_processes
 from psdmc.progress import Step
+from psdmc.reading import read_file
 
 INDEX = "simulated.json"
+LARGEST_INDEX = 1 << 20
+"""Bytes of an index: 100 a log."""
 LARGEST_SEED = 2**31
 """Largest seed; each run adds its number to it."""
 
@@ -125,7 +129,7 @@ def _require_robot(run: ListedRun, robot: VirtualRobot, plant: Path) -> None:
 def _index(path: Path) -> dict[str, str]:
     """Digests by log; none where the file is missing or damaged, so that everything is simulated again."""
     try:
-        found = json.loads(path.read_bytes())
+        found = json.loads(read_file(path, LARGEST_INDEX, "remove it: the logs are simulated again"))
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
@@ -152,5 +156,5 @@ def _key(job: _Job) -> str:
     code = [Path(str(module.__file__)).read_bytes() for module in (virtual_robot, plant_file)]
     for part in (repr(variant).encode("utf-8"), *plant_texts(job.plant), *code):
         digest.update(part + b"\0")
-    digest.update(job.run.trajectory.read_bytes())
+    digest.update(read_file(job.run.trajectory, LARGEST_FILE, SHORTER))
     return digest.hexdigest()

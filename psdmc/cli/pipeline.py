@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,14 +22,35 @@ if TYPE_CHECKING:
 
 CHECK_FAILED_STATUS = 5
 
+PLAIN_VALUE = re.compile(r"[\w\s.,:/+\-\[\]]*")
+"""Words, paths, numbers and lists of them."""
+
 RobotFile = Annotated[
     Path, typer.Argument(metavar="ROBOT", help="URDF, xacro, MJCF (.xml), or DH table (.toml)")
+]
+RootBody = Annotated[
+    str | None,
+    typer.Option(
+        "--root", metavar="BODY", help="body of an MJCF that the robot begins with, where several move"
+    ),
+]
+XacroArguments = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[NAME:=VALUE]...", help="arguments of a xacro file", show_default=False),
+]
+XacroOption = Annotated[
+    list[str] | None, typer.Option("--xacro-arg", metavar="NAME:=VALUE", help="the same as an option")
+]
+Packages = Annotated[
+    list[str] | None,
+    typer.Option("--package", metavar="NAME=DIR", help="where a xacro file's $(find NAME) leads to"),
 ]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="model file made by psdmc derive (.npz)")]
 
 
 def derive(
     robot: RobotFile,
+    arguments: XacroArguments = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="MODEL.npz")] = None,
     base: Annotated[
         str | None, typer.Option(metavar="LINK", help="link that a chain starts at; default: the whole tree")
@@ -79,6 +101,9 @@ def derive(
             "--floating", help="put the root link on a free joint, as of a robot that walks or flies"
         ),
     ] = False,
+    root: RootBody = None,
+    xacro_arg: XacroOption = None,
+    package: Packages = None,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
@@ -103,6 +128,9 @@ def derive(
             numbers(tool, "--tool", "six numbers: x,y,z in m, roll,pitch,yaw in rad"),
             parsed_lock(assignments(lock)),
             floating,
+            root,
+            xacro_arguments(arguments, xacro_arg),
+            package_folders(package),
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"
@@ -111,6 +139,37 @@ def derive(
     for note in model.mechanism.notes:
         print(f"note: {note}")
     say_next("check", target)
+
+
+def xacro_arguments(words: list[str] | None, options: list[str] | None) -> dict[str, str]:
+    """Values by argument, of the words behind the robot's file and of --xacro-arg."""
+    from psdmc.robot.xacro_file import parsed_arguments
+
+    return parsed_arguments([*(words or ()), *(options or ())])
+
+
+def package_folders(given: list[str] | None) -> dict[str, Path]:
+    """Folders by package, of --package."""
+    found = {}
+    for text in assignments(given):
+        name, equals, folder = text.partition("=")
+        if not equals or name in found:
+            what = f"{name!r} is named twice" if equals else f"{text!r} is no NAME=DIR"
+            raise InputError(f"--package: {what}", "such as --package ur_description=DIR")
+        found[name] = Path(folder)
+    return found
+
+
+def _with_kept(kept: dict[str, str], given: dict[str, str]) -> dict[str, str]:
+    """Arguments of a xacro file: given ones, else those that the model was derived with. The file's expressions evaluate
+    their values, so that a model's, which may be forged, are taken only where they cannot call anything."""
+    for name, value in kept.items():
+        if name not in given and not PLAIN_VALUE.fullmatch(value):
+            raise InputError(
+                f"the model's value of xacro argument {name!r} is more than a word or numbers",
+                f"give it again: {name}:=VALUE",
+            )
+    return {**kept, **given}
 
 
 def _drive_inertia(given: list[str] | None) -> bool | tuple[float, ...]:
@@ -132,10 +191,13 @@ def say_what_a_model_is_for(path: Path, model: DynamicsModel) -> None:
 
 def check(
     model: ModelFile,
+    arguments: XacroArguments = None,
     robot: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="robot file to check against instead of the embedded source"),
     ] = None,
+    xacro_arg: XacroOption = None,
+    package: Packages = None,
 ) -> None:
     """Check a model again, independently, against Pinocchio's (and MuJoCo's) own reading of its source, and its mass
     matrix."""
@@ -146,9 +208,14 @@ def check(
     from psdmc.verification.check import check_model
 
     found = load(model)
-    source = None
+    given, folders, source = xacro_arguments(arguments, xacro_arg), package_folders(package), None
+    if robot is None and (given or folders):
+        raise InputError("arguments and packages of a xacro file without the file", "add --robot FILE.xacro")
     if robot is not None:
-        source = load_robot(robot, **found.provenance.get("options", {}))
+        options = dict(found.provenance.get("options", {}))
+        kept = options.pop("xacro_args", {})
+        kept = kept if robot.suffix.lower() == ".xacro" else {}
+        source = load_robot(robot, **options, xacro_args=_with_kept(kept, given), packages=folders)
     with steps() as progress:
         progress("checking against other readers")
         rows = check_model(found, source)

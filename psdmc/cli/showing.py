@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from psdmc.cli.next_step import say_next
-from psdmc.cli.pipeline import say_what_a_model_is_for
+from psdmc.cli.pipeline import (
+    Packages,
+    RootBody,
+    XacroArguments,
+    XacroOption,
+    package_folders,
+    say_what_a_model_is_for,
+    xacro_arguments,
+)
 from psdmc.cli.progress import steps
 from psdmc.errors import InputError
 from psdmc.robot.file_kinds import ROBOT_SUFFIXES
@@ -16,6 +25,7 @@ from psdmc.robot.file_kinds import ROBOT_SUFFIXES
 if TYPE_CHECKING:
     from psdmc.lower.kernels import Lowering
     from psdmc.model.dynamics_model import DynamicsModel
+    from psdmc.robot.mechanism import Mechanism
 
 LARGEST_EXPANDED = 2000
 """`show --cost` prints the expanded lowering too up to this many monomials; beyond, it takes minutes."""
@@ -28,10 +38,14 @@ def show(
             metavar="MODEL", help="model file (.npz), or a robot file (.urdf, .xacro, .xml, .toml)"
         ),
     ],
+    arguments: XacroArguments = None,
     terms: Annotated[bool, typer.Option("--terms", help="list the monomials y")] = False,
     cost: Annotated[bool, typer.Option("--cost", help="operations per function and lowering")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON document instead, all digits")] = False,
     latex: Annotated[bool, typer.Option("--latex", help="the base parameters in LaTeX instead")] = False,
+    root: RootBody = None,
+    xacro_arg: XacroOption = None,
+    package: Packages = None,
 ) -> None:
     """Print a model: joints, sizes, base parameters with equations, values and units, certificate. Of a robot file: all of
     its joints, what each hangs on and follows."""
@@ -40,9 +54,21 @@ def show(
         both = " and ".join([*asked, *(["--json"] if latex and json else [])])
         raise InputError(f"{both} are several questions", "ask one at a time")
     if model.suffix.lower() in ROBOT_SUFFIXES:
+        from psdmc.robot.load import load_robot
+
         if asked:
             raise InputError(f"{model}: {asked[0]} is of models", "derive one first: psdmc derive")
-        _show_robot(model, json)
+        found = load_robot(
+            model,
+            root=root,
+            xacro_args=xacro_arguments(arguments, xacro_arg),
+            packages=package_folders(package),
+        )
+        _show_robot(found.mechanism, json)
+        if not json:
+            say_next("derive", model, *_again(root, [*(arguments or ()), *(xacro_arg or ())], package or ()))
+    elif root or arguments or xacro_arg or package:
+        raise InputError(f"{model}: a model, which has no further arguments", "they are of robot files")
     elif latex:
         from psdmc.model.load import load
 
@@ -51,10 +77,13 @@ def show(
         _show_model(model, terms, cost, json)
 
 
-def _show_robot(path: Path, json: bool) -> None:
-    from psdmc.robot.load import load_robot
+def _again(root: str | None, arguments: Sequence[str], packages: Sequence[str]) -> list[str]:
+    """The words by which another command reads the same robot."""
+    body = [] if root is None else ["--root", root]
+    return [*arguments, *body, *(word for one in packages for word in ("--package", one))]
 
-    found = load_robot(path).mechanism
+
+def _show_robot(found: Mechanism, json: bool) -> None:
     if json:
         from psdmc.cli.show_json import mechanism_json, print_json
 
@@ -63,7 +92,6 @@ def _show_robot(path: Path, json: bool) -> None:
     from psdmc.cli.show_robot import print_mechanism
 
     print_mechanism(found)
-    say_next("derive", path)
 
 
 def _show_model(path: Path, terms: bool, cost: bool, json: bool) -> None:

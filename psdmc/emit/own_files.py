@@ -16,6 +16,7 @@ from pathlib import Path
 
 from psdmc.emit.manifest import GENERATOR
 from psdmc.errors import InputError
+from psdmc.reading import read_file
 
 MANIFEST = "manifest.json"
 JOURNAL = ".psdmc-emission.json"
@@ -103,7 +104,7 @@ def _content(path: Path) -> dict[str, object]:
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_LIST:
             return {}
-        content = json.loads(path.read_bytes())
+        content = json.loads(read_file(path, LARGEST_LIST, "emit the package again"))
     except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) and content.get("generator") == GENERATOR else {}

@@ -22,7 +22,7 @@ from psdmc.robot.inertia import physical_fault
 from psdmc.robot.limits import shown
 from psdmc.robot.lock import locked
 from psdmc.robot.mechanism import Placement
-from psdmc.robot.source_words import DRIVE
+from psdmc.robot.source_words import DRIVE, MJCF
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import place_of
 from psdmc.robot.xml_text import parse_xml
@@ -41,6 +41,7 @@ def urdf_with(what: Written, provenance: Mapping[str, Any]) -> tuple[Element, tu
     options = provenance["options"]
     robot = locked(read_urdf(text, source), options.get("lock") or {}, source)
     root = parse_xml(text, source, "robot")
+    _remove(root, (MJCF,))
     moving = {body.joint.name: body for body in what.bodies}
     kept = _below(robot, what.base)
     notes = [*_dropped(root, kept), *_tell_mujoco(root)]

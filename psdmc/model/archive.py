@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+BEGINS = b"PK"
+"""First bytes of an archive."""
 ALWAYS_ALLOWED = 64 << 20
 """Bytes that every file may unpack to."""
 LARGEST = 2 << 30
-"""Bytes that no file may unpack to more than."""
+"""Bytes that no file may have, or unpack to."""
 LARGEST_RATIO = 200
 """Bytes unpacked per byte of the file, beyond ALWAYS_ALLOWED; models have 10 to 40, zip's own limit is 1032."""
 
@@ -43,7 +45,7 @@ class BrokenArchiveError(ValueError):
 
 def opened(data: bytes) -> zipfile.ZipFile:
     """The archive in a file's bytes; ValueError where it is none, BrokenArchiveError where it is a damaged one."""
-    if not data.startswith(b"PK"):
+    if not data.startswith(BEGINS):
         raise ValueError("no zip archive")
     try:
         return zipfile.ZipFile(io.BytesIO(data))

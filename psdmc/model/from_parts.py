@@ -139,7 +139,7 @@ def _check_options(options: dict[str, Any], chain: Mechanism) -> None:
     foreign = [name for name in options if name not in {field.name for field in fields(LoadOptions)}]
     if foreign:
         raise ValueError(f"the provenance has an option '{foreign[0]}'")
-    for name in ("base", "tip"):
+    for name in ("base", "tip", "root"):
         if options.get(name) is not None:
             json.text(options[name], f"the option {name}")
     if options.get("gravity") is not None:
@@ -154,6 +154,8 @@ def _check_options(options: dict[str, Any], chain: Mechanism) -> None:
         json.text(name, "the option frames")
     for value in json.record(options.get("lock", {}), "the option lock").values():
         json.number(value, "an entry of the option lock")
+    for text in json.record(options.get("xacro_args", {}), "the option xacro_args").values():
+        json.text(text, "an entry of the option xacro_args")
     json.flag(options.get("floating", False), "the option floating")
     if options.get("tool") is not None:
         json.numbers(options["tool"], "the option tool", 6)

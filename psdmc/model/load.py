@@ -12,10 +12,11 @@ from typing import Any
 from numpy.typing import NDArray
 
 from psdmc.errors import InputError
-from psdmc.model.archive import LARGEST, BrokenArchiveError, opened, read_arrays
+from psdmc.model.archive import BEGINS, LARGEST, BrokenArchiveError, opened, read_arrays
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.from_parts import model_from
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
+from psdmc.reading import read_file
 
 _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
     1: lambda manifest: manifest | {"schema": 2}
@@ -86,12 +87,7 @@ def _read(data: bytes, source: Path) -> tuple[dict[str, NDArray[Any]], dict[str,
 
 def _bytes_of(source: Path) -> bytes:
     try:
-        if source.stat().st_size > LARGEST:
-            raise InputError(
-                f"{source}: larger than any model file ({LARGEST >> 30} GiB)",
-                "give a file that psdmc derive wrote",
-            )
-        return source.read_bytes()
+        return read_file(source, LARGEST, "give a file that psdmc derive wrote", BEGINS)
     except FileNotFoundError as error:
         raise InputError(f"{source}: no such file", "psdmc derive ROBOT -o MODEL.npz makes one") from error
     except OSError as error:

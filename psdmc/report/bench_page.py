@@ -14,6 +14,7 @@ from psdmc.atomic import write_whole
 from psdmc.bench.results import BenchResult
 from psdmc.bench.run import SCALED
 from psdmc.errors import InputError, exit_status_of
+from psdmc.reading import read_file
 from psdmc.report import bench_plots
 from psdmc.report.bench_view import (
     FunctionTable,
@@ -26,6 +27,8 @@ from psdmc.report.bench_view import (
     thread_rows,
 )
 
+LARGEST_RESULT = 64 << 20
+"""Bytes of a result: the bench of all robots has 0.3 MB."""
 COMMAND = "make bench"
 
 
@@ -103,7 +106,7 @@ def _environment() -> Environment:
 def read_result(path: Path) -> BenchResult:
     """A result that was written as JSON; InputError where the file is missing or something else."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_file(path, LARGEST_RESULT, "make it with: psdmc bench --json").decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}", "make it with: psdmc bench --json") from error
     return BenchResult.from_json(text)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 from psdmc.errors import InputError
 from psdmc.robot.load_options import LoadOptions
+from psdmc.robot.xml_text import root_tag
 
 ROBOT_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf", ".toml")
 """Endings of files that `psdmc show` reads as a robot; all others are models."""
@@ -21,14 +23,29 @@ COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 SourceFormat = Literal["urdf", "dh"]
 
 
-def as_source(file: Path, text: str, options: LoadOptions) -> tuple[str, SourceFormat, LoadOptions]:
+def as_source(
+    file: Path, text: str, options: LoadOptions, packages: Mapping[str, Path]
+) -> tuple[str, SourceFormat, LoadOptions]:
     """The text to read, its format, and the options with what the file itself says: an MJCF's gravity and free root.
 
-    InputError where the file's format is not read, or needs a package that is not installed.
+    packages   folders of ROS packages that a xacro file names
+
+    InputError where the file's format is not read, or needs a package that is not installed; and where an option is for
+    files of another format.
     """
-    if file.suffix.lower() == ".toml":
+    suffix = file.suffix.lower()
+    tag = "" if suffix == ".toml" else root_tag(text)
+    is_xacro = (
+        tag != "mujoco" and suffix != ".toml" and (suffix == ".xacro" or MACRO in COMMENT.sub("", text))
+    )
+    _refuse_options(file.name, options, tag == "mujoco", is_xacro)
+    if (tag == "mujoco" or is_xacro) and not file.is_file():
+        raise InputError(
+            f"{file.name}: an MJCF or xacro file, which is read again with all that it includes, from a pipe",
+            "save it to a file; a pipe may carry a URDF: psdmc derive <(xacro FILE)",
+        )
+    if suffix == ".toml":
         return text, "dh", options
-    tag = _root_tag(text)
     if tag == "sdf":
         raise InputError(
             f"{file.name}: an SDF, which psdmc does not read",
@@ -36,23 +53,27 @@ def as_source(file: Path, text: str, options: LoadOptions) -> tuple[str, SourceF
         )
     if tag == "mujoco":
         return _from_mjcf(file, options)
-    if file.suffix.lower() == ".xacro" or MACRO in COMMENT.sub("", text):
+    if is_xacro:
         from psdmc.robot.xacro_file import expanded
 
-        return expanded(file, file.name), "urdf", options
+        return expanded(file, file.name, options.xacro_args, packages), "urdf", options
     return text, "urdf", options
 
 
-def _root_tag(text: str) -> str:
-    from psdmc.robot.mjcf import root_tag
-
-    return root_tag(text)
+def _refuse_options(source: str, options: LoadOptions, is_mjcf: bool, is_xacro: bool) -> None:
+    if options.root is not None and not is_mjcf:
+        raise InputError(f"{source}: --root names a body of an MJCF", "--base LINK is for URDFs")
+    if options.xacro_args and not is_xacro:
+        raise InputError(
+            f"{source}: no xacro file, and {next(iter(options.xacro_args))!r} is given as an argument of one",
+            "leave it out",
+        )
 
 
 def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, LoadOptions]:
     from psdmc.robot.mjcf import read_mjcf
 
-    found = read_mjcf(file, file.name)
+    found = read_mjcf(file, file.name, options.root)
     if found.is_free and (options.base is not None or options.tip is not None):
         raise InputError(
             f"{file.name}: its root moves freely, --base and --tip cut a chain out of a robot that stands",

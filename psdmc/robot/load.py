@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from psdmc.errors import InputError
+from psdmc.reading import in_words, read_file
 from psdmc.robot import limits
 from psdmc.robot.dh_chain import dh_draft
 from psdmc.robot.draft import Draft, Snap
@@ -16,6 +18,7 @@ from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
+from psdmc.robot.ros_packages import checked_packages
 from psdmc.robot.source_words import with_source_words
 from psdmc.robot.tool import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
@@ -66,18 +69,21 @@ def load_robot(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    root: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
+    packages: Mapping[str, str | PathLike[str]] | None = None,
 ) -> LoadedRobot:
     """The robot in a URDF, MJCF, xacro or DH TOML file (told apart by the suffixes .toml and .xacro, and by the root
-    element). Options as in LoadOptions.
+    element). Options as in LoadOptions; `packages` are folders of ROS packages, by name, that a xacro file may look for.
 
     InputError where the file or an option is wrong, naming what and where.
     """
     file = Path(path)
     text = robot_text(file)
     options = checked_options(
-        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
+        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating, root, xacro_args
     )
-    text, source_format, options = as_source(file, text, options)
+    text, source_format, options = as_source(file, text, options, checked_packages(packages))
     _refuse_size(len(text.encode(errors="replace")), file.name)
     return _loaded(text, source_format, file.name, options)
 
@@ -97,11 +103,13 @@ def load_robot_text(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    root: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
     options = checked_options(
-        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
+        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating, root, xacro_args
     )
     return _loaded(text, source_format, source_name, options)
 
@@ -116,7 +124,7 @@ def _loaded(text: str, source_format: SourceFormat, source: str, options: LoadOp
 def _refuse_size(size: int, source: str) -> None:
     if size > limits.MAX_BYTES:
         raise InputError(
-            f"{source}: more than {limits.MAX_BYTES // 2**20} MiB, which is the most that psdmc reads",
+            f"{source}: more than {in_words(limits.MAX_BYTES)}, which is the most that psdmc reads",
             "give a URDF or a DH .toml file",
         )
 
@@ -124,9 +132,7 @@ def _refuse_size(size: int, source: str) -> None:
 def robot_text(file: Path) -> str:
     """The file's text; InputError where it cannot be read, is no text, or is larger than robot files are."""
     try:
-        with file.open("rb") as opened:
-            data = opened.read(limits.MAX_BYTES + 1)
-        _refuse_size(len(data), str(file))
+        data = read_file(file, limits.MAX_BYTES, "give a URDF or a DH .toml file")
         if data.startswith(PACKED):
             raise InputError(
                 f"{file}: a packed file, as models are, and no robot's", "give a URDF or a DH .toml file"

@@ -14,7 +14,7 @@ from psdmc.robot.limits import shown
 DEFAULT_SNAP = 1e-5
 """rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
 
-LATER = ("frames", "tool", "lock", "floating")
+LATER = ("frames", "tool", "lock", "floating", "root", "xacro_args")
 """Options that the first versions did not have."""
 
 MAX_SNAP = 0.1
@@ -34,6 +34,8 @@ class LoadOptions:
     tool           x y z (m), roll pitch yaw (rad) of a further frame 'tool' in the tip frame; None: no such frame
     lock           joints of a URDF that are held: positions by name, rad or m
     floating       whether the root link of a URDF is on a free joint
+    root           the body under an MJCF's world that the robot begins with; None: all of them
+    xacro_args     values of a xacro file's arguments
     """
 
     base: str | None = None
@@ -46,6 +48,8 @@ class LoadOptions:
     tool: tuple[float, ...] | None = None
     lock: dict[str, float] = field(default_factory=dict)
     floating: bool = False
+    root: str | None = None
+    xacro_args: dict[str, str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """Keyword arguments of load_robot_text as plain JSON values. Later options are included only where they are given,
@@ -65,11 +69,13 @@ def checked_options(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    root: str | None = None,
+    xacro_args: Mapping[str, object] | None = None,
 ) -> LoadOptions:
     """The options as LoadOptions; InputError names the first that is wrong."""
-    for name, value in (("base", base), ("tip", tip)):
+    for name, value, what in (("base", base, "link"), ("tip", tip, "link"), ("root", root, "body")):
         if value is not None and not isinstance(value, str):
-            raise InputError(f"{name} is {shown(value)}, expected a link's name", "give a text")
+            raise InputError(f"{name} is {shown(value)}, expected a {what}'s name", "give a text")
     if not _are_texts_in_order(assume_zero):
         raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
     if not isinstance(floating, bool):
@@ -91,6 +97,8 @@ def checked_options(
         _tool(tool),
         _lock(lock),
         floating,
+        root,
+        _xacro_args(xacro_args),
     )
 
 
@@ -131,6 +139,23 @@ def _lock(lock: Mapping[str, float] | None) -> dict[str, float]:
     if values is None:
         raise InputError(f"lock is {shown(dict(lock))}, expected finite positions", hint)
     return dict(zip(lock, values, strict=True))
+
+
+def _xacro_args(given: Mapping[str, object] | None) -> dict[str, str]:
+    """Values as texts, as they are on a command line."""
+    if given is None:
+        return {}
+    if (
+        not isinstance(given, Mapping)
+        or not _all_are_texts(given)
+        or not all(isinstance(value, str | int | float) for value in given.values())
+    ):
+        raise InputError(
+            f"xacro_args is {shown(given)}, expected texts or numbers by argument", 'such as {"name": "ur5e"}'
+        )
+    return {
+        name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in given.items()
+    }
 
 
 def _are_texts_in_order(values: object) -> bool:

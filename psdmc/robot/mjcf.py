@@ -6,7 +6,8 @@ then holds for it, and a model file has a source that can be read again without 
 
 from __future__ import annotations
 
-import re
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,12 +26,13 @@ from psdmc.robot.mjcf_notes import left_out
 from psdmc.robot.mjcf_terms import gravity
 from psdmc.robot.mjcf_text import tree_text
 from psdmc.robot.mujoco_warnings import kept_warnings
-
-ROOT = re.compile(r"\s*(?:<\?xml.*?\?>|<!--.*?-->|\s+)*<\s*([\w:.-]+)", re.DOTALL)
-"""Up to the name of an XML text's root element."""
+from psdmc.robot.tree import listed
 
 NOT_A_NUMBER = "NaN"
 """What MuJoCo's warning of such a number has in it."""
+
+MOST_LISTED = 12
+"""Bodies that a message names."""
 
 REASON = 300
 """Characters of MuJoCo's own message that an error repeats."""
@@ -45,14 +47,10 @@ class MjcfRobot:
     is_free: bool
 
 
-def root_tag(text: str) -> str:
-    """Name of the root element of an XML text; '' where there is none."""
-    found = ROOT.match(text.lstrip("\ufeff"))
-    return found[1] if found else ""
-
-
-def read_mjcf(path: Path, source: str) -> MjcfRobot:
+def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
     """The robot in an MJCF file.
+
+    root   the body under the world that the robot begins with, where several move: the others are left out
 
     InputError where MuJoCo is not installed or refuses the file, and where the file has what psdmc does not model.
     """
@@ -60,10 +58,16 @@ def read_mjcf(path: Path, source: str) -> MjcfRobot:
     refuse_many_copies(path, source)
     model, warned = _compiled(mujoco, path, source)
     names = Names.of(mujoco, model)
+    if root is not None:
+        others = _other_roots(mujoco, model, names, root, source)
+        if others:
+            model, warned = _compiled(mujoco, path, source, others)
+            warned = [*warned, f"left out by --root {root}: {listed([names.body(b) for b in others])}"]
+            names = Names.of(mujoco, model)
+    free = _free_root(mujoco, model, names, source)
     refuse_constraints(mujoco, model, names, source)
     refuse_references(mujoco, model, names, source)
     refuse_armatures(mujoco, model, names, source)
-    free = _free_root(mujoco, model, names, source)
     notes = [f"MJCF, as MuJoCo {mujoco.__version__} compiles it", *left_out(mujoco, model, names), *warned]
     follows = followers(mujoco, model, names)
     return MjcfRobot(
@@ -82,11 +86,11 @@ def _mujoco(source: str) -> Any:
     return mujoco
 
 
-def _compiled(mujoco: Any, path: Path, source: str) -> tuple[Any, list[str]]:
-    """MuJoCo's model, and notes of what it warned of."""
+def _compiled(mujoco: Any, path: Path, source: str, left_out: Sequence[int] = ()) -> tuple[Any, list[str]]:
+    """MuJoCo's model without these of the world's own bodies, and notes of what it warned of."""
     try:
         with kept_warnings(mujoco) as said:
-            model = mujoco.MjModel.from_xml_path(str(path))
+            model = _without(mujoco, path, left_out) if left_out else mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         raise InputError(
@@ -98,22 +102,63 @@ def _compiled(mujoco: Any, path: Path, source: str) -> tuple[Any, list[str]]:
     return model, [f"MuJoCo warns: {text[:REASON]}" for text in said]
 
 
+def _without(mujoco: Any, path: Path, left_out: Sequence[int]) -> Any:
+    """The file's model without some bodies, with all that is about them; keyframes would have too many numbers."""
+    spec = mujoco.MjSpec.from_file(str(path))
+    whole = spec.compile()
+    roots = [b for b in range(1, whole.nbody) if whole.body_parentid[b] == 0]
+    gone = [body for b, body in zip(roots, list(spec.worldbody.bodies), strict=True) if b in left_out]
+    for element in [*spec.keys, *gone]:
+        spec.delete(element)
+    return spec.compile()
+
+
+def _moving_roots(model: Any) -> list[int]:
+    """The world's own bodies that joints move, or that carry such."""
+    found: dict[int, None] = {}
+    for b in range(1, model.nbody):
+        if model.body_jntnum[b]:
+            found[int(model.body_rootid[b])] = None
+    return list(found)
+
+
+def _listed_roots(mujoco: Any, model: Any, names: Names) -> str:
+    free = {
+        int(b)
+        for b, kind in zip(model.jnt_bodyid, model.jnt_type, strict=True)
+        if kind == mujoco.mjtJoint.mjJNT_FREE
+    }
+    return ", ".join(
+        f"{shown(names.body(b))}{' (free)' if b in free else ''}" for b in _moving_roots(model)[:MOST_LISTED]
+    )
+
+
+def _other_roots(mujoco: Any, model: Any, names: Names, root: str, source: str) -> list[int]:
+    """The world's moving bodies but the one of that name; InputError where there is none of that name."""
+    roots = _moving_roots(model)
+    if root not in [names.body(b) for b in roots]:
+        raise InputError(
+            f"{source}: --root {shown(root)} is none of the bodies under the world that move",
+            f"choose one of {_listed_roots(mujoco, model, names)}",
+        )
+    if not hasattr(getattr(mujoco, "MjSpec", None), "delete"):
+        raise InputError(
+            f"{source}: --root needs a newer MuJoCo than {mujoco.__version__}", "pip install --upgrade mujoco"
+        )
+    return [b for b in roots if names.body(b) != root]
+
+
 def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None:
     """The body on a free joint that all others move with; None where the robot stands."""
     free = [
         int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
     ]
-    moving = [
-        b
-        for b in range(1, model.nbody)
-        if model.body_jntnum[b] and model.body_weldid[model.body_parentid[b]] == 0
-    ]
     if not free:
         return None
-    if len(moving) > 1:
-        listed = ", ".join(shown(names.body(b)) for b in moving[:8])
+    roots = _moving_roots(model)
+    if len(roots) > 1:
         raise InputError(
-            f"{source}: bodies {listed} move apart from each other, one of them freely: several robots",
-            "leave one of them in the file",
+            f"{source}: bodies {_listed_roots(mujoco, model, names)} move apart from each other, and psdmc reads one robot",
+            f"choose one of them, such as --root {shlex.quote(names.body(roots[0]))}",
         )
     return free[0]

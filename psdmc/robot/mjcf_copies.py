@@ -17,6 +17,7 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from psdmc.errors import InputError
+from psdmc.reading import read_file
 from psdmc.robot.limits import MAX_BYTES, MAX_COPIES, shown
 from psdmc.robot.mjcf_sizes import refuse_large
 
@@ -105,7 +106,7 @@ def _root(path: Path, source: str) -> Element | None:
     """A file's root element; None where it is none and has nothing to count."""
     text = _text(path, source)
     try:
-        root: Element = defusedxml.ElementTree.fromstring(text)
+        root: Element = defusedxml.ElementTree.fromstring(text.lstrip())
     except (ParseError, DefusedXmlException, ValueError, LookupError) as error:
         if WORD.search(text) is None:
             return None
@@ -132,16 +133,9 @@ def _text(path: Path, source: str) -> bytes:
     try:
         if not path.is_file():
             return b""
-        with path.open("rb") as file:
-            text = file.read(MAX_BYTES + 1)
+        return read_file(path, MAX_BYTES, "include less", name=f"{source}: it includes {shown(path.name)}")
     except (OSError, ValueError):
         return b""
-    if len(text) > MAX_BYTES:
-        raise InputError(
-            f"{source}: it includes {shown(path.name)}, which has more than {MAX_BYTES // 2**20} MiB",
-            "include less",
-        )
-    return text
 
 
 def _of_element(element: Element, folder: Path, document: _Document, reading: _Reading) -> _Count:

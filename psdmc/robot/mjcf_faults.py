@@ -30,7 +30,7 @@ def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> No
         *_loops(mujoco, model),
         *_followed_twice(mujoco, model, names),
         *_tendons(mujoco, model),
-        *_balls(mujoco, model, names),
+        *_wide_drives(mujoco, model, names),
     ]
     if model.nflex:
         faults.append("deformable bodies (flex)")
@@ -99,11 +99,16 @@ def _tendons(mujoco: Any, model: Any) -> Iterator[str]:
             yield f"tendon {_name(mujoco, model, 'TENDON', k)} ({', '.join(forces)})"
 
 
-def _balls(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
+def _wide_drives(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
     inertias = armatures(mujoco, model)
     for k in of_balls(mujoco, model):
         if inertias[k] > 0.0:
             yield f"armature of ball joint {shown(names.joint(k))}, a drive's inertia about three axes"
+    for k in range(model.njnt):
+        if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_FREE and inertias[k] > 0.0:
+            yield (
+                f"armature {inertias[k]:g} of free joint {shown(names.joint(k))} (<freejoint> takes none from defaults)"
+            )
 
 
 def of_balls(mujoco: Any, model: Any) -> list[int]:

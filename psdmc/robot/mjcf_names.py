@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from psdmc.robot.names import free_name
+
 
 @dataclass(frozen=True, slots=True)
 class Names:
@@ -29,14 +31,6 @@ class Names:
 def named(mujoco: Any, model: Any, kind: str, number: int) -> str:
     """The file's own name of an object, '' where it has none; kind: BODY, JOINT, TENDON and so on."""
     return mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), number) or ""
-
-
-def free_name(wanted: str, taken: set[str]) -> str:
-    """`wanted`, with underscores behind it until nothing else has it; it is taken then."""
-    while wanted in taken:
-        wanted += "_"
-    taken.add(wanted)
-    return wanted
 
 
 def _each_once(names: list[str], kind: str) -> tuple[str, ...]:

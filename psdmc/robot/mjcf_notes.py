@@ -9,13 +9,13 @@ import numpy as np
 
 from psdmc.robot.mjcf_faults import followers, of_balls
 from psdmc.robot.mjcf_names import Names, named
-from psdmc.robot.mjcf_terms import acting, armatures, is_active, is_odd
+from psdmc.robot.mjcf_terms import acting, is_active, is_odd
 from psdmc.robot.tree import listed
 
 
 def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
     """Notes on what the model of rigid bodies leaves out, by name."""
-    joints, bodies, inertias = range(model.njnt), range(model.nbody), armatures(mujoco, model)
+    joints, bodies = range(model.njnt), range(model.nbody)
     found = {
         "actuators are not modelled: efforts are those of the joints": _names(
             mujoco, model, "ACTUATOR", range(len(model.actuator_trntype))
@@ -51,11 +51,6 @@ def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
         ],
         "limits of ball joints are not read": [
             names.joint(j) for j in of_balls(mujoco, model) if model.jnt_limited[j]
-        ],
-        "drive inertia of a free joint is left out": [
-            names.joint(j)
-            for j in joints
-            if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE and inertias[j] > 0.0
         ],
     }
     notes = [f"{what}: {listed(which)}" for what, which in found.items() if which]

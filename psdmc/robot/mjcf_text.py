@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 
 from psdmc.robot.limits import TINIEST
 from psdmc.robot.mjcf_faults import Follows
-from psdmc.robot.mjcf_names import Names, free_name
+from psdmc.robot.mjcf_kept import kept_tree
+from psdmc.robot.mjcf_names import Names
 from psdmc.robot.mjcf_terms import armatures
-from psdmc.robot.source_words import BALL, DRIVE, NOTE
+from psdmc.robot.names import free_name
+from psdmc.robot.source_words import BALL, DRIVE, MJCF, NOTE
 
 Array = NDArray[np.float64]
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
@@ -78,6 +80,7 @@ def tree_text(
     for body in range(1, model.nbody):
         if body != root and _is_below(model, body, root):
             _body(writer, body)
+    SubElement(robot, MJCF).append(kept_tree(mujoco, model, names))
     indent(robot)
     return tostring(robot, encoding="unicode") + "\n"
 

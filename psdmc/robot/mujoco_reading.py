@@ -17,6 +17,7 @@ from psdmc.robot.mujoco_warnings import kept_warnings
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference_model import has_assumptions
 from psdmc.robot.rotation import from_quaternion
+from psdmc.robot.source_words import MJCF, SPACE
 from psdmc.robot.urdf import read_urdf
 from psdmc.robot.urdf_chain import STANDARD_GRAVITY
 from psdmc.robot.urdf_words import ATTRIBUTES
@@ -37,6 +38,10 @@ REASON = 160
 """Characters of MuJoCo's own message that an error repeats."""
 
 
+States = tuple[Array, Array, Array]
+"""q (k, nq), qd and qdd (k, nv)."""
+
+
 class NotCompared(Exception):
     """MuJoCo cannot read this robot; the message says why."""
 
@@ -52,13 +57,15 @@ def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Arra
     NotCompared where MuJoCo is not installed, or does not read this file.
     """
     mujoco = _mujoco()
+    chain, own = loaded.mechanism, _own_file(loaded)
+    if own is not None:
+        return _file_torques(mujoco, loaded, own, (q, qd, qdd))
     model = _model(mujoco, loaded)
     held = _held(loaded)
 
     def numbers(names: Iterable[str]) -> list[int]:
         return [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, JOINT_PREFIX + name) for name in names]
 
-    chain = loaded.mechanism
     rates = [kind.nv for kind in chain.types]
     joints, others = numbers(chain.joint_names), numbers(held)
     if -1 in [*joints, *others] or model.nv != sum(rates) + len(others):
@@ -68,15 +75,66 @@ def mujoco_torques(loaded: LoadedRobot, q: Array, qd: Array, qdd: Array) -> Arra
     model.dof_armature[speeds] = np.repeat(chain.parameters[:, DRIVE], rates)
     data = mujoco.MjData(model)
     data.qpos[model.jnt_qposadr[others]] = list(held.values())
+    return _inverse(mujoco, model, data, (places, speeds), _free_joint(chain), (q, qd, qdd))
+
+
+def _inverse(
+    mujoco: Any, model: Any, data: Any, of: tuple[list[int], list[int]], free: bool, states: States
+) -> Array:
+    """(k, nv) torques of the robot whose coordinates and rates MuJoCo has at the places `of`; `free`: the first joint is."""
+    (places, speeds), (q, qd, qdd) = of, to_mujoco(*states) if free else states
     torques = np.zeros_like(qd)
-    free = _free_joint(chain)
-    if free:
-        q, qd, qdd = to_mujoco(q, qd, qdd)
     for k in range(len(q)):
         data.qpos[places], data.qvel[speeds], data.qacc[speeds] = q[k], qd[k], qdd[k]
         mujoco.mj_inverse(model, data)
         torques[k] = data.qfrc_inverse[speeds]
     return force_from_mujoco(q, torques) if free else torques
+
+
+def _own_file(loaded: LoadedRobot) -> Element | None:
+    """The MJCF that the robot was read from, as MuJoCo compiled it; None of other files."""
+    if loaded.source_format != "urdf" or SPACE not in loaded.source_text:
+        return None
+    kept = parse_xml(loaded.source_text, loaded.source_name, "robot").find(MJCF)
+    return None if kept is None else kept.find("mujoco")
+
+
+def _file_torques(mujoco: Any, loaded: LoadedRobot, own: Element, states: States) -> Array:
+    """The torques of the file's own bodies and joints; joints that are not the robot's are where it locks them."""
+    if loaded.options.assume_zero or np.isnan(loaded.mechanism.parameters).any():
+        raise NotCompared("MuJoCo cannot be told of parameters assumed zero")
+    model = _compiled(mujoco, tostring(own, encoding="unicode"), loaded)
+    kinds, chain = mujoco.mjtJoint, loaded.mechanism
+    free = _free_joint(chain)
+    names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt)]
+    is_free = [kind == kinds.mjJNT_FREE for kind in model.jnt_type]
+    if free != any(is_free):
+        raise NotCompared("in MuJoCo's file another body is free, or none")
+    joints = [
+        is_free.index(True) if free and k == 0 else _place(names, name)
+        for k, name in enumerate(chain.joint_names)
+    ]
+    rates = [kind.nv for kind in chain.types]
+    speeds = _entries(model.jnt_dofadr[joints], rates)
+    places = _entries(model.jnt_qposadr[joints], [kind.nq for kind in chain.types])
+    if loaded.options.drive_inertia is not False:
+        model.dof_armature[speeds] = np.repeat(chain.parameters[:, DRIVE], rates)
+    data, held = mujoco.MjData(model), _held(loaded)
+    for j, name in enumerate(names):
+        if model.jnt_type[j] == kinds.mjJNT_HINGE or model.jnt_type[j] == kinds.mjJNT_SLIDE:
+            data.qpos[model.jnt_qposadr[j]] = held.get(name, 0.0)
+    # A ball joint's quaternion is x y z w here, and w x y z there; to_mujoco turns the free root's.
+    for k, kind in enumerate(chain.types):
+        if kind.mujoco == "ball":
+            start = sum(one.nq for one in chain.types[:k])
+            places[start : start + 4] = [*places[start + 1 : start + 4], places[start]]
+    return _inverse(mujoco, model, data, (places, speeds), free, states)
+
+
+def _place(names: Sequence[str], name: str) -> int:
+    if name not in names:
+        raise NotCompared(f"MuJoCo finds no joint {shown(name)}")
+    return names.index(name)
 
 
 def _free_joint(chain: Mechanism) -> bool:
@@ -162,9 +220,14 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
         raise NotCompared(f"MuJoCo drops inertia without mass, as link {shown(dropped)} has it")
     text = dynamics_of(root, moving, {})
     SubElement(SubElement(text, "mujoco"), "compiler", COMPILER)
+    return _compiled(mujoco, tostring(text, encoding="unicode"), loaded)
+
+
+def _compiled(mujoco: Any, text: str, loaded: LoadedRobot) -> Any:
+    """MuJoCo's model of a text, without constraints; NotCompared where it refuses it."""
     try:
         with kept_warnings(mujoco):
-            model = mujoco.MjModel.from_xml_string(tostring(text, encoding="unicode"))
+            model = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         raise NotCompared(f"MuJoCo refuses it: {shown(reason[:REASON])}") from None

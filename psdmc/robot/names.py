@@ -28,3 +28,11 @@ def name_faults(name: str, what: str) -> list[str]:
 def _has_control(name: str) -> bool:
     """Control characters, line and paragraph separators, and halves of a character that no file can hold."""
     return any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in name)
+
+
+def free_name(wanted: str, taken: set[str]) -> str:
+    """`wanted`, with underscores behind it until nothing else has it; it is taken then."""
+    while wanted in taken:
+        wanted += "_"
+    taken.add(wanted)
+    return wanted

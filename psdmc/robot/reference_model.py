@@ -23,7 +23,6 @@ from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, 
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model, reduced
 from psdmc.robot.tool import TOOL
 from psdmc.robot.urdf import read_urdf
-from psdmc.robot.urdf_floating import ROOT_JOINT
 
 
 def reference_model(
@@ -74,7 +73,7 @@ def _add_tool(model: pinocchio.Model, tip: str, tool: tuple[float, ...]) -> None
 def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     """The file as Pinocchio reads it, all but the chain's joints locked at neutral, seen from the base."""
     chain = loaded.mechanism
-    free = ROOT_JOINT if loaded.options.floating else None
+    free = chain.joint_names[0] if loaded.options.floating else None
     whole = pinocchio_model(loaded.source_text, loaded.source_name, free_root=free)
     held = held_positions(
         read_urdf(loaded.source_text, loaded.source_name), loaded.options.lock, loaded.source_name

@@ -20,6 +20,8 @@ BALL = f"{{{SPACE}}}ball"
 """Of a floating <joint>: it turns about every axis, and stays where it is."""
 STANDS_FOR_BALL = FREE.urdf_words[0]
 """The type that URDF has for it."""
+MJCF = f"{{{SPACE}}}mjcf"
+"""Of the <robot>: the MJCF of the same tree, as MuJoCo compiled it (psdmc/robot/mjcf_kept.py)."""
 NOTE = f"{{{SPACE}}}note"
 """Of the <robot>: text, one sentence for `show`."""
 

@@ -205,7 +205,8 @@ def _below(robot: UrdfRobot, base: str) -> list[str]:
 
 
 def _fixed_end(robot: UrdfRobot, link: str) -> str:
-    """The far end of the longest sequence of fixed joints (tool flanges); of equally long ones the file's first."""
+    """The far end of the longest sequence of fixed joints (tool flanges); of equally long ones the file's first. Links that
+    are shapes for collisions alone, such as those along the calf of Unitree's Go2, are no ends."""
     distance = {link: 0}
     queue = [link]
     while queue:
@@ -214,7 +215,9 @@ def _fixed_end(robot: UrdfRobot, link: str) -> str:
             if not joint.is_movable:
                 distance[joint.child] = distance[here] + 1
                 queue.append(joint.child)
-    return max(distance, key=lambda name: distance[name])
+    return max(
+        (name for name in distance if name == link or name not in robot.shapes), key=distance.__getitem__
+    )
 
 
 def _parting_link(robot: UrdfRobot, base: str, ends: Sequence[str]) -> str:

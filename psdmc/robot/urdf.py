@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 from xml.etree.ElementTree import Element
@@ -95,6 +95,7 @@ class UrdfRobot:
 
     notes      contents of the file that no chain holds, one sentence each
     free_root  the joint that was put above the file's root link, if any
+    shapes     links that are shapes for collisions alone: neither inertia nor looks
     """
 
     name: str
@@ -103,6 +104,7 @@ class UrdfRobot:
     joints: tuple[UrdfJoint, ...]
     notes: tuple[str, ...]
     free_root: str | None = None
+    shapes: tuple[str, ...] = ()
 
     def joints_below(self, link: str) -> tuple[UrdfJoint, ...]:
         return tuple(joint for joint in self.joints if joint.parent == link)
@@ -132,8 +134,14 @@ def read_urdf(text: str, source: str) -> UrdfRobot:
     _refuse(_scale_faults(inertials, joints), source, "lengths are in metres")
     children = {joint.child for joint in joints}
     base = next(name for name in inertials if name not in children)
-    return UrdfRobot(
-        root.get("name") or "robot", base, inertials, tuple(joints), _notes(root, inertials, joints)
+    notes = _notes(root, inertials, joints)
+    shapes = tuple(link.get("name", "") for link in root.findall("link") if _is_shape(link))
+    return UrdfRobot(root.get("name") or "robot", base, inertials, tuple(joints), notes, shapes=shapes)
+
+
+def _is_shape(link: Element) -> bool:
+    return (
+        link.find("collision") is not None and link.find("inertial") is None and link.find("visual") is None
     )
 
 
@@ -178,7 +186,18 @@ def _notes(
         notes.append(
             "quat_xyzw is read as a rotation, though the file does not say version 1.1: others ignore it"
         )
-    return (*notes, *unread_words(root))
+    return (*notes, *_reversed_limits(root), *unread_words(root))
+
+
+def _reversed_limits(root: Element) -> Iterator[str]:
+    """A note for each joint whose lower position limit is above its upper one."""
+    for joint in root.findall("joint"):
+        element = only(joint, "limit")
+        lower, upper = (number(element, name, 0.0, limits.ANY) for name in ("lower", "upper"))
+        kind = joint.get("type", "")
+        if lower > upper and kind in MOVABLE and URDF_TYPES[kind].about_z and kind != "continuous":
+            name = limits.shown(joint.get("name", ""))
+            yield f"joint {name}: <limit> lower {lower:g} is above upper {upper:g}: taken as no position limit"
 
 
 def _scale_faults(inertials: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]) -> list[str]:
@@ -277,7 +296,8 @@ def _mimic(joint: Element) -> Mimic | None:
 
 def _limits(joint: Element, kind: str) -> Limits:
     """The joint's limits; position limits only where the file gives one, as URDF's default, 0 to 0, would be a joint
-    that cannot move. A joint of several coordinates has none: a URDF does not say which of them it means."""
+    that cannot move. A joint of several coordinates has none: a URDF does not say which of them it means; and none
+    where the lower one is above the upper one, which _reversed_limits notes."""
     element = only(joint, "limit")
     if element is None:
         return Limits()
@@ -292,5 +312,5 @@ def _limits(joint: Element, kind: str) -> Limits:
     if kind == "continuous" or not written:
         return Limits(speed=speed, effort=effort, acceleration=acceleration)
     if lower > upper:
-        raise ValueError(f"<limit> lower {lower:g} is above upper {upper:g}")
+        return Limits(speed=speed, effort=effort, acceleration=acceleration)
     return Limits(lower=lower, upper=upper, speed=speed, effort=effort, acceleration=acceleration)

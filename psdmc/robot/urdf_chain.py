@@ -57,7 +57,7 @@ def urdf_draft(
     read = read_urdf(text, source)
     robot = locked(read, lock, source)
     if floating:
-        robot = on_free_root(robot, source)
+        robot = on_free_root(robot)
     route = find_route(robot, base, tip, source, frames)
     placed = _placed(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)

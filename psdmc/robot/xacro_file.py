@@ -4,18 +4,67 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from psdmc.errors import InputError
+from psdmc.reading import read_file
+from psdmc.robot.limits import MAX_BYTES, shown
+from psdmc.robot.ros_packages import package_folder
+from psdmc.robot.tree import listed
 
 REASON = 300
 """Characters of xacro's own message that an error repeats."""
 
+UNDEFINED = "Undefined substitution argument"
+"""What xacro's message has in it where an argument has neither value nor default."""
 
-def expanded(file: Path, source: str) -> str:
+ASSIGNED = ":="
+"""Stands between an argument's name and its value, as in ROS."""
+
+
+def parsed_arguments(texts: Sequence[str]) -> dict[str, str]:
+    """Values by argument from texts of the command line such as "name:=ur5e"."""
+    found: dict[str, str] = {}
+    for text in texts:
+        name, assigned, value = text.partition(ASSIGNED)
+        if not assigned or not name:
+            raise InputError(
+                f"{shown(text)} is no NAME:=VALUE",
+                "one robot's file, then arguments of xacro such as name:=ur5e",
+            )
+        if name in found:
+            raise InputError(f"xacro argument {shown(name)} is given twice", "give it once")
+        found[name] = value
+    return found
+
+
+class _Arguments(dict[str, str]):
+    """The arguments' values, which xacro adds defaults to; `asked` are those that the file declares or uses."""
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        super().__init__(given)
+        self.asked: dict[str, None] = {}
+
+    def __contains__(self, name: object) -> bool:
+        self.asked[str(name)] = None
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.asked[name] = None
+        return super().__getitem__(name)
+
+
+def expanded(file: Path, source: str, given: Mapping[str, str], packages: Mapping[str, Path]) -> str:
     """The text of the URDF. Expanding runs the expressions that the file holds, and reads the files that it includes.
 
-    InputError where xacro is not installed, or refuses the file.
+    given      values of the file's arguments
+    packages   folders of packages that it names, besides those that psdmc finds
+
+    InputError where xacro is not installed, or refuses the file; where the file has no such argument; and where a package
+    is not found.
     """
     try:
         import xacro
@@ -24,13 +73,55 @@ def expanded(file: Path, source: str) -> str:
             f"{source}: a xacro file, and xacro is not installed",
             "pip install 'psdmc[xacro]', or expand it yourself: xacro FILE > robot.urdf",
         ) from None
-    said = io.StringIO()
+    said, arguments, missing = io.StringIO(), _Arguments(given), list[str]()
+
+    def find(name: str) -> str:
+        folder = package_folder(name, packages, file)
+        if folder is None:
+            missing.append(name)
+            raise LookupError(name)
+        return str(folder)
+
     try:
-        with contextlib.redirect_stderr(said):
-            return str(xacro.process_file(str(file)).toxml())
+        with contextlib.redirect_stderr(said), _reading_and_finding(xacro, find):
+            text = str(xacro.process_file(str(file), mappings=arguments).toxml())
     except Exception as error:  # whatever an expression of the file raises
-        reason = " ".join(f"{error} {said.getvalue()}".split()) or type(error).__name__
+        if missing:
+            raise InputError(
+                f"{source}: package {shown(missing[0])} is not found",
+                f"--package {missing[0]}=DIR, or set ROS_PACKAGE_PATH or AMENT_PREFIX_PATH",
+            ) from None
+        reason = " ".join((str(error) or said.getvalue()).split()) or type(error).__name__
+        hint = (
+            "give it behind the file: NAME:=VALUE"
+            if UNDEFINED in reason
+            else "see what it says by itself: xacro FILE"
+        )
+        raise InputError(f"{source}: xacro cannot expand it: {reason[:REASON]}", hint) from None
+    strange = [name for name in given if name not in arguments.asked]
+    if strange:
         raise InputError(
-            f"{source}: xacro cannot expand it: {reason[:REASON]}",
-            "see what it says by itself: xacro FILE",
-        ) from None
+            f"{source}: it has no xacro argument {shown(strange[0])}",
+            f"it has: {listed(arguments.asked) or 'none'}",
+        )
+    return text
+
+
+@contextlib.contextmanager
+def _reading_and_finding(xacro: Any, find: Any) -> Iterator[None]:
+    """Let xacro open files by a limit on their size, and find packages by `find`: its own search needs an installed ROS."""
+    from xacro import substitution_args
+
+    before = substitution_args._eval_find
+    xacro.open = _opened
+    substitution_args._eval_find = substitution_args._eval_dict["find"] = find
+    try:
+        yield
+    finally:
+        del xacro.open
+        substitution_args._eval_find = substitution_args._eval_dict["find"] = before
+
+
+def _opened(name: str | os.PathLike[str]) -> io.StringIO:
+    """A file that xacro reads, without blank lines before its first."""
+    return io.StringIO(read_file(name, MAX_BYTES, "include less").decode("utf-8-sig").lstrip())

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from xml.etree.ElementTree import Element, ParseError
+from xml.parsers.expat import errors
 
 import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
@@ -12,11 +14,33 @@ from psdmc.errors import InputError
 from psdmc.robot.limits import MAX_CHARACTERS, Range, shown
 from psdmc.robot.numerals import decimal, words
 
+UNBOUND_PREFIX = errors.codes[errors.XML_ERROR_UNBOUND_PREFIX]
+"""Of a parser's error: a prefix that nothing declares."""
 
-def parse_xml(text: str, source: str, root_tag: str) -> Element:
-    """The root element; InputError where it is no XML, has another root, or defines or fetches entities."""
+ROOT = re.compile(r"\s*(?:<\?xml.*?\?>|<!--.*?-->|\s+)*<\s*([\w:.-]+)", re.DOTALL)
+"""Up to the name of an XML text's root element."""
+
+PREFIX = re.compile(r"<([A-Za-z_][\w.-]*):|\s([A-Za-z_][\w.-]*):[\w.-]+\s*=")
+"""The prefix of an element's or an attribute's name."""
+
+RESERVED = ("xml", "xmlns", "xacro")
+"""Prefixes that are not made up where they are not declared: what xacro must expand is no foreign word."""
+
+UNDECLARED = "urn:psdmc:undeclared:"
+"""Name spaces of prefixes that a file uses and does not declare begin so."""
+
+
+def root_tag(text: str) -> str:
+    """Name of the root element of an XML text; '' where there is none."""
+    found = ROOT.match(text.lstrip("\ufeff"))
+    return found[1] if found else ""
+
+
+def parse_xml(text: str, source: str, expected: str) -> Element:
+    """The root element, its default name space, if any, taken off; InputError where it is no XML, has another root than
+    `expected`, or defines or fetches entities."""
     try:
-        root: Element = defusedxml.ElementTree.fromstring(text)
+        root = _without_space(_parsed(text.lstrip()))
     except DefusedXmlException as error:
         kind = type(error).__name__
         raise InputError(
@@ -26,13 +50,38 @@ def parse_xml(text: str, source: str, root_tag: str) -> Element:
         raise InputError(
             f"{source}: not well-formed XML: {error}", "give a URDF or a DH .toml file"
         ) from None
-    if root.tag != root_tag:
+    if root.tag != expected:
         found = root.tag if str(root.tag).isidentifier() and len(root.tag) < 50 else shown(root.tag)
-        raise InputError(f"{source}: the root element is <{found}>, expected <{root_tag}>", "give a URDF")
+        raise InputError(f"{source}: the root element is <{found}>, expected <{expected}>", "give a URDF")
     if any("xacro" in str(element.tag) for element in root.iter()):
         raise InputError(
             f"{source}: this is a xacro file, not a URDF", "expand it first: xacro FILE > robot.urdf"
         )
+    return root
+
+
+def _parsed(text: str) -> Element:
+    """The root element; prefixes that nothing declares, which other readers take for letters of a name, are declared."""
+    try:
+        root: Element = defusedxml.ElementTree.fromstring(text)
+    except ParseError as error:
+        start = ROOT.match(text)
+        if error.code != UNBOUND_PREFIX or start is None:
+            raise
+        head = text[start.end() : text.find(">", start.end())]
+        used = dict.fromkeys(one or other for one, other in PREFIX.findall(text))
+        missing = [name for name in used if name not in RESERVED and f"xmlns:{name}" not in head]
+        declared = "".join(f' xmlns:{name}="{UNDECLARED}{name}"' for name in missing)
+        root = defusedxml.ElementTree.fromstring(text[: start.end()] + declared + text[start.end() :])
+    return root
+
+
+def _without_space(root: Element) -> Element:
+    """The tree with names of the root's own name space as they are written in the file."""
+    space, brace, _ = str(root.tag).rpartition("}")
+    for element in root.iter() if brace else ():
+        if isinstance(element.tag, str):
+            element.tag = element.tag.removeprefix(space + brace)
     return root
 
 

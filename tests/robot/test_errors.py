@@ -182,13 +182,6 @@ def test_bad_joints_are_named_all_at_once():
     )
 
 
-def test_limits_the_wrong_way_round():
-    extra = '<limit lower="2" upper="1" effort="1" velocity="1"/>'
-    found = message(link("base"), link("arm"), joint("shoulder", "base", "arm", extra=extra))
-
-    assert found == "arm.urdf: joint 'shoulder': <limit> lower 2 is above upper 1"
-
-
 def test_one_of_two_arms_needs_a_tip():
     parts = (*ARM, link("other"), joint("other_shoulder", "base", "other"))
 

@@ -9,7 +9,7 @@ import pytest
 
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot
-from psdmc.robot.mjcf import root_tag
+from psdmc.robot.xml_text import root_tag
 
 XACRO = """<?xml version="1.0"?>
 <robot name="x" xmlns:xacro="http://www.ros.org/wiki/xacro">

@@ -189,12 +189,14 @@ def test_what_makes_no_sense_with_a_free_root_is_refused(options: dict[str, obje
         floating(**options)
 
 
-def test_names_and_kinds_of_the_file_do_not_meet_the_free_joints() -> None:
+def test_names_and_kinds_of_the_file_do_not_meet_the_free_joints(tmp_path: Path) -> None:
     taken = BEAST.replace('"knee"', '"root_joint"')
-    with pytest.raises(
-        InputError, match="'root_joint' of the file has the name of the joint that --floating adds"
-    ):
-        floating(taken)
+    robot = floating(taken)
+    assert robot.mechanism.joint_names == ("root_joint_", "lift", "hip", "root_joint")
+    oracle = pin.buildModelFromXML(taken, pin.JointModelFreeFlyer(), "root_joint_")
+    assert_is(robot, oracle)
+    (tmp_path / "x.urdf").write_text(taken, encoding="utf-8")
+    assert all(row.passed for row in check_model(derive(tmp_path / "x.urdf", floating=True)))
     assert "root_joint" in load_robot_text(taken, "urdf", source_name="x.urdf").mechanism.joint_names
     free = BEAST.replace('name="knee" type="revolute"', 'name="knee" type="free"')
     for is_floating in (True, False):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -17,11 +19,12 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.model.random_states import on_joints
+from psdmc.robot import mjcf_text
 from psdmc.robot.limits import MAX_BYTES
 from psdmc.robot.load import load_robot, load_robot_text
 from psdmc.robot.mjcf_copies import refuse_many_copies
 from psdmc.robot.mujoco_reading import force_from_mujoco, to_mujoco
-from psdmc.verification.check import check_model
+from psdmc.verification.check import MUJOCO, check_model
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -386,13 +389,94 @@ def test_a_drive_of_a_ball_joint_is_refused_by_name(tmp_path: Path) -> None:
         load_robot(written(tmp_path, text))
 
 
-def test_two_robots_of_which_one_flies_are_refused(tmp_path: Path) -> None:
-    text = with_more("").replace(
-        "</worldbody>", '<body name="ball"><freejoint/><geom size=".1"/></body></worldbody>'
+BALL_BESIDE = """<body name="ball" pos="2 0 1"><freejoint name="fly"/><geom name="shape" size=".1"/></body>
+<body name="wall" pos="0 5 0"><geom size=".1"/></body></worldbody>
+<equality><weld name="glue" body1="ball"/></equality><sensor><framepos objtype="body" objname="ball"/></sensor>
+<contact><exclude body1="ball" body2="a"/></contact>
+<keyframe><key name="home" qpos="0 0 2 0 1 1 0 0 0"/></keyframe>"""
+
+
+def test_of_two_robots_of_which_one_flies_root_names_the_one(tmp_path: Path) -> None:
+    """All that is about the other one goes with it: constraints, keyframes, its free joint."""
+    alone = with_more("").replace(
+        "</worldbody>", '<body name="wall" pos="0 5 0"><geom size=".1"/></body></worldbody>'
+    )
+    path = written(tmp_path, with_more("").replace("</worldbody>", BALL_BESIDE))
+    with pytest.raises(InputError) as refused:
+        load_robot(path)
+    said = "robot.xml: bodies 'a', 'ball' (free) move apart from each other, and psdmc reads one robot"
+    assert (refused.value.message, refused.value.hint) == (said, "choose one of them, such as --root a")
+
+    robot = derive(path, root="a", snap=0.0)
+    (tmp_path / "alone").mkdir()
+    expected = derive(written(tmp_path / "alone", alone), snap=0.0)
+    given = states(20, 2, 2)
+    assert np.array_equal(robot.inverse_dynamics(*given), expected.inverse_dynamics(*given))
+    standing(tmp_path / "alone" / "robot.xml")
+    assert "left out by --root a: 'ball'" in robot.mechanism.notes
+    assert robot.provenance["options"]["root"] == "a"
+    robot.save(tmp_path / "m.npz")
+    assert all(row.passed for row in check_model(load(tmp_path / "m.npz")))
+
+    with pytest.raises(
+        InputError, match="--root 'wall' is none of the bodies under the world that move"
+    ) as refused:
+        load_robot(path, root="wall")
+    assert refused.value.hint == "choose one of 'a', 'ball' (free)"
+    with pytest.raises(InputError, match="--root names a body of an MJCF"):
+        load_robot(written(tmp_path, "<robot name='r'><link name='l'/></robot>", "r.urdf"), root="l")
+
+
+def test_the_one_that_flies_can_be_chosen_too(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        FLYING.replace(
+            "</worldbody>", '<body name="door"><joint name="hinge"/><geom size=".1"/></body></worldbody>'
+        ),
     )
 
-    with pytest.raises(InputError, match="bodies 'a', 'ball' move apart from each other"):
-        load_robot(written(tmp_path, text))
+    robot = derive(path, root="trunk", snap=0.0)
+
+    alone = derive(written(tmp_path, FLYING, "alone.xml"), snap=0.0)
+    assert robot.joint_names == alone.joint_names == ("root_joint", "hip_l", "hip_r")
+    assert np.array_equal(robot.mechanism.parameters, alone.mechanism.parameters)
+
+
+@pytest.mark.parametrize("text", [ARM, FLYING, GRIPPER, BALLS], ids=["arm", "flying", "gripper", "balls"])
+def test_check_compares_with_mujocos_own_reading_of_the_file(text: str, tmp_path: Path) -> None:
+    path = written(tmp_path, text)
+    robot = derive(path)
+    robot.save(tmp_path / "m.npz")
+
+    for source in (None, load_robot(path)):
+        row = next(row for row in check_model(load(tmp_path / "m.npz"), source) if row.against == MUJOCO)
+        assert row.limit is not None, row.remark
+        assert row.error < 1e-11
+
+
+@pytest.mark.parametrize("options", [{"lock": {"elbow": 0.4}}, {"lock": {"slide": 0.2, "turn": 0.1}}, {"tip": "b"},
+                                     {"gravity": (1.0, 2.0, -3.0)}, {"drive_inertia": (0.1, 0.2, 0.3, 0.4)}])  # fmt: skip
+def test_check_gives_the_options_to_mujocos_reading_too(options: dict[str, Any], tmp_path: Path) -> None:
+    row = next(row for row in check_model(derive(written(tmp_path, ARM), **options)) if row.against == MUJOCO)
+    assert row.limit is not None, row.remark
+    assert row.error < 1e-11
+
+
+def moved_anchor(real: Callable[..., Any]) -> Callable[..., Any]:
+    def read(writer: Any, j: int, origin: np.ndarray, *others: Any) -> Any:
+        return real(writer, j, origin + 1e-4, *others)
+
+    return read
+
+
+def test_a_mistake_in_the_translation_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The URDF that psdmc makes of an MJCF is what all others read: MuJoCo's own reading alone tells that it is another
+    robot."""
+    monkeypatch.setattr(mjcf_text, "_at_reference", moved_anchor(mjcf_text._at_reference))
+
+    rows = check_model(derive(written(tmp_path, ARM)))
+
+    assert [row.against for row in rows if not row.passed] == [MUJOCO]
 
 
 def test_forces_and_drives_are_noted_by_name(tmp_path: Path) -> None:
@@ -481,7 +565,7 @@ def test_what_is_included_and_is_no_file_is_mujocos_matter(tmp_path: Path, name:
 def test_an_included_file_is_not_longer_than_a_robot_s(tmp_path: Path) -> None:
     (tmp_path / "more.xml").write_text(" " * (MAX_BYTES + 1))
     (tmp_path / "robot.xml").write_text(REPEATED.format("<include file='more.xml'/>"))
-    with pytest.raises(InputError, match=r"robot.xml: it includes 'more.xml', which has more than 4 MiB"):
+    with pytest.raises(InputError, match=r"robot.xml: it includes 'more.xml': more than 4 MiB"):
         load_robot(tmp_path / "robot.xml")
 
 

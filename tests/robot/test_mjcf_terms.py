@@ -78,13 +78,46 @@ def test_armatures_of_actuators_elsewhere_are_refused_by_name(tmp_path: Path) ->
         load_robot(written(tmp_path, ball))
 
 
-def test_armature_of_a_free_joints_actuator_is_noted(tmp_path: Path) -> None:
+def test_armature_of_a_free_joints_actuator_is_refused(tmp_path: Path) -> None:
     needs("actuator_armature")
     text = FLYING.format(joint='<freejoint name="root"/>', motor='<motor joint="root" armature=".1"/>')
-    assert (
-        "drive inertia of a free joint is left out: 'root'"
-        in load_robot(written(tmp_path, text)).mechanism.notes
-    )
+    with pytest.raises(InputError, match=r"not modelled: armature 0\.1 of free joint 'root'"):
+        load_robot(written(tmp_path, text))
+
+
+WALKING = """<mujoco><default><joint armature=".5"/></default><worldbody><body name="trunk" pos="0 0 1">{}
+<geom type="box" size=".3 .2 .1" pos=".05 .01 0"/><body name="leg" pos=".3 .2 0" euler="0 10 0">
+<joint name="hip" axis="0 1 0"/><geom type="capsule" size=".03" fromto="0 0 0 0 0 -.4"/></body></body>
+</worldbody></mujoco>"""
+
+
+def test_armature_of_a_free_joint_is_refused_where_it_would_enter_mujocos_mass_matrix(tmp_path: Path) -> None:
+    """<freejoint> takes none from the defaults: there psdmc's mass matrix is MuJoCo's, with the other joints' armature."""
+    heavy = written(tmp_path, WALKING.format('<joint name="root" type="free"/>'), "heavy.xml")
+    plain = written(tmp_path, WALKING.format('<freejoint name="root"/>'))
+    with pytest.raises(InputError) as refused:
+        load_robot(heavy)
+    said = "heavy.xml: not modelled: armature 0.5 of free joint 'root' (<freejoint> takes none from defaults)"
+    assert refused.value.message == said
+
+    robot = derive(plain, snap=0.0)
+    q = np.array([0.3, -0.2, 0.9, 0.0, 0.0, 0.0, 1.0, 0.7])
+    expected = mass_matrix(plain, q[[0, 1, 2, 6, 3, 4, 5, 7]])
+    assert robot.mass_matrix(q) == pytest.approx(expected, rel=1e-12, abs=1e-13)
+    assert mass_matrix(heavy, q[[0, 1, 2, 6, 3, 4, 5, 7]])[0, 0] == pytest.approx(expected[0, 0] + 0.5)
+
+
+def mass_matrix(path: Path, qpos: np.ndarray) -> np.ndarray:
+    """MuJoCo's, at an upright root, where its linear rates are along the root's own axes too."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    try:
+        mujoco.mj_fullM(model, full, data.qM)
+    except (AttributeError, TypeError):
+        mujoco.mj_fullM(model, data, full)
+    return full
 
 
 @pytest.mark.parametrize("flag", ["equality", "constraint"])

@@ -160,3 +160,44 @@ def test_what_no_mechanism_has_is_refused(parts: tuple[str, ...], message: str) 
         tree_of(urdf(*links, *parts))
     assert str(refused.value).startswith("hand.urdf: ")
     assert refused.value.hint
+
+
+SHAPE = '<collision><geometry><sphere radius="0.02"/></geometry></collision>'
+
+
+def dog(shape: str) -> str:
+    """Two legs as of Unitree's own Go2: along each calf a chain of two shapes, and a foot; a head on the trunk."""
+    parts = [link("trunk"), link("head"), link("jaw")]
+    parts += [joint("neck", "trunk", "head", kind="fixed"), joint("chin", "head", "jaw", kind="fixed")]
+    for side in "LR":
+        parts += [
+            link(f"{side}_thigh"),
+            link(f"{side}_calf"),
+            link(f"{side}_lower", shape),
+            link(f"{side}_lower1", shape),
+        ]
+        parts += [link(f"{side}_foot"), link(f"{side}_rotor")]
+        parts += [
+            joint(f"{side}_hip", "trunk", f"{side}_thigh", axis="0 1 0"),
+            joint(f"{side}_knee", f"{side}_thigh", f"{side}_calf", axis="0 1 0"),
+            joint(f"{side}_rotor_joint", f"{side}_thigh", f"{side}_rotor", kind="fixed"),
+            joint(f"{side}_lower_joint", f"{side}_calf", f"{side}_lower", kind="fixed"),
+            joint(f"{side}_lower1_joint", f"{side}_lower", f"{side}_lower1", kind="fixed"),
+            joint(f"{side}_foot_joint", f"{side}_calf", f"{side}_foot", kind="fixed"),
+        ]
+    return urdf(*parts)
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_a_shape_along_a_leg_is_no_default_frame_and_neither_is_what_a_moving_body_carries(
+    floating: bool,
+) -> None:
+    """Feet are the ends: not the calves' collision shapes, nor rotors and a head on bodies that carry moving joints."""
+    robot = load_robot_text(dog(SHAPE), "urdf", floating=floating).mechanism
+    assert [frame.name for frame in robot.frames] == ["L_foot", "R_foot"]
+    carriers = {robot.joints[frame.joint].name for frame in robot.frames}
+    assert carriers == {"L_knee", "R_knee"}, "none of a body that carries a moving joint"
+    asked = load_robot_text(dog(SHAPE), "urdf", floating=floating, frames=["L_lower1", "jaw"][: 1 + floating])
+    assert [frame.name for frame in asked.mechanism.frames] == ["L_lower1", "jaw"][: 1 + floating]
+    seen = load_robot_text(dog(SHAPE + "<visual/>"), "urdf", floating=floating).mechanism
+    assert [frame.name for frame in seen.frames] == ["L_lower1", "R_lower1"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pinocchio
@@ -10,7 +11,7 @@ import pytest
 from small_robots import INERTIAL, joint, largest_difference, link, load_urdf, torques
 
 from psdmc.errors import InputError
-from psdmc.robot.load import LoadedRobot, load_robot_text
+from psdmc.robot.load import LoadedRobot, load_robot, load_robot_text
 
 PLAIN = (link("base"), link("arm"), joint("shoulder", "base", "arm"))
 HALF = math.sqrt(0.5)
@@ -211,3 +212,80 @@ def test_dynamics_that_say_nothing_are_not_noted():
     )
 
     assert loaded.chain.notes == ()
+
+
+BODY = f'<link name="base"/><link name="arm">{INERTIAL}</link>'
+TURN = '<joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>%s</joint>'
+
+LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+OUTSIDE = {
+    "a prefix that nothing declares": (
+        '<robot name="r"><!-- <robot> --><sensor:camera name="c" sensor:rate="3"><a:b/></sensor:camera>'
+        f"{BODY}{TURN % (LIMIT + '<x:y/>')}</robot>"
+    ),
+    "one of two prefixes declared": (
+        f'<robot name="r" xmlns:a="urn:a"><a:b/><sensor:camera a:x="1"/>{BODY}{TURN % LIMIT}</robot>'
+    ),
+    "a prefix declared within": f'<robot name="r"><s:c xmlns:s="urn:s"/><s:d/>{BODY}{TURN % LIMIT}</robot>',
+    "a default name space": (
+        f'<?xml version="1.0"?><robot xmlns="http://www.ros.org" name="r">{BODY}'
+        f'<gazebo xmlns="urn:other"><mass/></gazebo>{TURN % LIMIT}</robot>'
+    ),
+    "a blank first line": f'\n \n<?xml version="1.0"?>\n<robot name="r">{BODY}{TURN % LIMIT}</robot>',
+    "a mark and a blank line": f'\ufeff\n<?xml version="1.0"?>\n<robot name="r">{BODY}{TURN % LIMIT}</robot>',
+}
+
+
+@pytest.mark.parametrize("text", OUTSIDE.values(), ids=OUTSIDE)
+def test_xml_that_other_readers_take_is_read_as_they_read_it(text: str, tmp_path: Path) -> None:
+    """urdfdom, by which Pinocchio reads, knows no name spaces."""
+    (tmp_path / "arm.urdf").write_text(text, encoding="utf-8")
+    oracle = pinocchio.buildModelFromXML(text.lstrip("\ufeff"))
+
+    robot = load_robot(tmp_path / "arm.urdf")
+
+    assert robot.mechanism.notes == ()
+    data, states = oracle.createData(), np.random.default_rng(1).uniform(-3, 3, (3, 5, 1))
+    expected = [pinocchio.rnea(oracle, data, *state) for state in zip(*states, strict=True)]
+    assert torques(robot.mechanism, *states) == pytest.approx(np.array(expected), rel=1e-13)
+    again = load_robot_text(robot.source_text, "urdf", **robot.options.as_json())
+    assert np.array_equal(again.mechanism.parameters, robot.mechanism.parameters)
+
+
+def test_what_dynamics_needs_counts_in_the_files_own_name_space_only() -> None:
+    other = f'<robot name="r" xmlns:o="urn:o">{BODY}{TURN % ""}<o:link name="x"/><o:joint/></robot>'
+    assert load(other).mechanism.joint_names == ("j",)
+    misspelt = f'<robot xmlns="urn:x" name="r">{BODY.replace("inertial", "inertail")}{TURN % ""}</robot>'
+    assert "did you mean <inertial>?" in refused(misspelt).message
+
+
+def test_a_macro_that_nothing_declares_is_no_foreign_word() -> None:
+    """Passed over, it would be a robot without what the macro stands for."""
+    assert "unbound prefix" in refused(f"<robot>{BODY}{TURN % ''}<xacro:leg/></robot>").message
+
+
+def test_limits_the_wrong_way_round_are_none_and_noted() -> None:
+    reversed_one = '<limit lower="2" upper="1" effort="7" velocity="5"/>'
+    robot = load(robot_of(reversed_one))
+    right = load(robot_of('<limit effort="7" velocity="5"/>'))
+
+    assert robot.mechanism.notes == (
+        "joint 'j': <limit> lower 2 is above upper 1: taken as no position limit",
+    )
+    (limits,) = [joint.limits for joint in robot.mechanism.joints]
+    assert (limits.lower, limits.upper) == (-math.inf, math.inf)
+    assert limits == right.mechanism.joints[0].limits
+    assert load(robot_of('<limit lower="0" upper="0"/>')).mechanism.notes == ()
+    for kind in ("continuous", "fixed"):
+        quiet = robot_of(reversed_one, "<link name='more'/>", 'type="continuous"').replace(
+            "revolute", kind, 1
+        )
+        assert not any("above" in note for note in load(quiet).mechanism.notes)
+
+
+def robot_of(limit: str, more: str = "", kind: str = "") -> str:
+    """The arm with a limit; with `kind`, a further joint of that type and its link."""
+    further = f'<joint name="k" {kind}><parent link="arm"/><child link="more"/></joint>' if kind else ""
+    body = f'<link name="more">{INERTIAL}</link>' if more else ""
+    return f'<robot name="r">{BODY}{TURN % limit}{body}{further}</robot>'

@@ -19,6 +19,7 @@ LARGEST_STORED = 64 * 1024**3
 LARGEST_TOML = 256 * 1024
 """Bytes of a campaign or plant: a thousand runs; beyond that the standard library's reader takes seconds."""
 
+SHORTER = "cut it into several"
 WRITE_AGAIN = "record, export or copy it again; the format goes by the file's ending"
 
 
@@ -32,9 +33,7 @@ def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
         if status.st_size == 0:
             raise InputError(f"{path}: is empty", "record or export it again")
         if status.st_size > largest:
-            raise InputError(
-                f"{path}: has {status.st_size:,} bytes, expected at most {largest:,}", "cut it into several"
-            )
+            raise InputError(f"{path}: has {status.st_size:,} bytes, expected at most {largest:,}", SHORTER)
         file = path.open("rb")
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such file", "check the path") from error

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.atomic import make_folder, whole_file
-from psdmc.calibration.logs.foreign_bytes import opened
+from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER, opened
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.table_binary import (
     columns_from_npz,
@@ -22,6 +22,7 @@ from psdmc.calibration.logs.table_csv import columns_from_csv, header_names
 from psdmc.calibration.logs.table_limits import require_size
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
+from psdmc.reading import read_rest
 
 TABLES = (".csv", ".parquet", ".npz")
 LARGEST_HEADER = 1024**2
@@ -36,7 +37,7 @@ def read_columns(path: Path) -> dict[str, Array]:
     kind = _kind(path)
     with opened(path) as file:
         if kind == ".csv":
-            columns = columns_from_csv(file.read(), str(path))
+            columns = columns_from_csv(read_rest(file, LARGEST_FILE, str(path), SHORTER), str(path))
         else:
             reader = columns_from_npz if kind == ".npz" else columns_from_parquet
             columns = reader(file, str(path))

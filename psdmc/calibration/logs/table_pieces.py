@@ -15,11 +15,10 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.table_binary import NUMBERS, open_parquet
 from psdmc.calibration.logs.table_csv import CsvReader
 from psdmc.calibration.logs.table_limits import require_names
+from psdmc.calibration.logs.table_text import PIECE_BYTES, whole_lines
 from psdmc.calibration.logs.wording import quoted
 from psdmc.errors import InputError
 
-PIECE_BYTES = 16 * 1024**2
-"""Of text that is parsed at once."""
 PIECE_ROWS = 65_536
 """Of binary tables."""
 
@@ -29,27 +28,11 @@ Pieces = tuple[list[str], Iterator[Array]]
 def csv_pieces(file: BinaryIO, name: str) -> Pieces:
     """Of a CSV file: each piece ends with a line."""
     reader = CsvReader(name)
-    names = reader.header(file.readline())
+    names = reader.header(file.readline(PIECE_BYTES))
     while not names:  # empty lines before the header
-        line = file.readline()
+        line = file.readline(PIECE_BYTES)
         names = reader.header(line) if line else reader.no_header()
-    return names, _lines(file, reader)
-
-
-def _lines(file: BinaryIO, reader: CsvReader) -> Iterator[Array]:
-    left = b""
-    while chunk := file.read(PIECE_BYTES):
-        end = chunk.rfind(b"\n") + 1
-        if not end:
-            left += chunk
-            continue
-        rows = reader.rows(left + chunk[:end])
-        left = chunk[end:]
-        if len(rows):
-            yield rows
-    rows = reader.rows(left)
-    if len(rows):
-        yield rows
+    return names, (rows for text in whole_lines(file, name) if len(rows := reader.rows(text)))
 
 
 def parquet_pieces(file: BinaryIO, name: str) -> Pieces:

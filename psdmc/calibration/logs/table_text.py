@@ -21,6 +21,7 @@ from psdmc.calibration.logs.table_csv import is_number, plain_text
 from psdmc.calibration.logs.table_limits import require_size
 from psdmc.calibration.logs.wording import quoted
 from psdmc.errors import InputError
+from psdmc.reading import in_words
 
 SEPARATOR_WORDS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 COMMENTS = ("#", "%")
@@ -29,7 +30,7 @@ MOST_COMMENTS = 10_000
 LARGEST_LINE = 1024**2
 """Bytes: a thousand columns with names of a thousand letters."""
 PIECE_BYTES = 16 * 1024**2
-"""Of text that is parsed at once."""
+"""Of text that is parsed at once, and most of a line."""
 DATE_HINT = "where that is the time: unit = 'date' in [time] of a log description"
 HINT = (
     "[csv] of a log description says where the table starts, what separates it, and whether it has a header"
@@ -107,16 +108,10 @@ class TextTable:
         """
         self._dated = places[0] if dates else None
         line, left = (self._line, self._first.encode() + b"\n") if self._first else (self._line + 1, b"")
-        while chunk := self._file.read(PIECE_BYTES):
-            end = chunk.rfind(b"\n") + 1
-            if not end:
-                left += chunk
-                continue
-            text = plain_text(left + chunk[:end], self.name, line - 1)
-            left = chunk[end:]
+        for piece in whole_lines(self._file, self.name, left):
+            text = plain_text(piece, self.name, line - 1)
             yield self._numbers(text, line, places)
             line += text.count("\n")
-        yield self._numbers(plain_text(left, self.name, line - 1), line, places)
 
     def _numbers(self, text: str, line: int, places: Sequence[int]) -> Array:
         if not text.strip():
@@ -166,6 +161,21 @@ class TextTable:
             hint = DATE_HINT if _is_date(cell) else HINT
             raise InputError(f"{self.name}: line {line}, column {column}: {what}", hint)
         return float(word)
+
+
+def whole_lines(file: BinaryIO, name: str, left: bytes = b"") -> Iterator[bytes]:
+    """The rest of a text in pieces that end with a line, after what is `left` of it; InputError where a line is longer than
+    a piece."""
+    while chunk := file.read(PIECE_BYTES):
+        end = chunk.rfind(b"\n") + 1
+        if not end and len(left) + len(chunk) > PIECE_BYTES:
+            raise InputError(
+                f"{name}: a line of more than {in_words(PIECE_BYTES)}", "write one row of the table per line"
+            )
+        if end:
+            yield left + chunk[:end]
+        left = chunk[end:] if end else left + chunk
+    yield left
 
 
 def _is_date(text: str) -> bool:

@@ -8,9 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, decoding, opened
+from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, SHORTER, decoding, opened
 from psdmc.calibration.logs.wording import first_faults, listed, quoted
 from psdmc.errors import InputError
+from psdmc.reading import read_rest
 
 LONGEST_LINE = 500
 """Characters of a line: the standard library's reader takes time that grows with the square of a dotted key's parts."""
@@ -25,7 +26,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     what   that is expected, such as 'a plant (.toml)'
     """
     with opened(path, LARGEST_TOML) as file:
-        return toml_content(file.read(), str(path), what)
+        return toml_content(read_rest(file, LARGEST_TOML, str(path), SHORTER), str(path), what)
 
 
 def toml_content(data: bytes, name: str, what: str) -> dict[str, Any]:

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, decoding, opened
+from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, SHORTER, decoding, opened
 from psdmc.calibration.logs.toml_tables import TomlTable, is_number, read_toml, require_none, toml_content
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
+from psdmc.reading import read_rest
 from psdmc.robot.dh import read_dh
 
 Triple = tuple[float, float, float]
@@ -161,8 +162,13 @@ def plant_texts(path: str | Path) -> tuple[bytes, bytes]:
     """The bytes that a plant depends on: its own file's and its robot's."""
     path = Path(path)
     robot = path.parent / str(read_toml(path, WHAT).get("robot"))
-    with opened(path, LARGEST_TOML) as own, opened(robot, LARGEST_TOML) as other:
-        return own.read(), other.read()
+    own, other = (_bytes_of(file) for file in (path, robot))
+    return own, other
+
+
+def _bytes_of(path: Path) -> bytes:
+    with opened(path, LARGEST_TOML) as file:
+        return read_rest(file, LARGEST_TOML, str(path), SHORTER)
 
 
 def _truth(value: object, where: str, faults: list[str]) -> JointTruth:
@@ -213,8 +219,7 @@ def _harness(value: object, names: Sequence[str], faults: list[str]) -> Harness:
 
 def read_plant_robot(path: Path) -> PlantRobot:
     """The DH table of a virtual robot; InputError where it is no such table, or a value is unknown."""
-    with opened(path, LARGEST_TOML) as file:
-        data = file.read()
+    data = _bytes_of(path)
     content = toml_content(data, str(path), "a robot as a DH table (.toml)")
     with decoding(str(path), "a DH table"):
         read_dh(data.decode("utf-8-sig").replace("\r\n", "\n"), str(path))  # refuses what is malformed

@@ -1,0 +1,57 @@
+"""Content that others wrote, read up to a stated limit: the one way in which psdmc reads a file whole.
+
+A device or a pipe may never end, and a file may grow while it is read: sizes that the system states are not relied on.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import BinaryIO
+
+from psdmc.errors import InputError
+
+PIECE = 1 << 20
+"""Bytes that are asked for at once, so that memory grows with what is there and not with the limit."""
+
+
+def read_file(
+    path: str | os.PathLike[str], most: int, hint: str, begins: bytes = b"", name: str | None = None
+) -> bytes:
+    """The content of a file, pipe or device; arguments and errors as of read_rest, and OSError where it cannot be read."""
+    with Path(path).open("rb") as file:
+        return read_rest(file, most, name or os.fspath(path), hint, begins)
+
+
+def read_rest(file: BinaryIO, most: int, name: str, hint: str, begins: bytes = b"") -> bytes:
+    """What is left in an open file; at most one byte beyond `most` is read.
+
+    begins   its first bytes: where they are others, these others alone are returned
+
+    InputError, which calls the file `name`, where there are more bytes than `most`.
+    """
+    found = bytearray(_up_to(file, len(begins)))
+    if found != begins:
+        return bytes(found)
+    while len(found) <= most:
+        piece = file.read(min(PIECE, most + 1 - len(found)))
+        if not piece:
+            return bytes(found)
+        found += piece
+    raise InputError(f"{name}: more than {in_words(most)}, which is the most that psdmc reads", hint)
+
+
+def _up_to(file: BinaryIO, count: int) -> bytes:
+    """So many bytes; fewer where the file ends."""
+    found = b""
+    while len(found) < count and (piece := file.read(count - len(found))):
+        found += piece
+    return found
+
+
+def in_words(size: int) -> str:
+    """A limit in bytes as people read it."""
+    for unit, bits in (("GiB", 30), ("MiB", 20), ("KiB", 10)):
+        if size >= 1 << bits and size % (1 << bits) == 0:
+            return f"{size >> bits} {unit}"
+    return f"{size:,} bytes"
