@@ -59,6 +59,7 @@ def derive(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    unknown: Sequence[str] | str = (),
 ) -> DynamicsModel:
     """The certified model (E, P, theta_b) of a robot file: URDF, or DH table in TOML.
 
@@ -75,6 +76,8 @@ def derive(
     lock           joints that are held: their positions by name, rad or m
     floating       the root link of a URDF is on a free joint: q = position, quaternion xyzw, then the joints; rates are
                    linear and angular velocity along the root link's own axes, then the joints'
+    unknown        links of a URDF or MJCF whose inertia is unknown, whatever the file says, or a single one; "all", or
+                   "missing": those without inertia in the file, which are massless otherwise
 
     Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.
     """
@@ -101,6 +104,7 @@ def derive(
         tool=tool,
         lock=lock,
         floating=floating,
+        unknown=_names(unknown),
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
 

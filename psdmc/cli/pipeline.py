@@ -79,9 +79,17 @@ def derive(
             "--floating", help="put the root link on a free joint, as of a robot that walks or flies"
         ),
     ] = False,
+    unknown: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LINK,...",
+            help="links of unknown inertia; 'all', or 'missing': those that the file has none of",
+        ),
+    ] = None,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
+    from psdmc.cli.tables import print_note
     from psdmc.robot.lock import parsed as parsed_lock
 
     target = output or Path(Path(robot.name.removesuffix(".xacro")).stem + ".npz")
@@ -103,13 +111,14 @@ def derive(
             numbers(tool, "--tool", "six numbers: x,y,z in m, roll,pitch,yaw in rad"),
             parsed_lock(assignments(lock)),
             floating,
+            names(unknown),
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"
     own = f" with {model.nv} coordinates" if model.mechanism.has_followers else ""
     print(f"{target}: {model.n} joints{own}, {sizes}, largest torque error {model.certificate.max():.1e}")
     for note in model.mechanism.notes:
-        print(f"note: {note}")
+        print_note(note)
     say_next("check", target)
 
 

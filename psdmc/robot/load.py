@@ -16,6 +16,7 @@ from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
+from psdmc.robot.missing_inertia import with_massless_warning
 from psdmc.robot.source_words import with_source_words
 from psdmc.robot.tool import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
@@ -66,6 +67,7 @@ def load_robot(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    unknown: Sequence[str] = (),
 ) -> LoadedRobot:
     """The robot in a URDF, MJCF, xacro or DH TOML file (told apart by the suffixes .toml and .xacro, and by the root
     element). Options as in LoadOptions.
@@ -75,7 +77,7 @@ def load_robot(
     file = Path(path)
     text = robot_text(file)
     options = checked_options(
-        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
+        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating, unknown
     )
     text, source_format, options = as_source(file, text, options)
     _refuse_size(len(text.encode(errors="replace")), file.name)
@@ -97,11 +99,12 @@ def load_robot_text(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    unknown: Sequence[str] = (),
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
     options = checked_options(
-        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating
+        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating, unknown
     )
     return _loaded(text, source_format, source_name, options)
 
@@ -154,6 +157,7 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
             options.frames,
             options.lock,
             options.floating,
+            options.unknown,
         )
         return with_source_words(draft, text, source)
     if options.base is not None or options.tip is not None:
@@ -163,6 +167,10 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
     if options.floating:
         raise InputError(
             f"{source}: --floating frees the root link of a URDF", "a DH table's base stands: leave it out"
+        )
+    if options.unknown:
+        raise InputError(
+            f"{source}: --unknown names links of a URDF", "in a DH table leave out what is unknown of a link"
         )
     return dh_draft(text, source, gravity, options.snap, options.frames)
 
@@ -181,7 +189,7 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         link_values(np.append(x[:DRIVE], drive or 0.0), zero)
         for x, drive, zero in zip(draft.parameters, given, zeros, strict=True)
     ]
-    return Mechanism(
+    mechanism = Mechanism(
         name=draft.name,
         convention=draft.convention,
         base_name=draft.base_name,
@@ -196,7 +204,9 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         parents=draft.parents,
         tip_body=draft.tip_body,
         coordinates=draft.coordinates,
+        massless=draft.massless,
     )
+    return with_massless_warning(mechanism)
 
 
 def _frames(draft: Draft, options: LoadOptions, source: str) -> tuple[NamedFrame, ...]:
@@ -243,7 +253,8 @@ def _zero_notes(draft: Draft, said: Sequence[Sequence[str]], values: Sequence[Ar
     for joint, own, more, before, after in zip(
         draft.joints, draft.zeros, said, draft.parameters, values, strict=True
     ):
-        names = list(dict.fromkeys((*own, *more)))
+        stated = () if joint.link_name in draft.massless else own
+        names = list(dict.fromkeys((*stated, *more)))
         if not names:
             continue
         size = np.nanmax(np.abs(before[:DRIVE]), initial=0.0)

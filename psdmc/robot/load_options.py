@@ -14,7 +14,7 @@ from psdmc.robot.limits import shown
 DEFAULT_SNAP = 1e-5
 """rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
 
-LATER = ("frames", "tool", "lock", "floating")
+LATER = ("frames", "tool", "lock", "floating", "unknown")
 """Options that the first versions did not have."""
 
 MAX_SNAP = 0.1
@@ -34,6 +34,7 @@ class LoadOptions:
     tool           x y z (m), roll pitch yaw (rad) of a further frame 'tool' in the tip frame; None: no such frame
     lock           joints of a URDF that are held: positions by name, rad or m
     floating       whether the root link of a URDF is on a free joint
+    unknown        links of a URDF whose inertia is unknown, whatever the file says; "all", or "missing": those without any
     """
 
     base: str | None = None
@@ -46,6 +47,7 @@ class LoadOptions:
     tool: tuple[float, ...] | None = None
     lock: dict[str, float] = field(default_factory=dict)
     floating: bool = False
+    unknown: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Keyword arguments of load_robot_text as plain JSON values. Later options are included only where they are given,
@@ -65,6 +67,7 @@ def checked_options(
     tool: Sequence[float] | None = None,
     lock: Mapping[str, float] | None = None,
     floating: bool = False,
+    unknown: Sequence[str] = (),
 ) -> LoadOptions:
     """The options as LoadOptions; InputError names the first that is wrong."""
     for name, value in (("base", base), ("tip", tip)):
@@ -72,6 +75,10 @@ def checked_options(
             raise InputError(f"{name} is {shown(value)}, expected a link's name", "give a text")
     if not _are_texts_in_order(assume_zero):
         raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
+    if not _are_texts_in_order(unknown):
+        raise InputError(
+            f"unknown is {shown(unknown)}, expected links' names", 'such as ["forearm"], or "all"'
+        )
     if not isinstance(floating, bool):
         raise InputError(f"floating is {shown(floating)}, expected True or False", "the default is False")
     if floating and (base is not None or tip is not None):
@@ -91,6 +98,7 @@ def checked_options(
         _tool(tool),
         _lock(lock),
         floating,
+        tuple(dict.fromkeys(unknown)),
     )
 
 

@@ -97,6 +97,7 @@ class Mechanism:
     tip_body         the body that the tip frame is fixed to; left out: the only leaf
     coordinates      n, which coordinate each joint's q follows; left out: each joint its own
     frames           named frames; left out: the tip alone
+    massless         moving links without inertia in the file, which is read as none: they have no parameters
     """
 
     name: str
@@ -113,6 +114,7 @@ class Mechanism:
     tip_body: int = BASE
     coordinates: tuple[Coordinate, ...] = ()
     frames: tuple[NamedFrame, ...] = ()
+    massless: tuple[str, ...] = ()
 
     __reduce__ = made_again
 

@@ -32,6 +32,12 @@ ROOT = re.compile(r"\s*(?:<\?xml.*?\?>|<!--.*?-->|\s+)*<\s*([\w:.-]+)", re.DOTAL
 NOT_A_NUMBER = "NaN"
 """What MuJoCo's warning of such a number has in it."""
 
+NO_INERTIA = "mass and inertia of moving bodies must be larger"
+"""What MuJoCo says of a moving body without them."""
+
+LEAST = 2.0**-46
+"""kg, kg m^2: above MuJoCo's mjMINVAL (1e-15), and a number that no file has."""
+
 REASON = 300
 """Characters of MuJoCo's own message that an error repeats."""
 
@@ -86,7 +92,7 @@ def _compiled(mujoco: Any, path: Path, source: str) -> tuple[Any, list[str]]:
     """MuJoCo's model, and notes of what it warned of."""
     try:
         with kept_warnings(mujoco) as said:
-            model = mujoco.MjModel.from_xml_path(str(path))
+            model = _with_massless(mujoco, path)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         raise InputError(
@@ -96,6 +102,24 @@ def _compiled(mujoco: Any, path: Path, source: str) -> tuple[Any, list[str]]:
     if any(NOT_A_NUMBER in text for text in said):
         raise InputError(f"{source}: a number of it is NaN", "write a number there")
     return model, [f"MuJoCo warns: {text[:REASON]}" for text in said]
+
+
+def _with_massless(mujoco: Any, path: Path) -> Any:
+    """The compiled file. MuJoCo refuses moving bodies without inertia: for the compiler those get the least that it takes,
+    which is taken away again. ValueError where MuJoCo refuses the file for another reason."""
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as refused:
+        if NO_INERTIA not in str(refused) or not hasattr(mujoco, "MjSpec"):
+            raise
+        spec = mujoco.MjSpec.from_file(str(path))
+        spec.compiler.boundmass = spec.compiler.boundinertia = LEAST
+        model = spec.compile()
+        bare, least = model.body_mass == LEAST, model.body_inertia == LEAST
+        if (least.any(axis=1) & ~bare).any():  # mass in a point, or none about an axis, which psdmc takes from nobody
+            raise
+        model.body_mass[bare], model.body_inertia[bare] = 0.0, 0.0
+        return model
 
 
 def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None:
