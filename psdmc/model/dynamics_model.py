@@ -181,10 +181,8 @@ class DynamicsModel(Answers):
         """(l,) theta_b; while it is unknown what links of known inertia add to it, None where there is no such link."""
         if self.theta_b is not None:
             return self.theta_b
-        parameters = self.mechanism.parameters
-        unknown = np.asarray(np.isnan(parameters).any(axis=1))
-        known = np.where(unknown[:, None], 0.0, parameters)
-        if not unknown.any() or not known.any():
+        known = self.mechanism.known_parameters
+        if not np.isnan(self.mechanism.parameters).any() or not known.any():
             return None
         return np.asarray(times(self.B, known.reshape(-1)))
 

@@ -116,7 +116,9 @@ def _with_massless(mujoco: Any, path: Path) -> Any:
         spec.compiler.boundmass = spec.compiler.boundinertia = LEAST
         model = spec.compile()
         bare, least = model.body_mass == LEAST, model.body_inertia == LEAST
-        if (least.any(axis=1) & ~bare).any():  # mass in a point, or none about an axis, which psdmc takes from nobody
+        if (
+            least.any(axis=1) & ~bare
+        ).any():  # mass in a point, or none about an axis, which psdmc takes from nobody
             raise
         model.body_mass[bare], model.body_inertia[bare] = 0.0, 0.0
         return model

@@ -69,10 +69,10 @@ def knowledge_of(
     require_none(faults, where, HINT)
     found = dict(bodies.confidence)
     if stated is not None:
-        links = enumerate(model.mechanism.parameters)
-        found = {
-            k: found.get(k, body_confidence(link, stated)) for k, link in links if not np.isnan(link).any()
-        }
+        unknown = model.mechanism.has_unknown_body
+        for k, link in enumerate(model.mechanism.parameters):
+            if not unknown[k]:
+                found.setdefault(k, body_confidence(link, stated))
     if found or stated is not None:
         _require_values(model, found)
     return Knowledge(found, bodies.bounds(), wanted)
@@ -80,8 +80,8 @@ def knowledge_of(
 
 def _require_values(model: DynamicsModel, confidence: Mapping[int, Confidence]) -> None:
     """InputError where confidence in a link's values is stated and the file does not give them."""
-    parameters = model.mechanism.parameters
-    names = [model.mechanism.joints[k].link_name for k in confidence if np.isnan(parameters[k]).any()]
+    unknown = model.mechanism.has_unknown_body
+    names = [model.mechanism.joints[k].link_name for k in confidence if unknown[k]]
     if model.file_theta_b is None or (names and model.theta_b is None):
         lacks = f"the inertia of {listed(names)}" if names else "all inertias"
         raise InputError(

@@ -42,18 +42,16 @@ def body_confidence(link: Array, share: float) -> Confidence:
 def theta_covariance(model: DynamicsModel, stated: dict[int, Confidence], scale: Array) -> Array:
     """(l, l) of theta_b, from what is stated of links by number; the others are vaguely known.
 
-    scale  (l, ...)  how large a base parameter may believably be: what is known of those that contain unknowns
+    scale  (l, ...)  how large a base parameter may believably be: all that is known of one that contains unknowns or is zero
     """
     covariance = np.zeros((PARAMETERS_PER_LINK * len(model.mechanism),) * 2)
-    for k, link in enumerate(model.mechanism.parameters):
-        if np.isnan(link).any():
-            continue
+    for k, link in enumerate(model.mechanism.known_parameters):
         own = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
         covariance[own, own] = _covariance(link, stated.get(k, body_confidence(link, VAGUE)))
-    unknown = list(model.unknown_base_parameters)
     found = np.asarray(model.B @ covariance @ model.B.T)
-    found[unknown, unknown] += (VAGUE * scale[unknown]) ** 2
-    return found
+    is_open = np.diag(found) == 0.0
+    is_open[list(model.unknown_base_parameters)] = True
+    return found + np.diag(np.where(is_open, VAGUE * scale[: model.l], 0.0) ** 2)
 
 
 def _covariance(link: Array, own: Confidence) -> Array:
