@@ -62,6 +62,7 @@ def derive(
     root: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
     packages: Mapping[str, str | Path] | None = None,
+    unknown: Sequence[str] | str = (),
 ) -> DynamicsModel:
     """The certified model (E, P, theta_b) of a robot file: URDF, or DH table in TOML.
 
@@ -81,6 +82,8 @@ def derive(
     root           the body under the world of an MJCF that the robot begins with, where several move
     xacro_args     values of a xacro file's arguments, by name
     packages       folders of ROS packages, by name, which a xacro file finds; also by ROS_PACKAGE_PATH, AMENT_PREFIX_PATH
+    unknown        links of a URDF or MJCF whose inertia is unknown, whatever the file says, or a single one; "all", or
+                   "missing": those without inertia in the file, which are massless otherwise
 
     Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.
     """
@@ -110,6 +113,7 @@ def derive(
         root=root,
         xacro_args=xacro_args,
         packages=packages,
+        unknown=_names(unknown),
     )
     return derive_model(loaded.mechanism, expand=expand, progress=progress, provenance=provenance(loaded))
 

@@ -168,7 +168,14 @@ def calibrate_campaign(
     progress("checking logs")
     logs = checked_runs(model.mechanism, runs, options.campaign)
     found = calibrate_four_steps(
-        model.mechanism, regressor, model.l, runs, options.campaign, progress, torque_constants, model.theta_b
+        model.mechanism,
+        regressor,
+        model.l,
+        runs,
+        options.campaign,
+        progress,
+        torque_constants,
+        model.file_theta_b,
     )
 
     def record(steps: FourSteps, theta_b: Array) -> Calibration:
@@ -224,7 +231,7 @@ def calibrate_logs(
     )
     progress("linear fit")
     found = calibrate_linear(
-        model.mechanism, regressor, model.l, logs, linear, motors, model.theta_b, progress
+        model.mechanism, regressor, model.l, logs, linear, motors, model.file_theta_b, progress
     )
     fit = LogFit(model, logs, linear, options.physical, options.consistency, known, progress)
     result = fit.record(found)

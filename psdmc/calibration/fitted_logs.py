@@ -17,7 +17,7 @@ from psdmc.calibration.verdict.judged_record import judged_record
 from psdmc.calibration.verdict.linear_record import linear_record
 from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
 from psdmc.calibration.verdict.record import Calibration, with_data, with_model
-from psdmc.errors import InputError
+from psdmc.errors import InputError, InternalError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 
@@ -57,15 +57,18 @@ class LogFit:
     def _with_prior(self, found: LinearResult) -> LinearResult:
         if not self.known.confidence:
             return found
-        covariance = theta_covariance(self.model, dict(self.known.confidence))
-        joined = with_prior(found.estimate, self.model.known_theta_b(), covariance)
+        known = self.model.file_theta_b
+        if known is None:
+            raise InternalError(f"{self.model.mechanism.name}: a confidence without values")
+        covariance = theta_covariance(self.model, dict(self.known.confidence), found.prior.scale)
+        joined = with_prior(found.estimate, known, covariance, self.model.unknown_base_parameters)
         return replace(found, estimate=joined, stated=True)
 
     def _essential(self, found: LinearResult, whole: Calibration, options: EssentialOptions) -> Calibration:
         self.progress("essential parameters")
         lesser = essential(found.estimate, found.prior.values, found.samples, options, self.linear.fit)
         fewer = self._consistent(replace(found, estimate=lesser.estimate, dropped=lesser.dropped))
-        return with_price(fewer, whole, lesser, found.problem.names)
+        return with_price(fewer, whole, lesser, (*self.model.base_parameters.labels, *found.problem.names))
 
     def _consistent(self, found: LinearResult) -> Calibration:
         """The physically consistent record where it is wanted and exists; else the unconstrained one, with a note."""

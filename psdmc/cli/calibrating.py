@@ -124,16 +124,22 @@ def calibrate(
     from psdmc.calibration.identify.essential import EssentialOptions
     from psdmc.calibration.sources import LogNaming
     from psdmc.calibration.verdict.record import verdict_of
+    from psdmc.calibration.verdict.record_rows import dropped_links
     from psdmc.calibration.verdict.said_once import unsaid_warnings
     from psdmc.cli.show_checks import print_accuracy, print_torque_constants, print_verdict
+    from psdmc.model.load import load as load_model
     from psdmc.report.calibrate_commands import calibrate_command
 
     read = [*given, *(validate or []), *(loaded or [])]
     check_output(output, *read)
     check_report(report, output, *read)
+    known = load_model(model)
+    dropped = dropped_links(known)
+    for warning in dropped:
+        print(f"warning: {one_line(warning)}", flush=True)
     with steps() as progress:
         record = calibrate_command(
-            model,
+            known,
             logs,
             output,
             report,
@@ -165,7 +171,8 @@ def calibrate(
     for note in record.notes:
         print(f"note: {one_line(note)}")
     for warning in unsaid_warnings(record):
-        print(f"warning: {one_line(warning)}")
+        if warning not in dropped:
+            print(f"warning: {one_line(warning)}")
     for written, what in ((report, "page"), (actuators, "friction and motors in C")):
         if written is not None and written.exists():
             print(f"{written}: {what}")

@@ -104,9 +104,17 @@ def derive(
     root: RootBody = None,
     xacro_arg: XacroOption = None,
     package: Packages = None,
+    unknown: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LINK,...",
+            help="links of unknown inertia; 'all', or 'missing': those that the file has none of",
+        ),
+    ] = None,
 ) -> None:
     """Derive a robot's model (E, P, theta_b) and save it."""
     from psdmc import compiler
+    from psdmc.cli.tables import print_note
     from psdmc.robot.lock import parsed as parsed_lock
 
     target = output or Path(Path(robot.name.removesuffix(".xacro")).stem + ".npz")
@@ -131,13 +139,14 @@ def derive(
             root,
             xacro_arguments(arguments, xacro_arg),
             package_folders(package),
+            names(unknown),
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"
     own = f" with {model.nv} coordinates" if model.mechanism.has_followers else ""
     print(f"{target}: {model.n} joints{own}, {sizes}, largest torque error {model.certificate.max():.1e}")
     for note in model.mechanism.notes:
-        print(f"note: {note}")
+        print_note(note)
     say_next("check", target)
 
 

@@ -7,13 +7,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from psdmc.cli.show_calibration import print_calibration, standard_deviations
-from psdmc.cli.tables import TERMS, Table, print_line, print_table
+from psdmc.cli.tables import TERMS, Table, print_line, print_note, print_table
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
 from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.tree import listed
 
 
 def print_model(model: DynamicsModel) -> None:
@@ -29,10 +30,12 @@ def print_model(model: DynamicsModel) -> None:
     print_table(_joints(model.mechanism, joint_errors(model.mechanism, found.certificate)))
     print()
     print_table(_parameters(found, calibrated or {}))
+    for line in _unknowns(model):
+        print_line(line)
     print()
     print_line(f"largest torque error against Newton-Euler, relative: {max(found.certificate):.1e}")
     for note in found.notes:
-        print_line(f"note: {note}")
+        print_note(note)
     for line in _snapping(model):
         print_line(line)
     print_line(f"source: {found.source_name or 'not kept'}")
@@ -101,6 +104,16 @@ def _parameters(found: Summary, calibrated: Mapping[str, Any]) -> Table:
         given = [std] if calibrated else []
         rows.append((str(index), value, *given, parameter.unit, parameter.equation))
     return Table(heads, rows, prose=True, breaks=TERMS)
+
+
+def _unknowns(model: DynamicsModel) -> list[str]:
+    """How many base parameters contain unknowns, and of which links."""
+    count = len(model.unknown_base_parameters)
+    if not count:
+        return []
+    rows = zip(model.mechanism.joints, model.mechanism.parameters, strict=True)
+    links = [joint.link_name for joint, row in rows if any(map(math.isnan, row))]
+    return [f"{count} of {model.l} base parameters contain unknown parameters of {listed(links)}"]
 
 
 def _snapping(model: DynamicsModel) -> list[str]:

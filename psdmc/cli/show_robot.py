@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 
 from psdmc.cli.show import followed, position_range
-from psdmc.cli.tables import Table, print_line, print_table
+from psdmc.cli.tables import Table, print_line, print_note, print_table
 from psdmc.errors import InputError
 from psdmc.robot.coordinates import leaders
 from psdmc.robot.derivable import require_derivable
@@ -21,7 +22,7 @@ def print_mechanism(found: Mechanism) -> None:
     print_table(_bodies(found))
     print()
     for note in found.notes:
-        print_line(f"note: {note}")
+        print_note(note)
     refused = why_not_derived(found)
     if refused is not None:
         print_line(f"not derived as a whole: {refused}")
@@ -52,7 +53,7 @@ def _bodies(found: Mechanism) -> Table:
                 joint.type.word,
                 followed(found, i),
                 position_range(limits.lower, limits.upper, joint.type.position_unit),
-                f"{found.parameters[i, 0]:.6g} kg",
+                "unknown" if math.isnan(found.parameters[i, 0]) else f"{found.parameters[i, 0]:.6g} kg",
             )
         )
     return Table(("joint", "link", "hangs on", "type", "q", "position", "mass"), rows)

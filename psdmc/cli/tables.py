@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from rich.cells import cell_len
 
 from psdmc.cli.one_line import one_line
+from psdmc.robot.missing_inertia import WARNING
 
 PLAIN_WIDTH = 80
 """Columns where the output is no terminal, and where a terminal does not say how wide it is."""
@@ -55,6 +56,11 @@ def print_table(table: Table) -> None:
         head, *body = lines(piece, line_width())
         print(f"{BOLD}{head}{PLAIN}" if bold else head)
         print("\n".join(body))
+
+
+def print_note(note: str) -> None:
+    """Print a note, or what begins with "warning: ", in one line."""
+    print_line(note if note.startswith(WARNING) else f"note: {note}")
 
 
 def print_line(text: str) -> None:

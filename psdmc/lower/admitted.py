@@ -13,6 +13,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix
 from psdmc.model.standard_parameters import lack_of_standard_parameters
 from psdmc.recipes.recipe import Needs
+from psdmc.robot.missing_inertia import idle_joints, massless_words, unknown_option
 
 REMEDY = {
     Needs.POSITIVE_MASS: "correct the inertias, or calibrate with physical consistency",
@@ -28,9 +29,10 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
         need = RECIPES[name].needs
         others = ",".join(other for other in names if other not in lacking)
         leave = f"; or leave it out: --functions {others}" if others else ""
-        raise InputError(
-            f"{model.mechanism.name}: no {name}: {reason}", f"{REMEDY[need] if need else ''}{leave}"
-        )
+        chain, remedy = model.mechanism, REMEDY[need] if need else ""
+        if need is Needs.POSITIVE_MASS and chain.massless and idle_joints(chain):
+            remedy = f"add <inertial>, or derive with {unknown_option(chain)}"
+        raise InputError(f"{chain.name}: no {name}: {reason}", f"{remedy}{leave}")
 
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -61,6 +63,10 @@ def _lacking(model: DynamicsModel, names: Sequence[str]) -> dict[str, str]:
 
 def _without_positive_mass(model: DynamicsModel) -> str | None:
     """Why there is no forward dynamics; None where there is, or while the parameters are unknown."""
+    chain = model.mechanism
+    idle = idle_joints(chain) if chain.massless else ()
+    if idle:
+        return f"joint {chain.joints[idle[0]].name!r} moves no inertia, as {massless_words(chain)}"
     mass = check_mass_matrix(model)
     return None if mass is None or mass.passed else mass.reason
 

@@ -60,6 +60,7 @@ def chain_to_json(chain: Mechanism) -> dict[str, Any]:
             },
             "notes": list(chain.notes),
         }
+        | ({"massless": list(chain.massless)} if chain.massless else {})
         | _frames_to_json(chain)
         | _tree_to_json(chain)
     )
@@ -156,8 +157,15 @@ def chain_from_json(data: object) -> Mechanism:
             text(note, "a note") for note in entries(part(data, "notes", "the chain"), "notes", MOST_NOTES)
         ),
         frames=tuple(_frame_from_json(frame, len(listed)) for frame in _frames(data)),
+        massless=_massless(data, len(listed)),
         **_tree_from_json(data, len(listed)),
     )
+
+
+def _massless(data: object, n: int) -> tuple[str, ...]:
+    """Links' names; empty in files of earlier versions."""
+    found = data.get("massless", []) if isinstance(data, dict) else []
+    return tuple(text(name, "a massless link's name") for name in entries(found, "massless links", n))
 
 
 def _parameters(rows: object, n: int) -> Array:

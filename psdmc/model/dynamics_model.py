@@ -168,6 +168,24 @@ class DynamicsModel(Answers):
             )
         return self.theta_b
 
+    @property
+    def unknown_base_parameters(self) -> tuple[int, ...]:
+        """Indices of the base parameters that contain an unknown standard parameter; none where theta_b is known."""
+        if self.theta_b is not None:
+            return ()
+        is_unknown = np.isnan(self.mechanism.parameters.reshape(-1))
+        return tuple(k for k, row in enumerate(self.B) if np.any(row[is_unknown]))
+
+    @property
+    def file_theta_b(self) -> Array | None:
+        """(l,) theta_b; while it is unknown what links of known inertia add to it, None where there is no such link."""
+        if self.theta_b is not None:
+            return self.theta_b
+        known = self.mechanism.known_parameters
+        if not np.isnan(self.mechanism.parameters).any() or not known.any():
+            return None
+        return np.asarray(times(self.B, known.reshape(-1)))
+
     def standard_parameters(self) -> Array:
         """(11n,) standard parameters that have the model's theta_b: `representative @ theta_b`, one choice of many."""
         found: Array = times(self.representative, self.known_theta_b())
@@ -221,8 +239,12 @@ class DynamicsModel(Answers):
 
     @property
     def base_parameters(self) -> BaseParameters:
-        """Equation, unit and value of each entry of theta_b: a tuple, and `to_frame()` for pandas, `to_latex()`."""
-        return BaseParameters(equations.base_parameters(self.mechanism, self.B, self.pivots, self.theta_b))
+        """Equation, unit and value (None while unknown) of each entry of theta_b: a tuple, and `to_frame()` for pandas,
+        `to_latex()`."""
+        unknown, known = self.unknown_base_parameters, self.file_theta_b
+        values = [None] * self.l if known is None else known.tolist()
+        shown = [None if k in unknown else value for k, value in enumerate(values)]
+        return BaseParameters(equations.base_parameters(self.mechanism, self.B, self.pivots, shown))
 
     def to_latex(self) -> str:
         """The base parameters' equations with values and units, as an `aligned` environment of amsmath: entries of theta_b

@@ -60,16 +60,15 @@ class _Known:
 
 
 def base_parameters(
-    chain: Mechanism, B: Array, pivots: Sequence[int], theta_b: Array | None
+    chain: Mechanism, B: Array, pivots: Sequence[int], values: Sequence[float | None]
 ) -> tuple[BaseParameter, ...]:
     """Equation, unit and value of each entry of theta_b.
 
     B        (l, 11n)  theta_b = B @ x
     pivots   l, the standard parameter (index into x) that stands first in each equation
-    theta_b  (l,) or None while unknown
+    values   l, None while unknown
     """
     known = list(_known_numbers(dh_lengths(chain)))
-    values = [None] * len(B) if theta_b is None else theta_b.tolist()
     return tuple(
         _base_parameter(_terms(row, pivot, chain, known), _unit(pivot, chain), value)
         for row, pivot, value in zip(B, pivots, values, strict=True)

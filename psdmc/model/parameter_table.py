@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -15,11 +16,21 @@ if TYPE_CHECKING:
 LINES = 12
 """Most lines of a repr."""
 
+LABEL = 40
+"""Most characters of an equation in a label, but for its first term."""
+
+BETWEEN_TERMS = re.compile(r" (?=[-+] )")
+
 
 class BaseParameters(tuple[BaseParameter, ...]):
     """The entries of theta_b in order: a tuple that shows itself as a table."""
 
     __slots__ = ()
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Each one's number from 0 and equation, such as 'theta_b[7] Izz2 + a2 mx2': at most LABEL characters of it."""
+        return tuple(f"theta_b[{k}] {_first_terms(parameter.equation)}" for k, parameter in enumerate(self))
 
     def to_frame(self) -> pd.DataFrame:
         """A pandas data frame: index theta_b (0 to l - 1), columns equation, value (NaN while unknown), unit.
@@ -59,6 +70,16 @@ class BaseParameters(tuple[BaseParameter, ...]):
 
     def _repr_latex_(self) -> str:
         return f"$$\n{self.to_latex()}\n$$"
+
+
+def _first_terms(equation: str) -> str:
+    """An equation, or as many of its terms as a label has room for."""
+    first, *others = BETWEEN_TERMS.split(equation)
+    for term in others:
+        if len(first) + len(term) > LABEL:
+            return f"{first} + ..."
+        first = f"{first} {term}"
+    return first
 
 
 def value_text(parameter: BaseParameter) -> str:

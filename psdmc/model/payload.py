@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -153,6 +154,11 @@ def _check_admitted(chain: Mechanism, load: Array, body: int) -> None:
     missed = np.abs(x - span @ x[leads]).max()
     if missed > SPAN_TOLERANCE * np.abs(x).max(initial=0.0):
         link = chain.joints[body].link_name
+        if link in chain.massless:
+            raise InputError(
+                f"link {limits.shown(link)} cannot carry this load: without <inertial> the model treats it as massless",
+                f"add <inertial>; or derive again with --unknown {shlex.quote(link)}, and calibrate",
+            )
         raise InputError(
             f"link '{link}' cannot carry this load: the model assumes some of its parameters zero",
             "derive the model again without those assumptions",

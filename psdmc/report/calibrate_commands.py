@@ -26,7 +26,7 @@ from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.load import load
+from psdmc.model.load import load, model_of
 from psdmc.model.store import save
 from psdmc.progress import Progress, silent
 from psdmc.report.calibrate_plots import excitation_figure
@@ -71,7 +71,7 @@ def simulate_command(
 
 
 def calibrate_command(
-    model: str | Path,
+    model: DynamicsModel | str | Path,
     sources: Sequence[str | Path],
     output: str | Path,
     report: str | Path | None = None,
@@ -85,7 +85,7 @@ def calibrate_command(
     loaded: Sequence[str | Path] = (),
     load_on: str | None = None,
 ) -> Calibration:
-    """Calibrate a model file from a campaign or from logs.
+    """Calibrate a model, or its file, from a campaign or from logs.
 
     output     the calibrated model file, which emit-c takes
     report     an HTML page, with the numbers as JSON beside it
@@ -95,7 +95,7 @@ def calibrate_command(
     validation  plain logs that are held out as a whole
     naming     topic and joint names of plain logs
     """
-    known = load(model)
+    known = model_of(model)
     record = calibrate(
         known,
         list(sources),

@@ -36,6 +36,7 @@ class Draft:
     drives         n flags: the file makes this joint's drive inertia a parameter
     gravity        (3,) m/s^2 in the base frame
     frames         named frames; empty: the tip alone
+    massless       moving links without inertia in the file, which is read as none
     parents, tip_body, coordinates   as in Mechanism; left out: those of a serial chain
     """
 
@@ -55,6 +56,7 @@ class Draft:
     parents: tuple[int, ...] = ()
     tip_body: int = ON_BASE
     coordinates: tuple[Coordinate, ...] = ()
+    massless: tuple[str, ...] = ()
 
     @property
     def tip_frame(self) -> NamedFrame:

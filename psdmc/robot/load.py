@@ -18,6 +18,7 @@ from psdmc.robot.file_kinds import SourceFormat, as_source
 from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
+from psdmc.robot.missing_inertia import with_massless_warning
 from psdmc.robot.ros_packages import checked_packages
 from psdmc.robot.source_words import with_source_words
 from psdmc.robot.tool import TOOL, tool_frame
@@ -72,6 +73,7 @@ def load_robot(
     root: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
     packages: Mapping[str, str | PathLike[str]] | None = None,
+    unknown: Sequence[str] = (),
 ) -> LoadedRobot:
     """The robot in a URDF, MJCF, xacro or DH TOML file (told apart by the suffixes .toml and .xacro, and by the root
     element). Options as in LoadOptions; `packages` are folders of ROS packages, by name, that a xacro file may look for.
@@ -81,7 +83,19 @@ def load_robot(
     file = Path(path)
     text = robot_text(file)
     options = checked_options(
-        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating, root, xacro_args
+        base,
+        tip,
+        gravity,
+        drive_inertia,
+        assume_zero,
+        snap,
+        frames,
+        tool,
+        lock,
+        floating,
+        root,
+        xacro_args,
+        unknown,
     )
     text, source_format, options = as_source(file, text, options, checked_packages(packages))
     _refuse_size(len(text.encode(errors="replace")), file.name)
@@ -105,11 +119,24 @@ def load_robot_text(
     floating: bool = False,
     root: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
+    unknown: Sequence[str] = (),
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
     options = checked_options(
-        base, tip, gravity, drive_inertia, assume_zero, snap, frames, tool, lock, floating, root, xacro_args
+        base,
+        tip,
+        gravity,
+        drive_inertia,
+        assume_zero,
+        snap,
+        frames,
+        tool,
+        lock,
+        floating,
+        root,
+        xacro_args,
+        unknown,
     )
     return _loaded(text, source_format, source_name, options)
 
@@ -160,6 +187,7 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
             options.frames,
             options.lock,
             options.floating,
+            options.unknown,
         )
         return with_source_words(draft, text, source)
     if options.base is not None or options.tip is not None:
@@ -169,6 +197,10 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
     if options.floating:
         raise InputError(
             f"{source}: --floating frees the root link of a URDF", "a DH table's base stands: leave it out"
+        )
+    if options.unknown:
+        raise InputError(
+            f"{source}: --unknown names links of a URDF", "in a DH table leave out what is unknown of a link"
         )
     return dh_draft(text, source, gravity, options.snap, options.frames)
 
@@ -187,7 +219,7 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         link_values(np.append(x[:DRIVE], drive or 0.0), zero)
         for x, drive, zero in zip(draft.parameters, given, zeros, strict=True)
     ]
-    return Mechanism(
+    mechanism = Mechanism(
         name=draft.name,
         convention=draft.convention,
         base_name=draft.base_name,
@@ -202,7 +234,9 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         parents=draft.parents,
         tip_body=draft.tip_body,
         coordinates=draft.coordinates,
+        massless=draft.massless,
     )
+    return with_massless_warning(mechanism)
 
 
 def _frames(draft: Draft, options: LoadOptions, source: str) -> tuple[NamedFrame, ...]:
@@ -249,7 +283,8 @@ def _zero_notes(draft: Draft, said: Sequence[Sequence[str]], values: Sequence[Ar
     for joint, own, more, before, after in zip(
         draft.joints, draft.zeros, said, draft.parameters, values, strict=True
     ):
-        names = list(dict.fromkeys((*own, *more)))
+        stated = () if joint.link_name in draft.massless else own
+        names = list(dict.fromkeys((*stated, *more)))
         if not names:
             continue
         size = np.nanmax(np.abs(before[:DRIVE]), initial=0.0)

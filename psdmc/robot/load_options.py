@@ -14,7 +14,7 @@ from psdmc.robot.limits import shown
 DEFAULT_SNAP = 1e-5
 """rad: pi/2 written as 1.5708 is 3.7e-6 away, pi as 3.1416 is 7.3e-6; no arm is calibrated that finely."""
 
-LATER = ("frames", "tool", "lock", "floating", "root", "xacro_args")
+LATER = ("frames", "tool", "lock", "floating", "root", "xacro_args", "unknown")
 """Options that the first versions did not have."""
 
 MAX_SNAP = 0.1
@@ -36,6 +36,7 @@ class LoadOptions:
     floating       whether the root link of a URDF is on a free joint
     root           the body under an MJCF's world that the robot begins with; None: all of them
     xacro_args     values of a xacro file's arguments
+    unknown        links of a URDF whose inertia is unknown, whatever the file says; "all", or "missing": those without any
     """
 
     base: str | None = None
@@ -50,6 +51,7 @@ class LoadOptions:
     floating: bool = False
     root: str | None = None
     xacro_args: dict[str, str] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Keyword arguments of load_robot_text as plain JSON values. Later options are included only where they are given,
@@ -71,6 +73,7 @@ def checked_options(
     floating: bool = False,
     root: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
+    unknown: Sequence[str] = (),
 ) -> LoadOptions:
     """The options as LoadOptions; InputError names the first that is wrong."""
     for name, value, what in (("base", base, "link"), ("tip", tip, "link"), ("root", root, "body")):
@@ -78,6 +81,10 @@ def checked_options(
             raise InputError(f"{name} is {shown(value)}, expected a {what}'s name", "give a text")
     if not _are_texts_in_order(assume_zero):
         raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
+    if not _are_texts_in_order(unknown):
+        raise InputError(
+            f"unknown is {shown(unknown)}, expected links' names", 'such as ["forearm"], or "all"'
+        )
     if not isinstance(floating, bool):
         raise InputError(f"floating is {shown(floating)}, expected True or False", "the default is False")
     if floating and (base is not None or tip is not None):
@@ -99,6 +106,7 @@ def checked_options(
         floating,
         root,
         _xacro_args(xacro_args),
+        tuple(dict.fromkeys(unknown)),
     )
 
 

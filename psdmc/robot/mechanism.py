@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.robot.coordinates import Coordinate, checked_coordinates, leaders
 from psdmc.robot.joints import JointType
@@ -97,6 +98,7 @@ class Mechanism:
     tip_body         the body that the tip frame is fixed to; left out: the only leaf
     coordinates      n, which coordinate each joint's q follows; left out: each joint its own
     frames           named frames; left out: the tip alone
+    massless         moving links without inertia in the file, which is read as none: they have no parameters
     """
 
     name: str
@@ -113,6 +115,7 @@ class Mechanism:
     tip_body: int = BASE
     coordinates: tuple[Coordinate, ...] = ()
     frames: tuple[NamedFrame, ...] = ()
+    massless: tuple[str, ...] = ()
 
     __reduce__ = made_again
 
@@ -133,6 +136,18 @@ class Mechanism:
         object.__setattr__(self, "frames", tuple(self.frames) or (self.tip_frame,))
         if any(not 0 <= frame.joint < n for frame in self.frames):
             raise ValueError(f"a frame moves with none of the {n} joints")
+
+    @property
+    def has_unknown_body(self) -> NDArray[np.bool_]:
+        """(n,) whether one of a link's ten body parameters is unknown."""
+        return np.asarray(np.isnan(self.parameters[:, :DRIVE]).any(axis=1))
+
+    @property
+    def known_parameters(self) -> Array:
+        """(n, 11) standard parameters, zero in links with an unknown body and for unknown drive inertias."""
+        known = np.nan_to_num(self.parameters)
+        known[self.has_unknown_body, :DRIVE] = 0.0
+        return known
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -34,6 +34,12 @@ NOT_A_NUMBER = "NaN"
 MOST_LISTED = 12
 """Bodies that a message names."""
 
+NO_INERTIA = "mass and inertia of moving bodies must be larger"
+"""What MuJoCo says of a moving body without them."""
+
+LEAST = 2.0**-46
+"""kg, kg m^2: above MuJoCo's mjMINVAL (1e-15), and a number that no file has."""
+
 REASON = 300
 """Characters of MuJoCo's own message that an error repeats."""
 
@@ -90,7 +96,7 @@ def _compiled(mujoco: Any, path: Path, source: str, left_out: Sequence[int] = ()
     """MuJoCo's model without these of the world's own bodies, and notes of what it warned of."""
     try:
         with kept_warnings(mujoco) as said:
-            model = _without(mujoco, path, left_out) if left_out else mujoco.MjModel.from_xml_path(str(path))
+            model = _with_massless(mujoco, path, left_out)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         raise InputError(
@@ -102,10 +108,16 @@ def _compiled(mujoco: Any, path: Path, source: str, left_out: Sequence[int] = ()
     return model, [f"MuJoCo warns: {text[:REASON]}" for text in said]
 
 
-def _without(mujoco: Any, path: Path, left_out: Sequence[int]) -> Any:
-    """The file's model without some bodies, with all that is about them; keyframes would have too many numbers."""
+def _without(mujoco: Any, path: Path, left_out: Sequence[int], least: float = 0.0) -> Any:
+    """The file's model without some bodies, with all that is about them; keyframes would have too many numbers.
+
+    least   kg, kg m^2, what moving bodies without inertia get
+    """
     spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.boundmass = spec.compiler.boundinertia = least
     whole = spec.compile()
+    if not left_out:
+        return whole
     roots = [b for b in range(1, whole.nbody) if whole.body_parentid[b] == 0]
     gone = [body for b, body in zip(roots, list(spec.worldbody.bodies), strict=True) if b in left_out]
     for element in [*spec.keys, *gone]:
@@ -146,6 +158,26 @@ def _other_roots(mujoco: Any, model: Any, names: Names, root: str, source: str) 
             f"{source}: --root needs a newer MuJoCo than {mujoco.__version__}", "pip install --upgrade mujoco"
         )
     return [b for b in roots if names.body(b) != root]
+
+
+def _with_massless(mujoco: Any, path: Path, left_out: Sequence[int]) -> Any:
+    """The compiled file without some bodies. MuJoCo refuses moving bodies without inertia: for the compiler those get the
+    least that it takes, which is taken away again. ValueError where MuJoCo refuses the file for another reason."""
+    try:
+        if left_out:
+            return _without(mujoco, path, left_out)
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as refused:
+        if NO_INERTIA not in str(refused) or not hasattr(mujoco, "MjSpec"):
+            raise
+        model = _without(mujoco, path, left_out, LEAST)
+        bare, least = model.body_mass == LEAST, model.body_inertia == LEAST
+        if (
+            least.any(axis=1) & ~bare
+        ).any():  # mass in a point, or none about an axis, which psdmc takes from nobody
+            raise
+        model.body_mass[bare], model.body_inertia[bare] = 0.0, 0.0
+        return model
 
 
 def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None:

@@ -16,6 +16,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.limits import TINIEST
 from psdmc.robot.mjcf_faults import Follows
 from psdmc.robot.mjcf_kept import kept_tree
@@ -42,11 +43,15 @@ class _Writer:
     joints: set[str] = field(default_factory=set)
 
     def link(self, name: str, body: int | None = None) -> None:
-        """A link; with the inertia of a body where it has one."""
+        """A link with the inertia of a body, if that has one; without a body it is between two joints, and has zero."""
         element = SubElement(self.root, "link", name=name)
-        if body is None or not (self.model.body_mass[body] > 0.0 or self.model.body_inertia[body].any()):
+        if body is not None and not (self.model.body_mass[body] > 0.0 or self.model.body_inertia[body].any()):
             return
         inertial = SubElement(element, "inertial")
+        if body is None:
+            SubElement(inertial, "mass", value="0")
+            SubElement(inertial, "inertia", {f"i{name}": "0" for name in INERTIA_NAMES})
+            return
         _origin(inertial, self.model.body_ipos[body], self.model.body_iquat[body])
         SubElement(inertial, "mass", value=_number(self.model.body_mass[body]))
         xx, yy, zz = self.model.body_inertia[body]

@@ -47,12 +47,17 @@ def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
 
 def merged_onto(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[Array]:
     """Merged parameters as above for any movable joints; all others are locked at neutral."""
+    return [without_noise(_merged(robot, body)) for body in bodies_of(robot, movable)]
+
+
+def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, Placement]]:
+    """The links that move with each of these joints alone, by their places in its child link's frame, which come first."""
     below: dict[str, list[tuple[str, Placement]]] = {}
     moves = {joint.name for joint in movable}
     for joint in robot.joints:
         if joint.name not in moves:
             below.setdefault(joint.parent, []).append((joint.child, place_of(joint)))
-    return [without_noise(_with_all_below(robot, joint.child, below)) for joint in movable]
+    return [_with_all_below(joint.child, below) for joint in movable]
 
 
 def body_parameters(body: UrdfInertial | None, place: Placement) -> Array:
@@ -91,14 +96,22 @@ def hold_against_pinocchio(
         _compare(own, body, joint.child, "all that moves with it", source)
 
 
-def _with_all_below(robot: UrdfRobot, link: str, below: dict[str, list[tuple[str, Placement]]]) -> Array:
-    """(10,) the link's body and those of all links that hang on it, about the link's frame."""
-    total = np.zeros(10)
+def _with_all_below(link: str, below: dict[str, list[tuple[str, Placement]]]) -> dict[str, Placement]:
+    """The link and all links that hang on it, each with its place in the link's frame."""
+    places: dict[str, Placement] = {}
     queue = [(link, Placement.identity())]
     while queue:
         name, place = queue.pop()
-        total = total + body_parameters(robot.inertials[name], place)
+        places[name] = place
         queue += [(child, place @ origin) for child, origin in reversed(below.get(name, []))]
+    return places
+
+
+def _merged(robot: UrdfRobot, body: Mapping[str, Placement]) -> Array:
+    """(10,) standard parameters of links together."""
+    total = np.zeros(10)
+    for name, place in body.items():
+        total = total + body_parameters(robot.inertials[name], place)
     return total
 
 

@@ -17,6 +17,7 @@ from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
 from psdmc.robot.mimic import mimic_coordinates
+from psdmc.robot.missing_inertia import judged_bodies
 from psdmc.robot.right_angles import coarse_right_angles
 from psdmc.robot.snap import (
     ROUNDING,
@@ -50,10 +51,11 @@ def urdf_draft(
     frames: Sequence[str] = (),
     lock: Mapping[str, float] = NO_LOCK,
     floating: bool = False,
+    unknown: Sequence[str] = (),
 ) -> Draft:
     """The chain from base to tip, or the whole tree (find_route); gravity in the root frame; rotations near exact ones
     snapped (rad); the links `frames` as named frames, a tree's ends where none are named; the joints `lock` held;
-    `floating`: the root link on a free joint."""
+    `floating`: the root link on a free joint; `unknown`: links whose inertia is unknown, whatever the file says."""
     read = read_urdf(text, source)
     robot = locked(read, lock, source)
     if floating:
@@ -64,15 +66,15 @@ def urdf_draft(
     root_gravity = np.array(STANDARD_GRAVITY) if gravity is None else gravity
     bodies = merged_parameters(robot, route)
     hold_against_pinocchio(robot, route, bodies, text, source, held_positions(read, lock, source))
-    bare = [joint.link_name for joint, x in zip(placed.joints, bodies, strict=True) if not x.any()]
+    found = judged_bodies(robot, route, bodies, unknown, source)
     return Draft(
         name=robot.name,
         convention="urdf",
         base_name=route.base,
         tip_name=route.tip,
         joints=placed.joints,
-        parameters=tuple(np.append(x, 0.0) for x in bodies),
-        zeros=tuple(("m",) if joint.link_name in bare else () for joint in placed.joints),
+        parameters=found.parameters,
+        zeros=found.zeros,
         drives=(False,) * len(placed.joints),
         gravity=times(base_rotation.T, root_gravity) + 0.0,
         tip=placed.tip.placement,
@@ -80,7 +82,7 @@ def urdf_draft(
         notes=(
             *robot.notes,
             *route.notes,
-            *(f"link '{link}' has no inertia: none assumed" for link in bare),
+            *found.notes,
             *_of_several_coordinates(route),
             *_unmodelled(route),
             *coarse_right_angles(
@@ -92,6 +94,7 @@ def urdf_draft(
         parents=placed.parents,
         tip_body=placed.tip.joint,
         coordinates=mimic_coordinates(route.movable, robot.joints, source),
+        massless=found.massless,
     )
 
 

@@ -104,7 +104,7 @@ def test_lengths_whose_squares_are_no_doubles_have_no_name() -> None:
     def first_equation(robot: Mechanism, length: float) -> str:
         B = np.eye(l)
         B[0, 1] = 1.0 / length
-        return base_parameters(robot, B, range(l), None)[0].equation
+        return base_parameters(robot, B, range(l), [None] * l)[0].equation
 
     assert first_equation(chain, 1.2) == "m1 + mx1/a1"
     assert first_equation(found, 1e-200) == "m1 + 1e+200 mx1"

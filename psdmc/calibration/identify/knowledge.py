@@ -69,17 +69,23 @@ def knowledge_of(
     require_none(faults, where, HINT)
     found = dict(bodies.confidence)
     if stated is not None:
-        links = enumerate(model.mechanism.parameters)
-        found = {k: found.get(k, body_confidence(link, stated)) for k, link in links}
-    if found:
-        _require_values(model)
+        unknown = model.mechanism.has_unknown_body
+        for k, link in enumerate(model.mechanism.parameters):
+            if not unknown[k]:
+                found.setdefault(k, body_confidence(link, stated))
+    if found or stated is not None:
+        _require_values(model, found)
     return Knowledge(found, bodies.bounds(), wanted)
 
 
-def _require_values(model: DynamicsModel) -> None:
-    if model.theta_b is None:
+def _require_values(model: DynamicsModel, confidence: Mapping[int, Confidence]) -> None:
+    """InputError where confidence in a link's values is stated and the file does not give them."""
+    unknown = model.mechanism.has_unknown_body
+    names = [model.mechanism.joints[k].link_name for k in confidence if unknown[k]]
+    if model.file_theta_b is None or (names and model.theta_b is None):
+        lacks = f"the inertia of {listed(names)}" if names else "all inertias"
         raise InputError(
-            f"{model.mechanism.name}: a confidence in the file's values is stated, but it lacks some or all inertias",
+            f"{model.mechanism.name}: a confidence in the file's values is stated, but it lacks {lacks}",
             "leave the confidence out, or give masses and inertias in the robot's file",
         )
 

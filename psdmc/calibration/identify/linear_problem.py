@@ -28,7 +28,6 @@ class LinearProblem:
 
     rows      of the l + n f + m unknowns, N samples, with what the position sensors' noise alone would make of them
     torque    (N, n)  N m;  held_out (N,)
-    names     l + n f + m  of the unknowns, for messages
     columns   whose m values come last
     """
 
@@ -42,8 +41,8 @@ class LinearProblem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        own = tuple(f"{name} of {joint}" for joint, name in self.plain)
-        return (*(f"theta_{k + 1}" for k in range(self.l)), *own, *self.columns.names)
+        """Of the n f + m unknowns behind the base parameters, for messages."""
+        return (*(f"{name} of {joint}" for joint, name in self.plain), *self.columns.names)
 
     @property
     def plain(self) -> tuple[tuple[str, str], ...]:

@@ -56,7 +56,7 @@ class LoadFit:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return (*LOAD_NAMES, *self.problem.names[LOAD:])
+        return (*LOAD_NAMES, *self.problem.names)
 
     @property
     def never_negative(self) -> NDArray[np.bool_]:

@@ -248,7 +248,7 @@ def _none_such(model: DynamicsModel, theta: Array) -> NoSuchLinks:
         f"{name!r}: no physical links have its theta_b: the nearest that some have changes torques by {distance:.2g} of "
         f"the joints' largest (root of the mean square over {STATES} random states), by up to "
         f"{np.abs(errors[:, joint]).max():.2g} at joint {worst!r} ({largest[joint]:.3g} N m), most of it by "
-        f"theta_{entry + 1} = {near[entry]:.4g} instead of {theta[entry]:.4g}",
+        f"{model.base_parameters.labels[entry]} = {near[entry]:.4g} instead of {theta[entry]:.4g}",
         hint,
         distance,
     )

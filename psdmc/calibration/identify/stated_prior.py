@@ -3,6 +3,7 @@ the data."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,13 +39,19 @@ def body_confidence(link: Array, share: float) -> Confidence:
     return Confidence(share, share * float(np.sqrt(max(np.trace(inertia), 0.0) / (2.0 * mass))), share)
 
 
-def theta_covariance(model: DynamicsModel, stated: dict[int, Confidence]) -> Array:
-    """(l, l) of theta_b, from what is stated of links by number; the others are vaguely known."""
+def theta_covariance(model: DynamicsModel, stated: dict[int, Confidence], scale: Array) -> Array:
+    """(l, l) of theta_b, from what is stated of links by number; the others are vaguely known.
+
+    scale  (l, ...)  how large a base parameter may believably be: all that is known of one that contains unknowns or is zero
+    """
     covariance = np.zeros((PARAMETERS_PER_LINK * len(model.mechanism),) * 2)
-    for k, link in enumerate(model.mechanism.parameters):
+    for k, link in enumerate(model.mechanism.known_parameters):
         own = slice(PARAMETERS_PER_LINK * k, PARAMETERS_PER_LINK * (k + 1))
         covariance[own, own] = _covariance(link, stated.get(k, body_confidence(link, VAGUE)))
-    return np.asarray(model.B @ covariance @ model.B.T)
+    found = np.asarray(model.B @ covariance @ model.B.T)
+    is_open = np.diag(found) == 0.0
+    is_open[list(model.unknown_base_parameters)] = True
+    return found + np.diag(np.where(is_open, VAGUE * scale[: model.l], 0.0) ** 2)
 
 
 def _covariance(link: Array, own: Confidence) -> Array:
@@ -79,10 +86,11 @@ def _about_centre(link: Array) -> Array:
     return np.asarray(inertia - mass * (com @ com * np.eye(3) - np.outer(com, com)))
 
 
-def with_prior(solved: Estimate, theta_b: Array, covariance: Array) -> Estimate:
+def with_prior(solved: Estimate, theta_b: Array, covariance: Array, unknown: Sequence[int] = ()) -> Estimate:
     """The estimate that is likeliest by data and prior together (maximum a posteriori; both normal).
 
     theta_b, covariance   (l,), (l, l)  of the prior of the vector's first l entries
+    unknown               those of them that it does not make known
 
     Hidden directions are kept for what is said of visibility; standard deviations are those of both together.
     """
@@ -96,7 +104,8 @@ def with_prior(solved: Estimate, theta_b: Array, covariance: Array) -> Estimate:
     values = solved.values + np.linalg.solve(both, np.linalg.solve(both.T, pulled))
     inverse = np.linalg.inv(both)
     total = inverse @ inverse.T
-    of_theta = np.arange(m) < l
+    by_file = np.arange(m) < l
+    by_file[list(unknown)] = False
     return replace(
         solved,
         values=values,
@@ -105,5 +114,5 @@ def with_prior(solved: Estimate, theta_b: Array, covariance: Array) -> Estimate:
         total_covariance=total,
         prior_std=0.0,
         whitening=both,
-        identifiable=solved.identifiable | of_theta,
+        identifiable=solved.identifiable | by_file,
     )

@@ -71,15 +71,14 @@ BY_PRIOR = "by the stated prior more than by the data"
 
 
 def as_fitted(
-    seen: Visibility, kept_at: Sequence[str], dropped: NDArray[np.bool_], stated: int
+    seen: Visibility, kept_at: Sequence[str], dropped: NDArray[np.bool_], stated: NDArray[np.bool_]
 ) -> Visibility:
-    """The words of unknowns of which some were dropped, and the first `stated` have a prior of stated confidence."""
+    """The words of unknowns of which some were dropped, and those that are `stated` have a prior of stated confidence."""
     words = [
-        f"{DROPPED}{kept_at[k]}" if dropped[k] else BY_PRIOR if k < stated and not known else word
+        f"{DROPPED}{kept_at[k]}" if dropped[k] else BY_PRIOR if stated[k] and not known else word
         for k, (word, known) in enumerate(zip(seen.words, seen.determined, strict=True))
     ]
-    by_prior = np.arange(len(words)) < stated
-    return Visibility(tuple(words), (seen.determined | by_prior) & ~dropped)
+    return Visibility(tuple(words), (seen.determined | stated) & ~dropped)
 
 
 def _unseen(names: Sequence[str], j: int, share: Array, together: Array, limit: float, kept_at: str) -> str:

@@ -199,7 +199,7 @@ def _indefinite(found: Findings) -> Iterator[str]:
 
 def _unchecked(found: Findings) -> Iterator[str]:
     if found.evidence.model.theta_b is None and not found.record.motors:
-        yield "the file states no inertias: a wrong unit, or all signs turned, would show in friction only"
+        yield "the file lacks inertias: a wrong unit, or all signs turned, would show in friction only"
     turned = [row.joint for row in found.record.motors if row.value < 0]
     if turned:
         yield f"the torque constant is negative at joint(s) {listed(turned)}: current counts against the joint's sense"

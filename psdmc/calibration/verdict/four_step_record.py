@@ -11,7 +11,14 @@ from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.identify.visibility import visibility, visibility_warnings, weak_notes
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.record import Calibration, NumberRow, with_model
-from psdmc.calibration.verdict.record_rows import by_joint, kept_at, motor_rows, parameter_rows, unit_of
+from psdmc.calibration.verdict.record_rows import (
+    by_joint,
+    dropped_links,
+    kept_at,
+    motor_rows,
+    parameter_rows,
+    unit_of,
+)
 from psdmc.model.dynamics_model import DynamicsModel
 
 
@@ -23,7 +30,7 @@ def four_step_record(
     groups = ["inertial"] * model.l
     for k in gravity.split.pivots:
         groups[int(k)] = "gravity"
-    names = [f"theta_{k + 1}" for k in range(model.l)]
+    names = model.base_parameters.labels
     at = kept_at(model, theta_b, inertial.scale)
     seen = visibility(names, theta_b, inertial.std, inertial.unseen / inertial.scale[:, None], at)
     facts = {
@@ -57,7 +64,7 @@ def four_step_record(
             motors=motor_rows(model, found.motors, found.motor),
             friction=_lugre_rows(model, found),
             steps=(),
-            warnings=(*found.warnings, *visibility_warnings("inertial", names, seen)),
+            warnings=(*dropped_links(model), *found.warnings, *visibility_warnings("inertial", names, seen)),
             facts=facts,
             prediction=Prediction("lugre", steps, runs=runs),
             notes=weak_notes("inertial", names, seen),

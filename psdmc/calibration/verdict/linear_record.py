@@ -20,7 +20,14 @@ from psdmc.calibration.identify.visibility import (
 )
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.record import Calibration, NumberRow, with_model
-from psdmc.calibration.verdict.record_rows import by_joint, kept_at, motor_rows, parameter_rows, unit_of
+from psdmc.calibration.verdict.record_rows import (
+    by_joint,
+    dropped_links,
+    kept_at,
+    motor_rows,
+    parameter_rows,
+    unit_of,
+)
 from psdmc.model.dynamics_model import DynamicsModel
 
 
@@ -29,10 +36,13 @@ def linear_record(
 ) -> Calibration:
     """The record of a linear fit with these values of the whole vector, without its quality."""
     problem, solved = found.problem, found.estimate
+    names = (*model.base_parameters.labels, *problem.names)
     at = kept_at(model, values, found.prior.scale)
-    seen = visibility(problem.names, values, solved.std, solved.unseen, at)
+    seen = visibility(names, values, solved.std, solved.unseen, at)
     dropped = np.zeros(len(values), dtype=bool) if found.dropped is None else found.dropped
-    seen = as_fitted(seen, at, dropped, model.l if found.stated else 0)
+    stated = np.arange(len(values)) < (model.l if found.stated else 0)
+    stated[list(model.unknown_base_parameters)] = False
+    seen = as_fitted(seen, at, dropped, stated)
     facts = {
         "rank": solved.rank,
         "unknowns": len(values),
@@ -67,7 +77,11 @@ def linear_record(
             friction=(*friction, *_chosen(extra, ~of_springs)),
             springs=_chosen(extra, of_springs),
             steps=(),
-            warnings=(*found.warnings, *visibility_warnings("linear fit", problem.names, seen)),
+            warnings=(
+                *dropped_links(model),
+                *found.warnings,
+                *visibility_warnings("linear fit", names, seen),
+            ),
             facts=facts,
             prediction=Prediction(
                 "linear",
@@ -78,7 +92,7 @@ def linear_record(
                 coupling=options.coupling,
                 columns=problem.columns.content,
             ),
-            notes=(*_coupled_notes(options), *weak_notes("linear fit", problem.names, seen)),
+            notes=(*_coupled_notes(options), *weak_notes("linear fit", names, seen)),
         ),
         values[: model.l],
     )

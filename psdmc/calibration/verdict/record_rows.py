@@ -11,6 +11,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.record import NumberRow, ParameterRow
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.mechanism import Joint
+from psdmc.robot.missing_inertia import massless_words, unknown_option
 
 MOVED = 1e-6
 """Distance from the prior, in units of what is believable, from which an invisible parameter counts as moved by
@@ -20,13 +21,26 @@ physical consistency."""
 def kept_at(model: DynamicsModel, values: Array, scale: Array) -> list[str]:
     """The value that each unseen parameter is kept at, in words: friction at zero, theta_b at the file's."""
     prior = np.zeros(len(values))
-    prior[: model.l] = 0.0 if model.theta_b is None else model.theta_b
-    names = ["zero" if model.theta_b is None else "the file's value"] * model.l
+    known, unknown = model.file_theta_b, model.unknown_base_parameters
+    prior[: model.l] = 0.0 if known is None else known
+    words = ["the known links' part" if k in unknown else "the file's value" for k in range(model.l)]
+    names = ["zero"] * model.l if known is None else words
     names += ["zero"] * (len(values) - model.l)
     moved = np.abs(values - prior) > MOVED * scale
     return [
         f"the physical value nearest to {name}" if m else name for name, m in zip(names, moved, strict=True)
     ]
+
+
+def dropped_links(model: DynamicsModel) -> tuple[str, ...]:
+    """A sentence on links without inertia in the file, which the model has no parameters for."""
+    chain = model.mechanism
+    if not chain.massless:
+        return ()
+    return (
+        f"{massless_words(chain)}, so the model has no parameters to calibrate there; derive it again with "
+        f"{unknown_option(chain)}",
+    )
 
 
 def unit_of(joint: Joint, turning: str) -> str:
@@ -45,7 +59,7 @@ def parameter_rows(
     """One row for each base parameter: theta and std (l,), the group of each, and what the data show of it."""
     return tuple(
         ParameterRow(
-            name=f"theta_{k + 1}",
+            name=f"theta_b[{k}]",
             group=groups[k],
             value=float(theta[k]),
             std=float(std[k]) if seen.determined[k] else float("inf"),
@@ -53,7 +67,7 @@ def parameter_rows(
             equation=parameter.equation,
             identifiable=seen.words[k] == IDENTIFIED,
             visibility=seen.words[k],
-            file=None if model.theta_b is None else float(model.theta_b[k]),
+            file=parameter.value,
         )
         for k, parameter in enumerate(model.base_parameters)
     )

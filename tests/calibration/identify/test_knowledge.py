@@ -66,7 +66,7 @@ def test_theta_s_prior_is_what_samples_of_bodies_scatter_by() -> None:
             )
             x[k, 10] *= 1 + own.inertia * rng.normal()
         drawn.append(model.B @ x.reshape(-1))
-    scatter, covariance = np.cov(np.array(drawn).T), theta_covariance(model, stated)
+    scatter, covariance = np.cov(np.array(drawn).T), theta_covariance(model, stated, np.ones(model.l))
     size = np.sqrt(np.diag(covariance))
     assert np.abs((scatter - covariance) / np.outer(size, size)).max() < 0.05
 
@@ -187,7 +187,7 @@ def test_what_is_wrong_is_named(arm, tables: dict[str, Any], said: str) -> None:
 
 
 def test_confidence_in_values_that_are_not_there_is_refused(arm, log: Log) -> None:
-    with pytest.raises(InputError, match="lacks some or all inertias"):
+    with pytest.raises(InputError, match="but it lacks all inertias"):
         calibrated(arm, log, known=False, prior_confidence=0.1)
 
 

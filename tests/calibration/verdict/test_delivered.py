@@ -211,7 +211,7 @@ def test_a_campaign_that_shows_little_keeps_the_files_values(
     assert "the file's value" in elbow_drive.visibility
     assert np.isinf(elbow_drive.std)
     assert record.parameters[2].identifiable
-    assert any("theta_7: not visible" in warning for warning in record.warnings)
+    assert any("theta_b[6] Im2: not visible" in warning for warning in record.warnings)
     require_delivered(record, poor, tmp_path, capsys)
     require_package(record, tmp_path)
 

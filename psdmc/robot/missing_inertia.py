@@ -1,0 +1,127 @@
+"""Moving links without inertia in a URDF: massless, as the standard says, or unknown where a user or the whole file says so.
+
+A body is a link with all that is fixed to it, so that frames without inertia do not count.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psdmc.errors import InputError
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, Array, Mechanism, Placement
+from psdmc.robot.tree import Route, listed
+from psdmc.robot.urdf import UrdfRobot
+from psdmc.robot.urdf_bodies import bodies_of
+
+ALL = "all"
+MISSING = "missing"
+"""Words of --unknown: every moving link, and those without inertia in the file."""
+
+MOST_NAMED = 3
+"""Links that a warning names."""
+
+WARNING = "warning: "
+"""How a note begins that is a warning."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedBodies:
+    """The bodies of n moving links.
+
+    parameters  n (11,), NaN where unknown
+    zeros       n names assumed zero: the mass of those without inertia
+    massless    links without inertia in the file, which is read as none
+    """
+
+    parameters: tuple[Array, ...]
+    zeros: tuple[tuple[str, ...], ...]
+    massless: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def judged_bodies(
+    robot: UrdfRobot, route: Route, merged: Sequence[Array], unknown: Sequence[str], source: str
+) -> JudgedBodies:
+    """The bodies (10,) of a route's movable joints, those that `unknown` names or the whole file lacks made unknown.
+
+    InputError where `unknown` names a link that does not move.
+    """
+    bodies = bodies_of(robot, route.movable)
+    bare = [all(robot.inertials[link] is None for link in body) for body in bodies]
+    is_unknown = _unknown(bodies, bare, unknown, source)
+    notes: tuple[str, ...] = ()
+    if any(bare) and not any(is_unknown) and not any(x.any() for x in merged):
+        is_unknown, notes = (
+            bare,
+            ("no moving link has <inertial>: all their inertial parameters are unknown",),
+        )
+    rows = list(zip(route.movable, merged, bare, is_unknown, strict=True))
+    return JudgedBodies(
+        parameters=tuple(
+            np.append(np.full(BODY_PARAMETERS, np.nan) if open_ else x, 0.0) for _, x, _, open_ in rows
+        ),
+        zeros=tuple(("m",) if not (open_ or x.any()) else () for _, x, _, open_ in rows),
+        massless=tuple(joint.child for joint, _, is_bare, open_ in rows if is_bare and not open_),
+        notes=notes,
+    )
+
+
+def _unknown(
+    bodies: Sequence[Mapping[str, Placement]], bare: Sequence[bool], words: Sequence[str], source: str
+) -> list[bool]:
+    """Which bodies the words name, by any of their links."""
+    moving = [link for body in bodies for link in body]
+    strange = [word for word in words if word not in (ALL, MISSING, *moving)]
+    if strange:
+        raise InputError(
+            f"{source}: link {shown(strange[0])}, to be unknown, does not move or does not exist",
+            f"moving links: {listed(moving)}; or {ALL}, or {MISSING}",
+        )
+    return [
+        any(word in (ALL, *body) or (word == MISSING and is_bare) for word in words)
+        for body, is_bare in zip(bodies, bare, strict=True)
+    ]
+
+
+def with_massless_warning(chain: Mechanism) -> Mechanism:
+    """The mechanism with a first note that names massless links, what they make impossible, and the option for them."""
+    if not chain.massless:
+        return chain
+    idle = [chain.joints[i].name for i in idle_joints(chain)]
+    plural, verb = ("", "moves") if len(idle) == 1 else ("s", "move")
+    lost = (
+        f" Joint{plural} {listed(idle, MOST_NAMED)} {verb} no inertia: forward dynamics cannot be generated."
+    )
+    whose = "its" if len(chain.massless) == 1 else "their"
+    note = (
+        f"{WARNING}{massless_words(chain)}: treated as massless.{lost if idle else ''}"
+        f" Add <inertial>, or keep {whose} parameters as unknowns with {unknown_option(chain)}."
+    )
+    return replace(chain, notes=(note, *chain.notes))
+
+
+def massless_words(chain: Mechanism) -> str:
+    """Which links have no inertia in the file: the subject and verb of a sentence."""
+    if len(chain.massless) == 1:
+        return f"link '{chain.massless[0]}' has no <inertial>"
+    return f"{len(chain.massless)} links ({listed(chain.massless, MOST_NAMED)}) have no <inertial>"
+
+
+def unknown_option(chain: Mechanism) -> str:
+    """The option that keeps the parameters of massless links, as a shell takes it."""
+    few = len(chain.massless) <= MOST_NAMED
+    return f"--unknown {shlex.quote(','.join(chain.massless)) if few else MISSING}"
+
+
+def idle_joints(chain: Mechanism) -> tuple[int, ...]:
+    """The joints that move no mass, inertia or drive inertia: with them, or by others that follow them."""
+    leaders = [i if c.leader is None else c.leader for i, c in enumerate(chain.coordinates)]
+    moving = {
+        leaders[i] for body, x in enumerate(chain.parameters) if x[:DRIVE].any() for i in chain.path_to(body)
+    } | {leaders[i] for i, x in enumerate(chain.parameters) if x[DRIVE] != 0.0}
+    return tuple(i for i in chain.own_joints if i not in moving)
