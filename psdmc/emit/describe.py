@@ -26,7 +26,7 @@ def description(
         f"Options: {', '.join(f'{key}={value}' for key, value in option_items(info, options).items())}",
         *_target(options.target),
         "Units: SI. Positions rad (m), rates rad/s (m/s), torques N m (N) for revolute (prismatic) joints.",
-        f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the base frame",
+        f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the {info.base_frame}",
         "",
         "Joints, each behind those that carry it:" if info.is_tree else "Joints, from base to tip:",
         *(f"  {i}  {line}" for i, line in enumerate(_joints(info))),
