@@ -72,7 +72,14 @@ def _in_order(
     what: str, values: Any, array: NDArray[Any], axes: Sequence[str], names: AxisNames
 ) -> NDArray[Any]:
     """The array of a series or data frame with its last axes in the order of the names; any other array as it is."""
-    if not hasattr(values, "to_numpy") or hasattr(values, "dims"):
+    if not hasattr(values, "to_numpy"):
+        return array
+    if hasattr(values, "dims"):
+        if names:
+            raise InputError(
+                f"{what} is a {type(values).__name__}, whose dimensions are not read here",
+                "give .values, with the axes of one state last",
+            )
         return array
     labels = [(word, getattr(values, word)) for word in ("index", "columns") if hasattr(values, word)]
     for k, ((word, own), axis) in enumerate(zip(reversed(labels), reversed(axes), strict=False)):

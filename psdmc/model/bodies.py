@@ -58,7 +58,7 @@ def refuse_outside(chain: Mechanism, vectors: Sequence[Array], who: str) -> None
         names = parameter_names([joint.link_name for joint in chain.joints])
         raise InputError(
             f"{who} what the model assumes zero: {limits.joined([names[k] for k in sorted(excluded)])}",
-            "derive the model again without those assumptions",
+            "derive the model again without those assumptions; drive inertias (Im) by --drive-inertia",
         )
 
 
