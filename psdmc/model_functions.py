@@ -89,7 +89,8 @@ def evaluated(
         )
         for quantity, array in zip(signature.inputs, arrays, strict=True)
     }
-    _admit(model, recipe.name, theta_b is None)
+    if recipe.needs is not None:
+        _admit(model, recipe.name, theta_b is None)
     found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
     outputs = [found[o.name].reshape(lead + tail) for o, tail in zip(signature.outputs, tails, strict=True)]
     if out is not None:
@@ -143,17 +144,15 @@ def _values(
     model: DynamicsModel, recipe: Recipe, theta: Array, given: Mapping[str, Array], sizes: Sizes
 ) -> Mapping[str, Array]:
     """All outputs, (k, ...); NaN in states whose mass matrix is not positive definite, where the function solves it."""
-    robot = RobotOnArrays.of(model, theta)
     count = len(next(iter(given.values()), (None,)))
     zeros = {quantity.name: np.zeros((count, *sizes.shape(quantity.axes))) for quantity in (Q, QD, QDD)}
+    whole = zeros | dict(given)  # references take shapes from any of the three
+    if model.expansion is not None and recipe.name in _FROM_MONOMIALS:
+        motion = [whole[quantity.name] for quantity in (Q, QD, QDD)]
+        (output,) = recipe.signature.outputs
+        return {output.name: _FROM_MONOMIALS[recipe.name](model.expansion, model.mechanism, theta, motion)}
+    robot = RobotOnArrays.of(model, theta)
     if recipe.signature.positive is None:
-        whole = zeros | dict(given)  # references take shapes from any of the three
-        if model.expansion is not None and recipe.name in _FROM_MONOMIALS:
-            states = [whole[quantity.name] for quantity in (Q, QD, QDD)]
-            (output,) = recipe.signature.outputs
-            return {
-                output.name: _FROM_MONOMIALS[recipe.name](model.expansion, model.mechanism, theta, states)
-            }
         return recipe.reference(robot, whole)
     solvable = _solvable(robot, given[Q.name])
     chosen = {name: values[solvable] for name, values in given.items()}
