@@ -40,7 +40,7 @@ def synthetic_log(model: DynamicsModel, rows: int, rate: float) -> Log:
         q += size * np.sin(angle)
         qd += size * w * np.cos(angle)
         qdd -= size * w**2 * np.sin(angle)
-    parameters = model.standard_parameters()
+    parameters = model.equivalent_parameters()
     tau = np.concatenate(
         [
             recursive.torques(model.mechanism, parameters, [part[k : k + AT_ONCE] for part in (q, qd, qdd)])

@@ -132,6 +132,7 @@ def emit_c(
     adapters: Sequence[str] | str = (),
     target: str | Target = NATIVE,
     friction: bool = False,
+    bodies: bool = False,
 ) -> list[str]:
     """Write the model's C package; returns the paths of the files that changed.
 
@@ -153,6 +154,8 @@ def emit_c(
     target     the machine that the package is for, by its name in psdmc.target.presets
     friction   whether the package has a function of the joints' friction; InputError where the model was not calibrated from
                plain logs
+    bodies     whether the package has a function that computes theta_b from all bodies; InputError where the model's
+               assumptions exclude some body's parameter
     """
     model = model_of(model)
     options = _options(lowering, real, trig, target)
@@ -163,7 +166,7 @@ def emit_c(
             "leave --with out, or emit another package for it",
         )
     more = chosen(adapters)
-    package = _package(model, lowering, functions, options, name, progress, payload, more, friction)
+    package = _package(model, lowering, functions, options, name, progress, payload, more, friction, bodies)
     progress("writing")
     return write_package(directory, package_files(package), force)
 
@@ -315,6 +318,7 @@ def _package(
     payload: bool = False,
     adapters: Sequence[str] = (),
     friction: bool = False,
+    bodies: bool = False,
 ) -> PackageView:
     names = wanted(with_needed(wanted(functions, model.mechanism), adapters), model.mechanism)
     require(model, names)
@@ -324,7 +328,7 @@ def _package(
         lambda: lower(model, lowering, names, progress, costs=costs),
     )
     shown: Mapping[str, str] = {"lowering": lowering, "real": options.real, "trig": options.trig}
-    info = package_info(model, name, shown, payload, friction)
+    info = package_info(model, name, shown, payload, friction, bodies)
     references = reference_states(model, names)
     if payload:
         references = replace(references, load=reference_load(model))

@@ -1,4 +1,5 @@
-"""Every generated function of a model in NumPy, by its recipe's reference: slow, and with nothing lowered or compiled.
+"""Every generated function of a model in NumPy, from E, P and theta_b or by its recipe's reference: slow, and with nothing
+lowered or compiled.
 
 Broadcasting, results, refusals and NaN are those of compiled robots.
 """
@@ -6,26 +7,35 @@ Broadcasting, results, refusals and NaN are those of compiled robots.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from psdmc.errors import InputError
 from psdmc.functions import RECIPES, SIGNATURES
 from psdmc.lower.admitted import require
+from psdmc.model import evaluate
 from psdmc.model.answers import Provider
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.expansion import Expansion
 from psdmc.program.signature import QD, QDD, TAU, Q, Signature, Sizes
-from psdmc.real_arrays import real_array
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Recipe
-from psdmc.robot.mechanism import Array
-from psdmc.robot.unit_lengths import refuse_other_lengths, units_of
-from psdmc.toolchain.call_arguments import bound_arguments, signature_of
+from psdmc.robot.mechanism import BASE_FRAME, Array, Mechanism
+from psdmc.robot.unit_lengths import units_of
+from psdmc.toolchain import given_outputs
+from psdmc.toolchain.call_arguments import (
+    RobotAxes,
+    bound_arguments,
+    common_lead,
+    parameters,
+    signature_of,
+    states,
+)
 from psdmc.toolchain.compiled_functions import results
+from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
 from psdmc.toolchain.stubs import documentation
 
 KEPT = 8
@@ -42,12 +52,10 @@ def function_of(model: DynamicsModel, name: str) -> Callable[..., Any]:
     recipe = RECIPES[name]
 
     def function(*given: Any, **named: Any) -> Any:
-        inputs, theta_b, out = bound_arguments(recipe.signature, given, named)
-        if out is not None:
-            raise InputError(f"{name}: out is for compiled robots", "leave it out, or psdmc.compile(model)")
-        return evaluated(model, recipe, inputs, theta_b)
+        return evaluated(model, recipe, *bound_arguments(recipe.signature, given, named))
 
-    function.__name__, function.__doc__ = name, documentation(recipe.signature)
+    meaning = documentation(recipe.signature).replace(BASE_FRAME, model.mechanism.base_frame)
+    function.__name__, function.__doc__ = name, meaning
     function.__signature__ = _without_self(signature_of(recipe.signature))  # type: ignore[attr-defined]
     function.__qualname__ = f"{type(model).__name__}.{name}"
     return function
@@ -58,19 +66,47 @@ def _without_self(signature: inspect.Signature) -> inspect.Signature:
 
 
 def evaluated(
-    model: DynamicsModel, recipe: Recipe, inputs: tuple[ArrayLike, ...], theta_b: ArrayLike | None = None
+    model: DynamicsModel,
+    recipe: Recipe,
+    inputs: tuple[ArrayLike, ...],
+    theta_b: ArrayLike | None = None,
+    out: Any = None,
 ) -> Any:
-    """The output, or a named tuple of the outputs, of a function at these states."""
+    """The output, or a named tuple of the outputs, of a function at these states; `out`: arrays to write it to."""
     signature = recipe.signature
-    sizes = _sizes(model, recipe)
-    lead, given = _states(signature, sizes, inputs)
-    _refuse_other_lengths(model, signature, given)
-    _admit(model, recipe.name, theta_b is None)
-    theta = _parameters(model, signature, theta_b)
-    robot = RobotOnArrays.of(model, theta)
-    found = _values(recipe, robot, given, sizes)
-    outputs = tuple(found[o.name].reshape(lead + sizes.shape(o.axes)) for o in signature.outputs)
+    axes = _axes(model, recipe)
+    tails = [axes.sizes.shape(output.axes) for output in signature.outputs]
+    if any(map(is_foreign, inputs)):
+        refuse_out(signature, out)
+        return _tuple(
+            signature, foreign(_on_arrays(model, recipe, theta_b), axes, signature, inputs, tails, np.float64)
+        )
+    arrays = states(signature, axes, inputs, np.float64)
+    lead = common_lead(signature, arrays)
+    given = {
+        quantity.name: np.broadcast_to(array, (*lead, *(tail := axes.sizes.shape(quantity.axes)))).reshape(
+            -1, *tail
+        )
+        for quantity, array in zip(signature.inputs, arrays, strict=True)
+    }
+    if recipe.needs is not None:
+        _admit(model, recipe.name, theta_b is None)
+    found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
+    outputs = [found[o.name].reshape(lead + tail) for o, tail in zip(signature.outputs, tails, strict=True)]
+    if out is not None:
+        kept = given_outputs.checked(signature, out, [lead + tail for tail in tails], np.dtype(np.float64))
+        for array, values in zip(kept, outputs, strict=True):
+            array[...] = values
+        outputs = list(kept)
+    return _tuple(signature, outputs)
+
+
+def _tuple(signature: Signature, outputs: Sequence[Any]) -> Any:
     return outputs[0] if len(outputs) == 1 else results(signature)(*outputs)
+
+
+def _on_arrays(model: DynamicsModel, recipe: Recipe, theta_b: ArrayLike | None) -> Callable[..., Any]:
+    return lambda *arrays: evaluated(model, recipe, arrays, theta_b)
 
 
 @lru_cache(2 * KEPT * len(RECIPES))
@@ -80,79 +116,64 @@ def _admit(model: DynamicsModel, name: str, with_own_parameters: bool) -> None:
         require(model, [name])
 
 
-def _refuse_other_lengths(model: DynamicsModel, signature: Signature, given: Mapping[str, Array]) -> None:
-    """InputError where a quaternion, or a cosine with its sine, is not of length one."""
+def _axes(model: DynamicsModel, recipe: Recipe) -> RobotAxes:
     robot = model.mechanism
-    units = units_of(robot.joints[i].type for i in robot.own_joints)
-    for quantity in signature.inputs:
-        if quantity.axes == Q.axes and not signature.normalizes:
-            refuse_other_lengths(f"{signature.name}: {quantity.name}", given[quantity.name], units)
-
-
-def _sizes(model: DynamicsModel, recipe: Recipe) -> Sizes:
-    own = len(model.mechanism.own_joints)
-    kept = len(recipe.packs.places(model.mechanism, model.representative)) if recipe.packs else 0
-    return Sizes(own, model.nq, model.nv, model.l, len(model.mechanism.frames), kept)
+    own = robot.own_joints
+    kept = len(recipe.packs.places(robot, model.representative)) if recipe.packs else 0
+    frames = tuple(frame.name for frame in robot.frames)
+    return RobotAxes(
+        Sizes(len(own), robot.nq, robot.nv, model.l, len(frames), kept),
+        {
+            "n": tuple(robot.joints[i].name for i in own),
+            "nq": robot.q_names,
+            "nv": robot.v_names,
+            "frames": frames,
+        },
+        units_of(robot.joints[i].type for i in own),
+    )
 
 
 def _parameters(model: DynamicsModel, signature: Signature, theta_b: ArrayLike | None) -> Array:
     """theta_b, (l,): the one given, or the model's own, which functions without theta_b do without."""
-    if theta_b is None:
-        return model.known_theta_b() if signature.theta or model.theta_b is not None else np.zeros(model.l)
-    array = real_array(f"{signature.name}: theta_b", theta_b)
-    if array.shape != (model.l,):
-        raise InputError(
-            f"{signature.name}: theta_b has shape {array.shape}, expected ({model.l},)",
-            "give one value per base parameter",
-        )
-    return array
-
-
-def _states(
-    signature: Signature, sizes: Sizes, inputs: tuple[ArrayLike, ...]
-) -> tuple[tuple[int, ...], dict[str, Array]]:
-    """The common leading shape, and each input as (states, ...) under its name."""
-    arrays = {}
-    for quantity, values in zip(signature.inputs, inputs, strict=True):
-        array, tail = real_array(f"{signature.name}: {quantity.name}", values), sizes.shape(quantity.axes)
-        if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:
-            expected = ", ".join(("...", *map(str, tail)))
-            raise InputError(
-                f"{signature.name}: {quantity.name} has shape {array.shape}, expected ({expected})",
-                "the last axes are those of one state",
-            )
-        arrays[quantity.name] = (array, tail)
-    try:
-        lead = np.broadcast_shapes(*(a.shape[: a.ndim - len(tail)] for a, tail in arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, (array, _) in arrays.items())
-        raise InputError(
-            f"{signature.name}: shapes do not broadcast: {shapes}",
-            "give arrays of one shape, or shapes that NumPy broadcasts",
-        ) from None
-    return lead, {
-        name: np.broadcast_to(array, lead + tail).reshape(-1, *tail) for name, (array, tail) in arrays.items()
-    }
+    if theta_b is not None:
+        return parameters(signature, model.l, theta_b, np.float64)
+    return model.known_theta_b() if signature.theta or model.theta_b is not None else np.zeros(model.l)
 
 
 def _values(
-    recipe: Recipe, robot: RobotOnArrays, given: Mapping[str, Array], sizes: Sizes
+    model: DynamicsModel, recipe: Recipe, theta: Array, given: Mapping[str, Array], sizes: Sizes
 ) -> Mapping[str, Array]:
     """All outputs, (k, ...); NaN in states whose mass matrix is not positive definite, where the function solves it."""
     count = len(next(iter(given.values()), (None,)))
     zeros = {quantity.name: np.zeros((count, *sizes.shape(quantity.axes))) for quantity in (Q, QD, QDD)}
+    whole = zeros | dict(given)  # references take shapes from any of the three
+    if model.expansion is not None and recipe.name in _FROM_MONOMIALS:
+        motion = [whole[quantity.name] for quantity in (Q, QD, QDD)]
+        (output,) = recipe.signature.outputs
+        return {output.name: _FROM_MONOMIALS[recipe.name](model.expansion, model.mechanism, theta, motion)}
+    robot = RobotOnArrays.of(model, theta)
     if recipe.signature.positive is None:
-        return recipe.reference(robot, zeros | dict(given))  # references take shapes from any of the three
+        return recipe.reference(robot, whole)
     solvable = _solvable(robot, given[Q.name])
     chosen = {name: values[solvable] for name, values in given.items()}
     if TAU.name in chosen and QDD.name not in chosen:
         chosen[QDD.name] = robot.accelerations(chosen["q"], chosen["qd"], chosen[TAU.name])
     found = recipe.reference(robot, chosen)
-    whole = {}
+    filled = {}
     for output in recipe.signature.outputs:
-        whole[output.name] = np.full((len(solvable), *sizes.shape(output.axes)), np.nan)
-        whole[output.name][solvable] = found[output.name]
-    return whole
+        filled[output.name] = np.full((len(solvable), *sizes.shape(output.axes)), np.nan)
+        filled[output.name][solvable] = found[output.name]
+    return filled
+
+
+_FROM_MONOMIALS: Mapping[str, Callable[[Expansion, Mechanism, Array, list[Array]], Array]] = {
+    **dict.fromkeys(("inverse_dynamics", "nonlinear_effects", "gravity"), evaluate.torques),
+    "mass_matrix": lambda expansion, chain, theta, states: evaluate.mass_matrix(
+        expansion, chain, theta, states[0]
+    ),
+    "regressor": lambda expansion, chain, theta, states: evaluate.regressor(expansion, chain, states),
+}
+"""Functions that E, P and theta_b give directly, from q, qd and qdd."""
 
 
 def _solvable(robot: RobotOnArrays, q: Array) -> NDArray[np.bool_]:

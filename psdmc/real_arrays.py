@@ -1,7 +1,12 @@
-"""Numbers that a caller gives, as arrays of reals; what is none is refused by name."""
+"""Numbers that a caller gives, as arrays of reals; what is none is refused by name.
+
+Data frames are matched with the robot by the names of their columns. They are known by what they offer, so that nothing is
+imported for them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,15 +18,36 @@ _REAL = "biuf"
 """Kinds of dtypes whose values are real numbers: truth values, integers, floats."""
 
 
-def real_array(what: str, values: ArrayLike, dtype: DTypeLike = np.float64) -> NDArray[Any]:
+AxisNames = Mapping[str, Sequence[str]]
+"""Word of an axis, such as nq -> names of what it runs over."""
+
+MOST_NAMES = 12
+"""Names that a message lists."""
+
+_NO_NAMES: AxisNames = {}
+
+
+def real_array(
+    what: str,
+    values: ArrayLike,
+    dtype: DTypeLike = np.float64,
+    axes: Sequence[str] = (),
+    names: AxisNames = _NO_NAMES,
+) -> NDArray[Any]:
     """The values as an array of this dtype, copied only where they are not.
 
-    InputError, beginning with `what`, for complex numbers, texts, dates, and lists that are no array.
+    axes   words of the last axes; labels that a data frame has along these are put in the order of
+    names  what each word's axis runs over
+
+    InputError, beginning with `what`, for complex numbers, texts, dates, masked entries, lists that are no array, and
+    labels that are other names. Integer labels that ascend, as pandas gives by default, are positions.
     """
     if type(values) is np.ndarray and values.dtype == dtype:
         return values
     try:
         array = np.asarray(values)
+        _refuse_masked(what, values)
+        array = _in_order(what, values, array, axes, names)
         if array.dtype.kind == "O":
             array = _of_numbers(array).astype(dtype)
     except (TypeError, ValueError) as error:
@@ -31,6 +57,60 @@ def real_array(what: str, values: ArrayLike, dtype: DTypeLike = np.float64) -> N
     if array.dtype.kind not in _REAL:
         raise InputError(f"{what} has dtype {array.dtype}, expected real numbers", _remedy(array))
     return np.asarray(array, dtype)
+
+
+def _refuse_masked(what: str, values: Any) -> None:
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        count = int(np.ma.getmaskarray(values).sum())
+        raise InputError(
+            f"{what} is a masked array with {count} masked {'entry' if count == 1 else 'entries'}",
+            "fill them with numbers, as .filled(0.0) does, or leave these states out",
+        )
+
+
+def _in_order(
+    what: str, values: Any, array: NDArray[Any], axes: Sequence[str], names: AxisNames
+) -> NDArray[Any]:
+    """The array of a series or data frame with its last axes in the order of the names; any other array as it is."""
+    if not hasattr(values, "to_numpy"):
+        return array
+    if hasattr(values, "dims"):
+        if names:
+            raise InputError(
+                f"{what} is a {type(values).__name__}, whose dimensions are not read here",
+                "give .values, with the axes of one state last",
+            )
+        return array
+    labels = [(word, getattr(values, word)) for word in ("index", "columns") if hasattr(values, word)]
+    for k, ((word, own), axis) in enumerate(zip(reversed(labels), reversed(axes), strict=False)):
+        order = order_of(f"{what} has {word}", list(own), names.get(axis, ()))
+        if order is not None:
+            array = np.take(array, order, axis=-1 - k)
+    return array
+
+
+def order_of(what: str, labels: Sequence[Any], names: Sequence[str]) -> list[int] | None:
+    """The places of the names among the labels; None where the labels are ascending integers: positions.
+
+    InputError, beginning with `what`, where the labels are not the names in any order.
+    """
+    if all(isinstance(label, int | np.integer) for label in labels) and list(labels) == sorted(labels):
+        return None
+    if names and sorted(map(str, labels)) == sorted(names):
+        return [list(map(str, labels)).index(name) for name in names]
+    unknown = [label for label in labels if label not in names]
+    missing = [name for name in names if name not in labels]
+    faults = [f"the robot has no {_listed(unknown)}"] if unknown else []
+    faults += [f"{_listed(missing)} {'is' if len(missing) == 1 else 'are'} missing"] if missing else []
+    raise InputError(
+        f"{what} {_listed(labels)}: {', and '.join(faults) or 'a name is there twice'}",
+        f"the names are {', '.join(names)}" if names else "give .to_numpy(), which is read by position",
+    )
+
+
+def _listed(names: Sequence[Any]) -> str:
+    more = [f"and {len(names) - MOST_NAMES} more"] if len(names) > MOST_NAMES else []
+    return ", ".join([*map(repr, names[:MOST_NAMES]), *more])
 
 
 def _of_numbers(array: NDArray[Any]) -> NDArray[Any]:

@@ -42,6 +42,7 @@ def declarations(package: PackageView) -> str:
     for kernel in package.kernels:
         lines += [prototype.text for prototype in kernel.prototypes.values()]
     lines += [prototype.text for prototype in package.payload.prototypes] if package.payload else []
+    lines += [package.bodies.prototype.text] if package.bodies else []
     lines += [package.friction_prototype.text] if package.info.friction else []
     return "".join(f"{line};\n" for line in lines)
 

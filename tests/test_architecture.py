@@ -99,7 +99,17 @@ ROOMS = {
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
-SHARED = {"errors", "version", "atomic", "reading", "garbage", "processes", "progress", "real_arrays", "reproducible"}
+SHARED = {
+    "errors",
+    "version",
+    "atomic",
+    "reading",
+    "garbage",
+    "processes",
+    "progress",
+    "real_arrays",
+    "reproducible",
+}
 ENTRY_POINTS = {"__init__", "__main__"}
 
 

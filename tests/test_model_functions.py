@@ -3,9 +3,11 @@ values."""
 
 from __future__ import annotations
 
+import ast
 import copy
 import inspect
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -118,6 +120,48 @@ def test_parameters_may_be_given(robot) -> None:
     assert np.allclose(found, robot.coriolis_matrix(q, qd, twice), rtol=LIMIT, atol=LIMIT)
 
 
+OWN = ["inverse_dynamics", "mass_matrix", "nonlinear_effects", "gravity"]
+"""Methods of the model's class; the others are found by name."""
+
+
+@pytest.mark.parametrize("expanded", [True, False])
+@pytest.mark.parametrize("name", OWN)
+def test_the_models_own_methods_take_theta_b_and_out(name: str, expanded: bool) -> None:
+    """Torques are linear in theta_b."""
+    model = bundled_model("scara") if expanded else replace(bundled_model("scara"), expansion=None)
+    given, call = list(states(name, 3).values()), getattr(model, name)
+    kept = np.empty_like(call(*given))
+    assert call(*given, 2.0 * model.theta_b, out=kept) is kept
+    assert np.allclose(kept, 2.0 * call(*given), rtol=1e-12, atol=1e-12)
+    unknown = replace(model, theta_b=None)
+    assert np.array_equal(getattr(unknown, name)(*given, theta_b=model.theta_b), call(*given))
+    with pytest.raises(InputError, match=f"{name}: theta_b has shape"):
+        call(*given, theta_b=[1.0])
+
+
+def shown(signature: inspect.Signature) -> list[tuple[str, object, object]]:
+    """Names, kinds and defaults; not annotations."""
+    return [(p.name, p.kind, p.default) for p in signature.parameters.values()]
+
+
+@pytest.mark.parametrize("name", SIGNATURES)
+def test_a_function_has_one_signature_in_models_robots_and_stubs(robot, name: str) -> None:
+    expected = shown(inspect.signature(getattr(robot, name)))
+    assert shown(inspect.signature(getattr(bundled_model("scara"), name))) == expected
+    of_robots = written("toolchain/call.pyi", "CompiledRobot")[name]
+    own = written("model/dynamics_model.py", "DynamicsModel")
+    of_models = own[name] if name in own else written("model/answers.pyi", "Answers")[name]
+    assert of_robots == of_models == [name for name, *_ in expected]
+
+
+def written(path: str, of: str) -> dict[str, list[str]]:
+    """Arguments of the methods of a class, by the methods' names, without self."""
+    tree = ast.parse((Path(psdmc.__file__).parent / path).read_text(encoding="utf-8"))
+    (found,) = (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == of)
+    methods = (node for node in found.body if isinstance(node, ast.FunctionDef))
+    return {m.name: [a.arg for a in (*m.args.args, *m.args.kwonlyargs)][1:] for m in methods}
+
+
 def test_states_without_solution_are_nan_and_leave_others_alone(robot) -> None:
     """Parameters whose mass matrix is positive definite in some states alone."""
     model, random = bundled_model("scara"), np.random.default_rng(0)
@@ -146,7 +190,7 @@ def test_states_without_solution_are_nan_and_leave_others_alone(robot) -> None:
         (lambda m: m.jacobian(np.zeros(4, complex)), "jacobian: q has dtype complex128"),
         (lambda m: m.coriolis_matrix(np.zeros((3, 4)), np.zeros((2, 4))), r"do not broadcast: q \(3, 4\), qd \(2, 4\)"),
         (lambda m: m.coriolis_matrix(np.zeros(4), np.zeros(4), [1.0]), r"theta_b has shape \(1,\), expected \(8,\)"),
-        (lambda m: m.jacobian(np.zeros(4), out=np.zeros((6, 4))), "out is for compiled robots"),
+        (lambda m: m.jacobian(np.zeros(4), out=np.zeros((6, 3))), r"out for J has shape \(6, 3\), expected \(6, 4\)"),
     ],
 )  # fmt: skip
 def test_wrong_input_is_refused_as_by_compiled_robots(call, message: str) -> None:

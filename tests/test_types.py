@@ -32,6 +32,8 @@ OF_MODELS = [
     *("model.base_parameters", "model.base_parameters[0].equation", "model.base_parameters.to_latex()"),
     *("model.to_latex()", "model.content_hash", "model.inverse_dynamics(q, q, q)", "model.mass_matrix(q)"),
     *("model.certificate", "model.with_payload(1.0, [0, 0, 0.1])", "psdmc.load('m.npz')"),
+    *("model.gravity(q, theta_b=q, out=q)", "model.theta_for(q, q, q)", "model.q_names", "model.link_names"),
+    *("model.gravity(q, theta_b=q, out=q)", "model.theta_for(q, q, q)", "model.q_names", "model.link_names"),
 ]
 OF_ROBOTS = [
     *("robot", "robot.n", "robot.nq", "robot.joint_names", "robot.limits.lower", "robot.theta_b"),

@@ -268,6 +268,9 @@ def emit_c(
     name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
     force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
     payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
+    bodies: Annotated[
+        bool, typer.Option("--bodies", help="also R_theta_from_bodies: theta_b from masses and inertias")
+    ] = False,
     friction: Annotated[
         bool,
         typer.Option("--friction", help="also R_friction: of a model that was calibrated from plain logs"),
@@ -311,6 +314,7 @@ def emit_c(
             names(adapters),
             target,
             friction,
+            bodies,
         )
     print(f"{folder}: {len(changed)} files written" if changed else f"{folder}: nothing changed")
     asked = name or found.mechanism.name

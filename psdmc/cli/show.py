@@ -24,7 +24,7 @@ def print_model(model: DynamicsModel) -> None:
     if calibrated is not None:
         print_calibration(calibrated)
     print_line(f"{found.name}: {found.base} to {found.ends}, {found.convention} frames")
-    print_line(f"gravity {_numbers(found.gravity)} m/s^2 in the base frame")
+    print_line(f"gravity {_numbers(found.gravity)} m/s^2 in the {model.mechanism.base_frame}")
     print("\n".join(_sizes(found)))
     print()
     print_table(_joints(model.mechanism, joint_errors(model.mechanism, found.certificate)))

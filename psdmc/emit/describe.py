@@ -9,6 +9,7 @@ from psdmc.emit.function_view import FunctionView
 from psdmc.emit.info import JointInfo, PackageInfo
 from psdmc.emit.options import EmitOptions
 from psdmc.program.signature import Signature
+from psdmc.robot.mechanism import BASE_FRAME
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 
@@ -20,13 +21,12 @@ def description(
     unescaped."""
     gx, gy, gz = info.gravity
     lines = [
-        f"Robot: {info.name}, "
-        + (f"a tree on {info.base}" if info.is_tree else f"from {info.base} to {info.tip}"),
+        f"Robot: {info.name}, {_extent(info)}",
         f"Model: {info.model_hash or 'not hashed'}",
         f"Options: {', '.join(f'{key}={value}' for key, value in option_items(info, options).items())}",
         *_target(options.target),
         "Units: SI. Positions rad (m), rates rad/s (m/s), torques N m (N) for revolute (prismatic) joints.",
-        f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the base frame",
+        f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the {info.base_frame}",
         "",
         "Joints, each behind those that carry it:" if info.is_tree else "Joints, from base to tip:",
         *(f"  {i}  {line}" for i, line in enumerate(_joints(info))),
@@ -45,6 +45,12 @@ def description(
         lines += ["", "Frames, in the order of every array over them:"]
         lines += [f"  {i}  {name}" for i, name in enumerate(info.frames)]
     return tuple(lines)
+
+
+def _extent(info: PackageInfo) -> str:
+    if info.base_frame != BASE_FRAME:
+        return f"a floating base in the world ({info.base})"
+    return f"a tree on {info.base}" if info.is_tree else f"from {info.base} to {info.tip}"
 
 
 def _arrays(info: PackageInfo) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from psdmc.emit.products import Multiplication
 from psdmc.errors import InternalError
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Signature, Sizes, in_order
+from psdmc.robot.mechanism import BASE_FRAME
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +57,14 @@ class FunctionView:
 
 
 def function_views(
-    kernels: Mapping[str, Kernel], sizes: Sizes, robot: str, options: EmitOptions
+    kernels: Mapping[str, Kernel],
+    sizes: Sizes,
+    robot: str,
+    options: EmitOptions,
+    base_frame: str = BASE_FRAME,
 ) -> tuple[FunctionView, ...]:
-    """The functions that `kernels` hold, in the order of their signatures, whatever the mapping's order."""
+    """The functions that `kernels` hold, in the order of their signatures, whatever the mapping's order. `base_frame`: what
+    their meanings call it."""
     wrong = [name for name, kernel in kernels.items() if name != kernel.name]
     if wrong:
         raise InternalError(f"kernel {wrong[0]!r} is filed under a name that is not its own")
@@ -68,7 +74,8 @@ def function_views(
         own = [kernels[name] for name in (function.name, f"{function.name}_theta") if name in kernels]
         shown = tuple(make_kernel_view(kernel, sizes, robot, options) for kernel in own)
         shape = _shape(function, sizes_of(own[0], sizes))
-        views.append(FunctionView(function.name, function.meaning, shape, function, shown))
+        meaning = function.meaning.replace(BASE_FRAME, base_frame)
+        views.append(FunctionView(function.name, meaning, shape, function, shown))
     return tuple(views)
 
 

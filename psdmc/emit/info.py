@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.emit.bodies import BodiesMap, bodies_map
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
 from psdmc.model.linear_friction import LinearFriction, linear_friction
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
-from psdmc.robot.mechanism import Mechanism
+from psdmc.robot.mechanism import BASE_FRAME, Mechanism
 from psdmc.robot.unit_lengths import units_of
 from psdmc.version import psdmc_version
 
@@ -69,7 +70,11 @@ class PackageInfo:
     payload     (l, 10) maps of a load to the change of theta_b, at the tip and, where there are others, at each named
                 frame; empty where the package has no function for loads
     units       parts of q, from an entry to before another, whose length must be one
+    bodies      links and the map of their bodies to theta_b; None where the package has no function for it
     friction    what a calibration from plain logs found; None where the package has no function for it
+    q_names     nq names of q's entries, untrusted text, and
+    v_names     nv names of rates' and torques'
+    base_frame  the frame that gravity, frames and velocities are given in, in words
     followers   sentences about joints that follow others, untrusted text: they are not among `joints`
     """
 
@@ -87,6 +92,10 @@ class PackageInfo:
     followers: tuple[str, ...] = ()
     units: tuple[tuple[int, int], ...] = ()
     friction: LinearFriction | None = None
+    bodies: BodiesMap | None = None
+    q_names: tuple[str, ...] = ()
+    v_names: tuple[str, ...] = ()
+    base_frame: str = BASE_FRAME
 
     def __post_init__(self) -> None:
         if not self.joints:
@@ -145,10 +154,11 @@ def package_info(
     options: Mapping[str, str] | None = None,
     payload: bool = False,
     friction: bool = False,
+    bodies: bool = False,
 ) -> PackageInfo:
     """Metadata of a MODEL. `name` replaces the robot's own. With `payload` it has what functions for loads need, with
-    `friction` what the one for friction needs; InputError where the model's assumptions do not admit every load, or it was
-    not calibrated from plain logs."""
+    `friction` and `bodies` what those for friction and bodies need; InputError where the model's assumptions do not admit
+    every load or body, or it was not calibrated from plain logs."""
     chain = model.mechanism
     joints = tuple(
         JointInfo(
@@ -185,6 +195,10 @@ def package_info(
         followers=tuple(_followers(chain)),
         units=units_of(chain.joints[i].type for i in chain.own_joints),
         friction=linear_friction(model) if friction else None,
+        bodies=bodies_map(model) if bodies else None,
+        q_names=chain.q_names,
+        v_names=chain.v_names,
+        base_frame=chain.base_frame,
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from psdmc.emit.adapters import chosen
+from psdmc.emit.bodies_view import BodiesView
 from psdmc.emit.cpp import CppClass, cpp_classes
 from psdmc.emit.describe import description, uses_frames
 from psdmc.emit.friction import FrictionView
@@ -63,9 +64,10 @@ class PackageView:
 
     @property
     def size_macros(self) -> dict[str, int]:
-        """Further sizes of the header: name and value. Of joints, q and rates where they are not equally many; of sparse
-        matrices' patterns."""
+        """Further sizes of the header: name and value. Of joints, q and rates where they are not equally many; of bodies;
+        of sparse matrices' patterns."""
         wide = {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv} if self.info.is_wide else {}
+        wide |= {"BODIES": len(self.info.bodies.links)} if self.info.bodies else {}
         return wide | {pattern.macro: len(pattern.places) for pattern in self.patterns}
 
     @property
@@ -138,9 +140,10 @@ class PackageView:
     def sources(self) -> tuple[str, ...]:
         """C files of the library, relative to the package."""
         payload = ("src/payload.c",) if self.info.payload else ()
+        bodies = ("src/bodies.c",) if self.info.bodies else ()
         friction = ("src/friction.c",) if self.info.friction else ()
         functions = (f"src/{unit.name}.c" for function in self.functions for unit in function.units)
-        return ("src/tables.c", *functions, *payload, *friction)
+        return ("src/tables.c", *functions, *payload, *bodies, *friction)
 
     @property
     def friction(self) -> FrictionView | None:
@@ -155,6 +158,11 @@ class PackageView:
     def payload(self) -> PayloadView | None:
         """The functions that add a load to theta_b, where the package has them."""
         return PayloadView(self.robot, self.real, self.info.payload) if self.info.payload else None
+
+    @property
+    def bodies(self) -> BodiesView | None:
+        """The function that computes theta_b from all bodies, where the package has it."""
+        return BodiesView(self.robot, self.real, self.info.bodies) if self.info.bodies else None
 
     @property
     def version(self) -> str:
@@ -173,7 +181,8 @@ class PackageView:
         own = self.references
         known = () if own is None else own.expected
         loads = 0 if own is None or own.load is None or self.payload is None else len(self.payload.prototypes)
-        return SelfTestView(self.kernels, self.dof, self.options, known, loads + bool(self.info.friction))
+        beside = loads + bool(self.info.friction) + bool(self.info.bodies)
+        return SelfTestView(self.kernels, self.dof, self.options, known, beside)
 
     @property
     def kernels(self) -> tuple[KernelView, ...]:
@@ -253,7 +262,7 @@ def package_view(
             "emit it with --trig inline, or leave --friction out",
         )
     robot = identifier(info.name)
-    functions = function_views(kernels, info.sizes, robot, options)
+    functions = function_views(kernels, info.sizes, robot, options, info.base_frame)
     package = PackageView(robot, info, options, functions, None, chosen(adapters))
     if references is None:
         return package

@@ -83,6 +83,8 @@ def library_files(package: PackageView) -> dict[str, str]:
                 files[f"src/{kernel.limbs.file}"] = render("limbs.inc.jinja", limbs=kernel.limbs)
     if package.info.payload:
         files["src/payload.c"] = render("payload.c.jinja", package=package)
+    if package.info.bodies:
+        files["src/bodies.c"] = render("bodies.c.jinja", package=package)
     if package.info.friction:
         files["src/friction.c"] = render("friction.c.jinja", package=package)
     return files

@@ -58,6 +58,12 @@ def payload_prototypes(robot: str, real: str) -> tuple[Prototype, Prototype]:
     )
 
 
+def bodies_prototype(robot: str, real: str) -> Prototype:
+    """The function that computes theta_b from all bodies."""
+    given = tuple(f"const {real} *{name}" for name in ("masses", "coms", "inertias"))
+    return Prototype("void", f"{robot}_theta_from_bodies", (*given, f"{real} *theta_b"))
+
+
 def friction_prototype(robot: str, real: str) -> Prototype:
     """The function of the joints' friction."""
     return Prototype("void", f"{robot}_friction", (f"const {real} *qd", f"{real} *tau_f"))

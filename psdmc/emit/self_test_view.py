@@ -16,7 +16,7 @@ class SelfTestView:
     kernels  of all its functions
     dof      length of rates and torques
     known    labels of the outputs whose values the reference states hold
-    beside   number of further C functions that it compares: of loads and friction
+    beside   number of further C functions that it compares: of loads, bodies and friction
     """
 
     kernels: tuple[KernelView, ...]
@@ -32,12 +32,12 @@ class SelfTestView:
 
     @property
     def functions(self) -> int:
-        """Number of C functions whose values are compared: kernels, loads and friction."""
+        """Number of C functions whose values are compared: kernels, loads, bodies and friction."""
         return len({check.kernel for check in self.checks if check.expected}) + self.beside
 
     @property
     def load_tolerance(self) -> str:
-        """Of the functions that add loads."""
+        """Of the functions that give theta_b."""
         return TOLERANCES[self.options.real]
 
     @property

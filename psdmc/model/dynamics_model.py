@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError
-from psdmc.model import equations, evaluate, glance, payload, recursive, store, symbolic
+from psdmc.model import bodies, equations, evaluate, glance, payload, recursive, store, symbolic
 from psdmc.model.answers import Answers
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from scipy import sparse
 
 Array = NDArray[np.float64]
+
+RENAMED = "standard_parameters() is called equivalent_parameters(); theta_for(masses, coms, inertias) is the way back"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +84,21 @@ class DynamicsModel(Answers):
     @property
     def joint_names(self) -> tuple[str, ...]:
         return self.mechanism.joint_names
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """n names: the link that moves with each joint, and with all that is fixed to it is a body."""
+        return tuple(joint.link_name for joint in self.mechanism.joints)
+
+    @property
+    def q_names(self) -> tuple[str, ...]:
+        """nq names of q's entries: a joint's own, or 'root_joint.x' and so on where it has several coordinates."""
+        return self.mechanism.q_names
+
+    @property
+    def v_names(self) -> tuple[str, ...]:
+        """nv names of the entries of rates, accelerations and torques: a joint's own, or 'root_joint.vx' and so on."""
+        return self.mechanism.v_names
 
     @property
     def frame_names(self) -> tuple[str, ...]:
@@ -186,15 +204,50 @@ class DynamicsModel(Answers):
             return None
         return np.asarray(times(self.B, known.reshape(-1)))
 
-    def standard_parameters(self) -> Array:
-        """(11n,) standard parameters that have the model's theta_b: `representative @ theta_b`, one choice of many."""
+    def equivalent_parameters(self) -> Array:
+        """(11n,) standard parameters that have the model's theta_b: `representative @ theta_b`, one choice of many. They
+        are not the links' own, and belong to no rigid bodies."""
         found: Array = times(self.representative, self.known_theta_b())
         return found
 
-    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    def standard_parameters(self) -> Array:
+        """`equivalent_parameters`, by its name in psdmc 0.1."""
+        warnings.warn(RENAMED, DeprecationWarning, stacklevel=2)
+        return self.equivalent_parameters()
+
+    def theta_for(
+        self,
+        masses: ArrayLike,
+        coms: ArrayLike,
+        inertias: ArrayLike,
+        drive_inertias: ArrayLike | None = None,
+    ) -> Array:
+        """(l,) base parameters of a robot with these bodies and the model's kinematics: `theta_b=` of its functions.
+
+            masses          (n,) kg, a body for each joint in the order of `link_names`: the link and all that is fixed to it
+            coms            (n, 3) m, centres of mass in the link frames
+            inertias        (n, 3, 3) kg m^2 about the centres of mass, along the link frames' axes
+            drive_inertias  (n,) kg m^2 (kg where a joint slides); None: the model's own
+
+        InputError where numbers are not finite, beyond the ranges of robot files or a mass is negative, an inertia is not
+        symmetric or without mass, or where the model's assumptions exclude the bodies. UserWarning where an inertia is that
+        of no rigid body.
+        """
+        x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
+        return np.asarray(times(self.B, x))
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        theta_b: ArrayLike | None = None,
+        *,
+        out: Array | None = None,
+    ) -> Array:
         """tau (..., nv), N m or N, directly from E, P and theta_b: slow, and the reference for faster code. Without E
-        and P, by Newton-Euler on the same base parameters."""
-        return self.torques_for(self.known_theta_b(), q, qd, qdd)
+        and P, by Newton-Euler on the same base parameters. `theta_b` (l,) replaces the model's own; `out` is written to."""
+        return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
     def torques_for(self, theta_b: ArrayLike, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """Inverse dynamics with base parameters (l,) that are not the model's own."""
@@ -210,32 +263,25 @@ class DynamicsModel(Answers):
             found = evaluate.torques(self.expansion, self.mechanism, theta, arrays)
         return found.reshape(*shape, self.nv)
 
-    def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
         """Y (..., nv, l) with tau = Y theta_b."""
-        shape, arrays = evaluate.states(self.mechanism, q=q, qd=qd, qdd=qdd)
-        if self.expansion is None:
-            found = recursive.regressor(self.mechanism, self.representative, arrays)
-        else:
-            found = evaluate.regressor(self.expansion, self.mechanism, arrays)
-        return found.reshape(*shape, self.nv, self.l)
+        return self._answer("regressor", q, qd, qdd, out=out)
 
-    def mass_matrix(self, q: ArrayLike) -> Array:
+    def mass_matrix(
+        self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
+    ) -> Array:
         """M(q), (..., nv, nv)."""
-        theta = self.known_theta_b()
-        shape, (angles,) = evaluate.states(self.mechanism, q=q)
-        if self.expansion is None:
-            found = recursive.mass_matrix(self.mechanism, self.standard_parameters(), angles)
-        else:
-            found = evaluate.mass_matrix(self.expansion, self.mechanism, theta, angles)
-        return found.reshape(*shape, self.nv, self.nv)
+        return self._answer("mass_matrix", q, theta_b, out=out)
 
-    def nonlinear_effects(self, q: ArrayLike, qd: ArrayLike) -> Array:
+    def nonlinear_effects(
+        self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
+    ) -> Array:
         """h(q, qd) = C(q, qd) qd + g(q), (..., nv)."""
-        return self.inverse_dynamics(q, qd, np.zeros(self.nv))
+        return self._answer("nonlinear_effects", q, qd, theta_b, out=out)
 
-    def gravity(self, q: ArrayLike) -> Array:
+    def gravity(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None) -> Array:
         """g(q), (..., nv)."""
-        return self.inverse_dynamics(q, np.zeros(self.nv), np.zeros(self.nv))
+        return self._answer("gravity", q, theta_b, out=out)
 
     @property
     def base_parameters(self) -> BaseParameters:

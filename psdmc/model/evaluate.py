@@ -29,7 +29,9 @@ BLOCK_BYTES = 2**18
 def states(chain: Mechanism, **vectors: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:
     """The broadcast leading shape, and each vector as (states, nv) float64, q as (states, nq); InputError where a shape
     does not fit or values are no real numbers."""
-    arrays = {name: real_array(name, value) for name, value in vectors.items()}
+    names = {"nq": chain.q_names, "nv": chain.v_names}
+    axes = {name: ("nq",) if name == "q" else ("nv",) for name in vectors}
+    arrays = {name: real_array(name, value, axes=axes[name], names=names) for name, value in vectors.items()}
     lengths = {name: chain.nq if name == "q" else chain.nv for name in vectors}
     for name, array in arrays.items():
         n = lengths[name]

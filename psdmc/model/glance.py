@@ -91,7 +91,7 @@ def _facts(model: Model) -> list[str]:
     return [
         f"joints: {joints_text(robot.joints)}",
         *lengths,
-        f"gravity: {numbers_text(robot.gravity.tolist())} m/s^2 in the base frame",
+        f"gravity: {numbers_text(robot.gravity.tolist())} m/s^2 in the {robot.base_frame}",
         f"{monomials}, l = {model.l} base parameters, theta_b {known}",
         f"largest torque error against Newton-Euler: {error:.1e}, relative",
         *([f"source: {shown(source)}"] if source else []),

@@ -73,7 +73,7 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
     low, high = (np.array(bound) for bound in zip(*ranges, strict=True))
     drawn = np.random.default_rng(SEED).uniform(low, high, size=(POSES, model.nq))
     poses = on_joints(model.mechanism, drawn)
-    mass = recursive.mass_matrix(model.mechanism, model.standard_parameters(), poses)
+    mass = recursive.mass_matrix(model.mechanism, model.equivalent_parameters(), poses)
     failing = ~_is_definite(mass, ROUNDING * _magnitudes(model, np.abs(poses).max(axis=0)))
     values, vectors = np.linalg.eigh(mass)
     worst = int(np.argmin(np.where(failing == failing.any(), values[:, 0], np.inf)))
@@ -97,7 +97,7 @@ def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
     """(nv,) sum of the magnitudes that the parameters contribute to the inertia of each rate. `travel` (nq,) is how far
     sliding joints move."""
     mechanism = model.mechanism
-    x = np.abs(model.standard_parameters()).reshape(model.n, PARAMETERS_PER_LINK)
+    x = np.abs(model.equivalent_parameters()).reshape(model.n, PARAMETERS_PER_LINK)
     masses, firsts, seconds = x[:, 0], x[:, 1:4].sum(axis=1), x[:, 4:10].sum(axis=1)
     slides = [[not any(angular) for _, angular in joint.type.twists] for joint in mechanism.joints]
     result = [[drive] * len(rates) for drive, rates in zip(x[:, 10].tolist(), slides, strict=True)]

@@ -10,19 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.dynamics.parameters import moved, moving_map, standard_parameters
 from psdmc.errors import InputError
+from psdmc.model.bodies import SPAN_TOLERANCE
 from psdmc.reproducible import times
 from psdmc.robot import limits
 from psdmc.robot.inertia import physical_fault, six_of
 from psdmc.robot.mechanism import BODY_PARAMETERS, PARAMETERS_PER_LINK, Mechanism, NamedFrame, Placement
-from psdmc.robot.zeros import leading_rows
+from psdmc.robot.zeros import outside
 
 Array = NDArray[np.float64]
 
 ROTATION_SLACK = 1e-6
 """Largest error of the products of a rotation's rows: that of a matrix written with seven digits."""
-
-SPAN_TOLERANCE = 1e-9
-"""Largest share of the load outside the parameters that the model admits: rounding only."""
 
 
 def loaded(chain: Mechanism, load: Array, mass: float, body: int) -> Mechanism:
@@ -149,10 +147,7 @@ def _check_admitted(chain: Mechanism, load: Array, body: int) -> None:
     """InputError unless the load lies in the span: a link whose mx is assumed zero cannot carry one off its axis."""
     x = np.zeros(PARAMETERS_PER_LINK * len(chain))
     x[body_parameters(body)] = load
-    span = chain.parameter_span
-    leads = leading_rows(span)
-    missed = np.abs(x - span @ x[leads]).max()
-    if missed > SPAN_TOLERANCE * np.abs(x).max(initial=0.0):
+    if outside(chain.parameter_span, x).max() > SPAN_TOLERANCE * np.abs(x).max(initial=0.0):
         link = chain.joints[body].link_name
         if link in chain.massless:
             raise InputError(

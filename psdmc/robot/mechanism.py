@@ -30,6 +30,9 @@ DRIVE = BODY_PARAMETERS
 BASE = -1
 """Parent of a body that hangs on the base."""
 
+BASE_FRAME = "base frame"
+"""The frame of gravity and placements, in words: of a robot whose base does not move."""
+
 FREE_RATES = 6
 """Rates of a joint that lets a body move in every way."""
 
@@ -154,6 +157,18 @@ class Mechanism:
         return tuple(joint.name for joint in self.joints)
 
     @property
+    def q_names(self) -> tuple[str, ...]:
+        """nq names of q's entries: a joint's own name, or 'joint.x' and so on where it has several coordinates."""
+        own = (self.joints[i] for i in self.own_joints)
+        return tuple(name for joint in own for name in _entry_names(joint.name, joint.type.q_names))
+
+    @property
+    def v_names(self) -> tuple[str, ...]:
+        """nv names of the entries of rates, accelerations and torques, likewise: 'joint.vx'."""
+        own = (self.joints[i] for i in self.own_joints)
+        return tuple(name for joint in own for name in _entry_names(joint.name, joint.type.v_names))
+
+    @property
     def tip_frame(self) -> NamedFrame:
         return NamedFrame(self.tip_name, self.tip_body, self.tip)
 
@@ -193,6 +208,11 @@ class Mechanism:
         return self.types[0].nv == FREE_RATES and self.parents[0] == BASE
 
     @property
+    def base_frame(self) -> str:
+        """The frame in which gravity and placements are given, in words."""
+        return "world frame" if self.has_free_root else BASE_FRAME
+
+    @property
     def own_joints(self) -> tuple[int, ...]:
         """The joints that follow no other, in order."""
         return leaders(self.coordinates)
@@ -216,6 +236,10 @@ class Mechanism:
 
     def __len__(self) -> int:
         return len(self.joints)
+
+
+def _entry_names(joint: str, several: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"{joint}.{name}" for name in several) or (joint,)
 
 
 def serial_parents(n: int) -> tuple[int, ...]:

@@ -128,6 +128,12 @@ def leading_rows(span: Array) -> NDArray[np.int64]:
     return leads
 
 
+def outside(span: Array, x: Array) -> Array:
+    """Magnitudes by which x misses the vector of the span that has its leading entries: zero where it lies in the span."""
+    missed: Array = np.abs(x - span @ x[leading_rows(span)])
+    return missed
+
+
 def _vanishing_at(columns: Array, rows: Sequence[int]) -> Array:
     """Columns that span the combinations of the given ones whose entries at `rows` are zero."""
     order = [*rows, *(k for k in range(columns.shape[0]) if k not in rows)]

@@ -1,14 +1,40 @@
-"""The arguments of a function that is called from Python: inputs, then theta_b and out where they are given."""
+"""The arguments of a function that is called from Python: inputs, then theta_b and out where they are given.
+
+Compiled robots and models take the same, with the same refusals.
+"""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from psdmc.program.signature import Signature
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from psdmc.errors import InputError
+from psdmc.program.signature import Q, Signature, Sizes
+from psdmc.real_arrays import AxisNames, real_array
+from psdmc.robot.unit_lengths import refuse_other_lengths
 from psdmc.toolchain.stubs import arguments
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotAxes:
+    """What the arrays of one robot run over.
+
+    sizes  lengths of axes by their words
+    names  of the entries of q (nq), of rates (nv), joints (n) and named frames (frames)
+    units  parts of q, from an entry to before another, whose length must be one
+    """
+
+    sizes: Sizes
+    names: AxisNames
+    units: tuple[tuple[int, int], ...]
 
 
 def bound_arguments(
@@ -39,3 +65,60 @@ def signature_of(function: Signature) -> inspect.Signature:
         ]
         + [inspect.Parameter("out", inspect.Parameter.KEYWORD_ONLY, default=None)]
     )
+
+
+def states(
+    function: Signature, axes: RobotAxes, inputs: Sequence[ArrayLike], dtype: DTypeLike
+) -> list[Array]:
+    """The inputs as arrays (..., *axes of one state); InputError where one has another shape, or a quaternion in it has not
+    the length one."""
+    arrays = []
+    for quantity, values in zip(function.inputs, inputs, strict=True):
+        what = f"{function.name}: {quantity.name}"
+        array = real_array(what, values, dtype, quantity.axes, axes.names)
+        tail = axes.sizes.shape(quantity.axes)
+        if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:
+            raise InputError(*other_shape(what, array.shape, tail, quantity.axes, axes))
+        arrays.append(array)
+        if axes.units and quantity.axes == Q.axes and not function.normalizes:
+            refuse_other_lengths(what, array, axes.units)
+    return arrays
+
+
+def other_shape(
+    what: str, shape: tuple[int, ...], tail: tuple[int, ...], words: Sequence[str], axes: RobotAxes
+) -> tuple[str, str]:
+    """Message and hint where an array has not the axes of one state."""
+    expected = ", ".join(("...", *map(str, tail)))
+    frames, joints = axes.names["frames"], axes.names["n"]
+    hint = f"the robot has {len(joints)} joints: {', '.join(joints)}"
+    if "frames" in words:
+        hint = f"the frames are {', '.join(frames)}"
+    return f"{what} has shape {shape}, expected ({expected})", hint
+
+
+def common_lead(function: Signature, arrays: Sequence[Array]) -> tuple[int, ...]:
+    """The leading axes that the arrays broadcast to; InputError where they do not."""
+    pairs = list(zip(function.inputs, arrays, strict=True))
+    leads = [array.shape[: array.ndim - len(quantity.axes)] for quantity, array in pairs]
+    if len(set(leads)) < 2:
+        return leads[0] if leads else ()
+    try:
+        return np.broadcast_shapes(*leads)
+    except ValueError:
+        shapes = ", ".join(f"{quantity.name} {array.shape}" for quantity, array in pairs)
+        raise InputError(
+            f"{function.name}: shapes do not broadcast: {shapes}",
+            "give arrays of one shape, or shapes that NumPy broadcasts",
+        ) from None
+
+
+def parameters(function: Signature, l: int, theta_b: ArrayLike, dtype: DTypeLike) -> Array:
+    """theta_b as an array (l,); InputError where it has another shape."""
+    array = np.ascontiguousarray(real_array(f"{function.name}: theta_b", theta_b, dtype, ("l",)))
+    if array.shape != (l,):
+        raise InputError(
+            f"{function.name}: theta_b has shape {array.shape}, expected ({l},)",
+            "give one value per base parameter",
+        )
+    return array

@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
-from psdmc.program.signature import WORDS, Q, Quantity, Signature
-from psdmc.real_arrays import real_array
-from psdmc.robot.unit_lengths import refuse_other_lengths
+from psdmc.program.signature import Signature
 from psdmc.toolchain import given_outputs
+from psdmc.toolchain.call_arguments import RobotAxes, common_lead, parameters, states
 from psdmc.toolchain.interface import Interface, batch_symbol
-from psdmc.toolchain.labelled_arrays import by_names, in_chunks, is_labelled, is_lazy
+from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
 from psdmc.toolchain.origin import Origin
 from psdmc.toolchain.robot_facts import RobotFacts
 from psdmc.toolchain.stubs import result_name
@@ -50,6 +49,7 @@ class CompiledFunctions(RobotFacts):
         self._robot = interface.robot
         self._sizes = interface.sizes
         self._units = interface.units
+        self._axes = RobotAxes(interface.sizes, interface.names, interface.units)
         self._dtype = np.dtype(interface.dtype)
         self._pointer = self._ffi.typeof(f"{interface.real} *")
         self._kernels = {name: _bound(interface, self._library, name) for name in interface.kernels}
@@ -87,16 +87,15 @@ class CompiledFunctions(RobotFacts):
 
         out  the array, or tuple of arrays, that results are written to and that is returned; None: new ones
         """
-        if any(is_labelled(given) or is_lazy(given) for given in inputs):
+        if any(map(is_foreign, inputs)):
             return self._foreign(function, inputs, theta_b, out)
         name = function.name
         kernel = self._kernel(name if theta_b is None else f"{name}_theta")
-        arrays = [self._states(name, q, x) for q, x in zip(function.inputs, inputs, strict=True)]
-        if self._units and not function.normalizes:
-            self._refuse_other_lengths(function, arrays)
-        lead, rows = self._rows(function, arrays)
+        arrays = states(function, self._axes, inputs, self._dtype)
+        lead = common_lead(function, arrays)
+        rows = self._rows(lead, function, arrays)
         if theta_b is not None:
-            rows.append(self._parameters(name, theta_b))
+            rows.append(parameters(function, self._sizes.l, theta_b, self._dtype))
         shapes = [lead + tail for tail in kernel.tails]
         kept = () if out is None else given_outputs.checked(function, out, shapes, self._dtype)
         is_direct = bool(kept) and all(given_outputs.is_direct(array, rows) for array in kept)
@@ -127,15 +126,10 @@ class CompiledFunctions(RobotFacts):
         self, function: Signature, inputs: Sequence[Any], theta_b: ArrayLike | None, out: Any
     ) -> Any:
         """The outputs as Dask's or xarray's arrays, as the inputs are."""
-        if out is not None:
-            raise InputError(f"{function.name}: out is for NumPy arrays", "leave it out")
+        refuse_out(function, out)
         kernel = self._kernel(function.name if theta_b is None else f"{function.name}_theta")
         call = OnArrays(self, function.name, theta_b)
-        if any(map(is_labelled, inputs)):
-            found: tuple[Any, ...] = by_names(call, self, function, inputs)
-        else:
-            lengths = {word: getattr(self._sizes, word) for word in WORDS}
-            found = in_chunks(call, function, lengths, kernel.tails, inputs, self._dtype)
+        found = foreign(call, self._axes, function, inputs, kernel.tails, self._dtype)
         return found[0] if len(found) == 1 else results(function)(*found)
 
     def _kernel(self, name: str) -> _Kernel:
@@ -170,61 +164,16 @@ class CompiledFunctions(RobotFacts):
         symbol = batch_symbol(self._robot, function)
         return int(self._ffi.cast("uintptr_t", self._ffi.addressof(self._library, symbol)))
 
-    def _states(self, name: str, quantity: Quantity, values: ArrayLike) -> Array:
-        array = real_array(f"{name}: {quantity.name}", values, self._dtype)
-        tail = self._sizes.shape(quantity.axes)
-        if array.ndim < len(tail) or array.shape[array.ndim - len(tail) :] != tail:
-            expected = ", ".join(("...", *map(str, tail)))
-            raise InputError(
-                f"{name}: {quantity.name} has shape {array.shape}, expected ({expected})",
-                self._hint(quantity),
-            )
-        return array
-
-    def _refuse_other_lengths(self, function: Signature, arrays: Sequence[Array]) -> None:
-        """InputError where a quaternion, or a cosine with its sine, is not of length one."""
-        for quantity, array in zip(function.inputs, arrays, strict=True):
-            if quantity.axes == Q.axes:
-                refuse_other_lengths(f"{function.name}: {quantity.name}", array, self._units)
-
-    def _hint(self, quantity: Quantity) -> str:
-        if "frames" in quantity.axes:
-            return f"the frames are {', '.join(self.frame_names)}"
-        return f"the robot has {self._sizes.n} joints: {', '.join(self.joint_names)}"
-
-    def _rows(self, function: Signature, arrays: list[Array]) -> tuple[tuple[int, ...], list[Array]]:
-        """The common leading shape, and the arrays as contiguous rows of it."""
-        leads = [
-            array.shape[: array.ndim - len(q.axes)] for q, array in zip(function.inputs, arrays, strict=True)
+    def _rows(self, lead: tuple[int, ...], function: Signature, arrays: Sequence[Array]) -> list[Array]:
+        """The arrays as contiguous rows of the common leading shape."""
+        tails = [
+            array.shape[array.ndim - len(q.axes) :] for q, array in zip(function.inputs, arrays, strict=True)
         ]
-        lead = leads[0] if leads else ()
-        if any(other != lead for other in leads):
-            lead = self._common_lead(function, arrays, leads)
-            tails = [array.shape[len(own) :] for own, array in zip(leads, arrays, strict=True)]
-            arrays = [np.broadcast_to(array, lead + tail) for array, tail in zip(arrays, tails, strict=True)]
-        return lead, [np.ascontiguousarray(array) for array in arrays]
-
-    def _common_lead(
-        self, function: Signature, arrays: list[Array], leads: list[tuple[int, ...]]
-    ) -> tuple[int, ...]:
-        try:
-            return np.broadcast_shapes(*leads)
-        except ValueError:
-            pairs = zip(function.inputs, arrays, strict=True)
-            shapes = ", ".join(f"{quantity.name} {array.shape}" for quantity, array in pairs)
-            raise InputError(
-                f"{function.name}: shapes do not broadcast: {shapes}",
-                "give arrays of one shape, or shapes that NumPy broadcasts",
-            ) from None
-
-    def _parameters(self, name: str, theta_b: ArrayLike) -> Array:
-        array = np.ascontiguousarray(real_array(f"{name}: theta_b", theta_b, self._dtype))
-        if array.shape != (self._sizes.l,):
-            raise InputError(
-                f"{name}: theta_b has shape {array.shape}, expected ({self._sizes.l},)",
-                "give one value per base parameter",
-            )
-        return array
+        whole = (
+            array if array.shape == lead + tail else np.broadcast_to(array, lead + tail)
+            for tail, array in zip(tails, arrays, strict=True)
+        )
+        return [np.ascontiguousarray(array) for array in whole]
 
     def _address(self, array: Array) -> Any:
         return self._ffi.from_buffer(self._pointer, array)

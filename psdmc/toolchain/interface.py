@@ -17,7 +17,7 @@ from psdmc.emit.patterns import patterns
 from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 
-FORMAT = 5
+FORMAT = 6
 """Version of the text's form."""
 
 
@@ -30,10 +30,13 @@ class Interface:
     n, l         joints, base parameters
     nq, nv       lengths of q, and of rates and torques
     joint_names  n, from base to tip
+    q_names      nq names of q's entries, and
+    v_names      nv names of rates' and torques'
     frame_names  the named frames
     units        parts of q, from an entry to before another, whose length must be one
     limits       n rows: lower, upper, speed, acceleration, effort; infinite where unknown
-    gravity      3, m/s^2 in the base frame
+    gravity      3, m/s^2 in
+    base_frame   the base frame, or the world frame of a floating base: its words
     theta_b      l base parameters; None while unknown
     kernels      name -> trailing axes of each of its results
     patterns     function -> (row, column) of the entries of its matrix that may differ from zero
@@ -48,10 +51,13 @@ class Interface:
     nq: int
     nv: int
     joint_names: tuple[str, ...]
+    q_names: tuple[str, ...]
+    v_names: tuple[str, ...]
     frame_names: tuple[str, ...]
     units: tuple[tuple[int, int], ...]
     limits: tuple[tuple[float, ...], ...]
     gravity: tuple[float, ...]
+    base_frame: str
     theta_b: tuple[float, ...] | None
     kernels: Mapping[str, tuple[tuple[int, ...], ...]]
     patterns: Mapping[str, tuple[tuple[int, int], ...]]
@@ -61,6 +67,11 @@ class Interface:
     def sizes(self) -> Sizes:
         """What the words of signatures mean for this robot."""
         return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names))
+
+    @property
+    def names(self) -> dict[str, tuple[str, ...]]:
+        """Names along the axes of arrays, by the axes' words."""
+        return {"n": self.joint_names, "nq": self.q_names, "nv": self.v_names, "frames": self.frame_names}
 
 
 def interface_of(package: PackageView) -> Interface:
@@ -74,10 +85,13 @@ def interface_of(package: PackageView) -> Interface:
         nq=package.info.nq,
         nv=package.info.nv,
         joint_names=tuple(joint.name for joint in package.info.joints),
+        q_names=package.info.q_names,
+        v_names=package.info.v_names,
         frame_names=package.info.frames,
         units=package.info.units,
         limits=tuple((j.lower, j.upper, j.speed, j.acceleration, j.effort) for j in package.info.joints),
         gravity=package.info.gravity,
+        base_frame=package.info.base_frame,
         theta_b=_known([parameter.value for parameter in package.info.parameters]),
         kernels={kernel.name: tuple(output.shape for output in kernel.outputs) for kernel in package.kernels},
         patterns={pattern.function: pattern.places for pattern in patterns(package.functions)},
@@ -118,6 +132,7 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
 
 def _from_plain(plain: dict[str, Any]) -> Interface:
     joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
+    coordinates, rates = tuple(plain.pop("q_names")), tuple(plain.pop("v_names"))
     units = tuple((int(start), int(stop)) for start, stop in plain.pop("units"))
     kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
     places = {
@@ -127,6 +142,8 @@ def _from_plain(plain: dict[str, Any]) -> Interface:
     values = plain.pop("theta_b")
     return Interface(
         joint_names=joints,
+        q_names=coordinates,
+        v_names=rates,
         frame_names=frames,
         units=units,
         limits=limits,

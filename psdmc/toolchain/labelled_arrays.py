@@ -1,22 +1,26 @@
-"""Compiled functions over Dask's and xarray's arrays: lazily in chunks, and by named dimensions.
+"""A robot's functions over Dask's and xarray's arrays: lazily in chunks, and by named dimensions.
 
 Both are optional, and nothing here is loaded before such an array is given.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.program.signature import WORDS, Quantity, Signature
-from psdmc.toolchain.robot_facts import RobotFacts
+from psdmc.real_arrays import order_of, real_array
+from psdmc.toolchain.call_arguments import RobotAxes
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Call = Callable[..., Any]
-"""A function of a compiled robot on arrays."""
+"""A function of a robot on arrays."""
 
 JOINT, COLUMN = "joint", "joint_column"
 """Dimensions of vectors over joints, and of the second axis of matrices."""
@@ -34,20 +38,39 @@ _DIMENSIONS = {
 _COLUMNS = {JOINT: COLUMN, "axis": "axis_column", "state": "state_column"}
 
 
-def is_lazy(value: object) -> bool:
-    """Whether a value is an array of Dask's."""
-    return type(value).__module__.partition(".")[0] == "dask"
+def is_foreign(value: object) -> bool:
+    """Whether a value is an array of Dask's or xarray's."""
+    return _room(value) in ("dask", "xarray")
 
 
-def is_labelled(value: object) -> bool:
-    """Whether a value is of xarray."""
-    return type(value).__module__.partition(".")[0] == "xarray"
+def _room(value: object) -> str:
+    return type(value).__module__.partition(".")[0]
+
+
+def refuse_out(function: Signature, out: Any) -> None:
+    """InputError where results are wanted in arrays of the caller's."""
+    if out is not None:
+        raise InputError(f"{function.name}: out is for NumPy arrays", "leave it out")
+
+
+def foreign(
+    call: Call,
+    axes: RobotAxes,
+    function: Signature,
+    inputs: Sequence[Any],
+    tails: Sequence[tuple[int, ...]],
+    dtype: Any,
+) -> tuple[Any, ...]:
+    """The outputs as xarray's arrays where an input is one, else as Dask's; `tails`: trailing axes of each output."""
+    if any(_room(given) == "xarray" for given in inputs):
+        return by_names(call, axes, function, inputs)
+    return in_chunks(call, axes, function, tails, inputs, dtype)
 
 
 def in_chunks(
     call: Call,
+    axes: RobotAxes,
     function: Signature,
-    shapes: Mapping[str, int],
     tails: Sequence[tuple[int, ...]],
     inputs: Sequence[Any],
     dtype: Any,
@@ -55,19 +78,21 @@ def in_chunks(
     """The outputs as arrays of Dask's, computed chunk by chunk when they are asked for.
 
     call    takes the inputs' chunks
-    shapes  length of each word of an input's axis
     tails   trailing axes of each output
 
-    Inputs whose last axes are cut are put together along these; chunks of states are cut alike.
+    Inputs whose last axes are cut are put together along these; chunks of states are cut alike. InputError where an axis
+    has another length than the robot's, or than another input's.
     """
     import dask.array
 
     da: Any = dask.array  # untyped
     arrays = [
-        _uncut(da.asarray(array), len(quantity.axes))
-        for quantity, array in zip(function.inputs, inputs, strict=True)
+        _checked(da, function, quantity, given, axes)
+        for quantity, given in zip(function.inputs, inputs, strict=True)
     ]
-    arrays = _cut_alike(da, arrays, [len(quantity.axes) for quantity in function.inputs])
+    own = [len(quantity.axes) for quantity in function.inputs]
+    _check_leads(function, arrays, own)
+    arrays = _cut_alike(da, [_uncut(array, k) for array, k in zip(arrays, own, strict=True)], own)
     ins = ",".join(map(_core, function.inputs))
     outs = ",".join(map(_core, function.outputs))
     made = {
@@ -75,8 +100,6 @@ def in_chunks(
         for quantity, tail in zip(function.outputs, tails, strict=True)
         for word, length in zip(quantity.axes, tail, strict=True)
     }
-    for array, quantity in zip(arrays, function.inputs, strict=True):
-        _check_tail(function, quantity, array, shapes)
     found = da.apply_gufunc(
         call,
         f"{ins}->{outs}",
@@ -85,6 +108,49 @@ def in_chunks(
         output_sizes={f"d{word}": size for word, size in made.items()},
     )
     return found if isinstance(found, tuple) else (found,)
+
+
+def _checked(da: Any, function: Signature, quantity: Quantity, given: Any, axes: RobotAxes) -> Any:
+    """The input as an array of Dask's with the axes of one state last."""
+    what = f"{function.name}: {quantity.name}"
+    if _room(given) != "dask":
+        given = real_array(what, given, np.float64, quantity.axes, axes.names)
+    elif hasattr(given, "columns") or not hasattr(given, "chunks"):
+        raise InputError(
+            f"{what} is a {type(given).__name__} of Dask's, expected an array",
+            "give .to_dask_array(lengths=True) with its columns in the robot's order",
+        )
+    array, tail = da.asarray(given), axes.sizes.shape(quantity.axes)
+    if array.ndim < len(tail):
+        names = ", ".join(map(repr, dimensions(quantity)))
+        raise InputError(
+            f"{what} has shape {array.shape}, expected the dimensions {names} last", _hint(axes, quantity)
+        )
+    for k, (name, length) in enumerate(zip(dimensions(quantity), tail, strict=True)):
+        axis = array.ndim - len(tail) + k
+        if array.shape[axis] != length:
+            expected = ", ".join(("...", *map(str, tail)))
+            raise InputError(
+                f"{what} has shape {array.shape}, expected ({expected}): its axis {axis}, dimension {name!r}, has "
+                f"{array.shape[axis]} entries",
+                _hint(axes, quantity),
+            )
+    return array
+
+
+def _check_leads(function: Signature, arrays: Sequence[Any], own: Sequence[int]) -> None:
+    """InputError that names the first axis of states along which two arrays do not broadcast."""
+    found = zip(function.inputs, arrays, own, strict=True)
+    leads = [(quantity.name, array.shape[: array.ndim - k]) for quantity, array, k in found]
+    for (one, first), (other, second) in combinations(leads, 2):
+        for back in range(1, min(len(first), len(second)) + 1):
+            lengths = {first[-back], second[-back]}
+            if len(lengths) == 2 and 1 not in lengths and all(length == length for length in lengths):
+                raise InputError(
+                    f"{function.name}: {one} has {first[-back]} states along its axis {len(first) - back}, {other} has "
+                    f"{second[-back]} along its axis {len(second) - back}",
+                    "give arrays of one shape, or shapes that NumPy broadcasts",
+                )
 
 
 def _uncut(array: Any, axes: int) -> Any:
@@ -106,44 +172,37 @@ def _core(quantity: Quantity) -> str:
     return f"({','.join(f'd{axis}' for axis in quantity.axes)})"
 
 
-def _check_tail(function: Signature, quantity: Quantity, array: Any, shapes: Mapping[str, int]) -> None:
-    tail = tuple(shapes[axis] if axis in shapes else int(axis) for axis in quantity.axes)
-    if array.shape[array.ndim - len(tail) :] != tail:
-        expected = ", ".join(("...", *map(str, tail)))
-        raise InputError(
-            f"{function.name}: {quantity.name} has shape {array.shape}, expected ({expected})",
-            "the last axes are those of one state",
-        )
-
-
 def by_names(
-    call: Call, robot: RobotFacts, function: Signature, inputs: Sequence[Any]
+    call: Call, axes: RobotAxes, function: Signature, inputs: Sequence[Any]
 ) -> tuple[xr.DataArray, ...]:
     """The outputs as data arrays: joints along the dimension 'joint', matrices' columns along 'joint_column', and so on;
-    every other dimension is one of states and broadcasts by its name. Names of joints are coordinates.
+    every other dimension is one of states and broadcasts by its name. Names of joints and frames are coordinates.
 
     call  takes the data, of NumPy or Dask, with the named dimensions last
 
-    InputError where a dimension is missing, or a coordinate names other joints. Joints in another order are put in the
-    robot's.
+    InputError where a dimension is missing or has another length, or a coordinate has other names. Names in another order
+    are put in the robot's.
     """
     import xarray as xr
 
     arrays = [
-        _in_order(robot, function, quantity, given) if is_labelled(given) else given
+        _in_order(axes, function, quantity, given)
         for quantity, given in zip(function.inputs, inputs, strict=True)
     ]
+    _check_states(function, arrays)
+    cores = [list(dimensions(quantity)) for quantity in function.inputs]
     found = xr.apply_ufunc(
         call,
         *arrays,
-        input_core_dims=[list(dimensions(quantity)) for quantity in function.inputs],
+        input_core_dims=cores,
         output_core_dims=[list(dimensions(quantity)) for quantity in function.outputs],
+        exclude_dims={
+            name for core in cores for name in core
+        },  # q and rates of a floating base differ in length
         dask="allowed",
     )
     several = found if isinstance(found, tuple) else (found,)
-    return tuple(
-        _named(robot, output.name, array) for output, array in zip(function.outputs, several, strict=True)
-    )
+    return tuple(_named(axes, output, array) for output, array in zip(function.outputs, several, strict=True))
 
 
 def dimensions(quantity: Quantity) -> tuple[str, ...]:
@@ -155,32 +214,71 @@ def dimensions(quantity: Quantity) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _in_order(robot: RobotFacts, function: Signature, quantity: Quantity, given: Any) -> Any:
+def _in_order(axes: RobotAxes, function: Signature, quantity: Quantity, given: Any) -> Any:
+    what = f"{function.name}: {quantity.name}"
+    if _room(given) == "dask":
+        return given
+    if _room(given) != "xarray":
+        return real_array(what, given, np.float64, quantity.axes, axes.names)
     if not hasattr(given, "dims") or hasattr(given, "data_vars"):
         raise InputError(
-            f"{function.name}: {quantity.name} is a {type(given).__name__}, expected a DataArray",
+            f"{what} is a {type(given).__name__}, expected a DataArray",
             "give one of its variables: dataset['q']",
         )
-    missing = [name for name in dimensions(quantity) if name not in given.dims]
-    if missing:
-        raise InputError(
-            f"{function.name}: {quantity.name} has dimensions {given.dims}, expected one called {missing[0]!r}",
-            f"rename the one that runs along it: {quantity.name}.rename(old={missing[0]!r})",
-        )
-    if JOINT not in given.coords or given.coords[JOINT].dtype.kind not in "UOT":
-        return given
-    names = [str(name) for name in given.coords[JOINT].values]
-    if sorted(names) != sorted(robot.joint_names):
-        raise InputError(
-            f"{function.name}: {quantity.name} is of joints {', '.join(map(repr, names))}",
-            f"the robot has {', '.join(robot.joint_names)}",
-        )
-    return given.sel({JOINT: list(robot.joint_names)})
+    for word, name in zip(quantity.axes, dimensions(quantity), strict=True):
+        if name not in given.dims:
+            raise InputError(
+                f"{what} has dimensions {given.dims}, expected one called {name!r}",
+                f"rename the one that runs along it: {quantity.name}.rename(old={name!r})",
+            )
+        if name in given.coords and given.coords[name].dtype.kind in "UOT" and axes.names.get(word):
+            labels = given.coords[name].values.tolist()
+            order = order_of(f"{what} has along dimension {name!r}", labels, axes.names[word])
+            given = given if order is None else given.isel({name: order})
+        (length,) = axes.sizes.shape([word])
+        if given.sizes[name] != length:
+            raise InputError(
+                f"{what} has {given.sizes[name]} entries along dimension {name!r}, expected {length}",
+                _hint(axes, quantity),
+            )
+    return given
 
 
-def _named(robot: RobotFacts, name: str, array: xr.DataArray) -> xr.DataArray:
-    """With the joints' names where they are missing."""
-    fits = [d for d in (JOINT, COLUMN) if d in array.dims and array.sizes[d] == len(robot.joint_names)]
-    missing = [dimension for dimension in fits if dimension not in array.coords]
-    named: xr.DataArray = array.assign_coords({dimension: list(robot.joint_names) for dimension in missing})
-    return named.rename(name)
+def _check_states(function: Signature, arrays: Sequence[Any]) -> None:
+    """InputError that names a dimension of states along which two data arrays differ."""
+    labelled = [
+        (q, array) for q, array in zip(function.inputs, arrays, strict=True) if hasattr(array, "dims")
+    ]
+    for (one, first), (other, second) in combinations(labelled, 2):
+        for name in first.dims:
+            if name not in second.dims or name in (*dimensions(one), *dimensions(other)):
+                continue
+            if first.sizes[name] != second.sizes[name]:
+                raise InputError(
+                    f"{function.name}: dimension {name!r} has {first.sizes[name]} entries in {one.name} and "
+                    f"{second.sizes[name]} in {other.name}",
+                    "give both the same states",
+                )
+            both = name in first.indexes and name in second.indexes
+            if both and not first.indexes[name].equals(second.indexes[name]):
+                raise InputError(
+                    f"{function.name}: dimension {name!r} has other coordinates in {other.name} than in {one.name}",
+                    f"{one.name}, {other.name} = xr.align({one.name}, {other.name}, join='inner') keeps the common states",
+                )
+
+
+def _hint(axes: RobotAxes, quantity: Quantity) -> str:
+    """What the robot has along a quantity's first named axis."""
+    word = next((word for word in quantity.axes if axes.names.get(word)), "n")
+    return f"the robot has {', '.join(axes.names[word])}"
+
+
+def _named(axes: RobotAxes, output: Quantity, array: xr.DataArray) -> xr.DataArray:
+    """With the names of joints and frames as coordinates."""
+    known = {
+        dimension: list(axes.names[word])
+        for word, dimension in zip(output.axes, dimensions(output), strict=True)
+        if axes.names.get(word)
+    }
+    named: xr.DataArray = array.assign_coords(known)
+    return named.rename(output.name)

@@ -65,6 +65,16 @@ class RobotFacts:
         return self._interface.joint_names
 
     @property
+    def q_names(self) -> tuple[str, ...]:
+        """nq names of q's entries: a joint's own, or 'root_joint.x' and so on where it has several coordinates."""
+        return self._interface.q_names
+
+    @property
+    def v_names(self) -> tuple[str, ...]:
+        """nv names of the entries of rates, accelerations and torques: a joint's own, or 'root_joint.vx' and so on."""
+        return self._interface.v_names
+
+    @property
     def frame_names(self) -> tuple[str, ...]:
         """Names of the frames that kinematic functions are about."""
         return self._interface.frame_names
@@ -88,7 +98,8 @@ class RobotFacts:
 
     @cached_property
     def gravity_acceleration(self) -> Vector:
-        """(3,) m/s^2 in the base frame, compiled in; `gravity(q)` are the torques against it."""
+        """(3,) m/s^2 in the base frame (of a floating base: in the world's), compiled in; `gravity(q)` are the torques
+        against it."""
         return _frozen(self._interface.gravity)
 
     @cached_property
@@ -115,7 +126,7 @@ class RobotFacts:
         return [
             f"joints: {_listed(map(repr, self.joint_names))}",
             *lengths,
-            f"gravity: {gravity} m/s^2 in the base frame",
+            f"gravity: {gravity} m/s^2 in the {self._interface.base_frame}",
             f"l = {self.l} base parameters, {compiled_in}",
             f"functions: {_listed(self.functions)}",
         ]

@@ -45,6 +45,8 @@ class Provider(NamedTuple):
 def provide(provider: Callable[[], Provider]) -> None: ...
 """
 
+_ANSWER = "    def _answer(self, name: str, *given: Any, **named: Any) -> NDArray[np.float64]: ..."
+
 
 def arguments(function: Signature) -> tuple[str, ...]:
     """Names of a method's arguments."""
@@ -85,13 +87,13 @@ def _results(function: Signature) -> list[str]:
     return [f"class {result_name(function)}(NamedTuple, Generic[RealT]):", *fields, ""]
 
 
-def _method(function: Signature, with_out: bool = True) -> list[str]:
+def _method(function: Signature) -> list[str]:
     given = [f"{quantity.name}: ArrayLike" for quantity in function.inputs]
     given += ["theta_b: ArrayLike | None = None"] if function.theta else []
     one = "NDArray[RealT] | None" if len(function.outputs) == 1 else "tuple[NDArray[RealT], ...] | None"
-    given += ["*", f"out: {one} = None"] if with_out else []
+    given = ["self", *given, "*", f"out: {one} = None"]
     returns = "NDArray" if len(function.outputs) == 1 else result_name(function)
-    return [f"    def {function.name}(self, {', '.join(given)}) -> {returns}[RealT]: ..."]
+    return [f"    def {function.name}({', '.join(given)}) -> {returns}[RealT]: ..."]
 
 
 def _shape(quantity: Quantity) -> str:
@@ -110,8 +112,8 @@ def answers_stub(functions: Iterable[Signature]) -> str:
     shown = [function for function in functions if function.name not in own]
     several = sorted(result_name(function) for function in shown if len(function.outputs) > 1)
     imported = "".join(f"    {name},\n" for name in several)
-    methods = [line.replace("[RealT]", "[np.float64]") for f in shown for line in _method(f, with_out=False)]
-    return "\n".join([_ANSWERS_HEAD.format(imported=imported), "class Answers:", *methods]) + "\n"
+    methods = [line.replace("[RealT]", "[np.float64]") for f in shown for line in _method(f)]
+    return "\n".join([_ANSWERS_HEAD.format(imported=imported), "class Answers:", _ANSWER, *methods]) + "\n"
 
 
 if __name__ == "__main__":

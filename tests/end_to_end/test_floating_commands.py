@@ -74,7 +74,9 @@ def test_its_package_is_built_and_passes_its_own_test(work: Path) -> None:
     header = (work / "solo/include/solo/solo.h").read_text(encoding="utf-8")
     assert "solo_NQ 19" in header
     assert "solo_NV 18" in header
-    assert "Robot: solo, a tree on universe" in header
+    assert "Robot: solo, a floating base in the world (universe)" in header
+    assert "m/s^2 in the world frame" in header
+    assert "base frame" not in header
     assert "from base to tip" not in header
     assert "FL_HFE (revolute)" in header
     assert "on link FL_SHOULDER" in header

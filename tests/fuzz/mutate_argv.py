@@ -77,7 +77,7 @@ VALUES: dict[str, tuple[str, ...]] = {
 
 FLAGS = ("--debug", "--version", "--help", "--no-expand", "--expand", "--terms", "--cost", "--force", "--counts",
          "--log-det", "--condition", "--ideal", "--harness", "--physical",
-         "--floating", "--payload", "--edited", "--keep", "--describe", "--", "-o", "-h", "-x")  # fmt: skip
+         "--floating", "--payload", "--bodies", "--edited", "--keep", "--describe", "--", "-o", "-h", "-x")  # fmt: skip
 SLOW = ("--seconds", "--workers", "--rounds")
 
 

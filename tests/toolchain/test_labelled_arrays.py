@@ -135,9 +135,12 @@ class TestNamedDimensions:
 
     def test_other_joints_are_refused_by_name(self, xr, robot: CompiledRobot) -> None:
         q = xr.DataArray(np.zeros(4), dims="joint", coords={"joint": ["J1", "J2", "J3", "wrist"]})
-        with pytest.raises(InputError, match="q is of joints 'J1', 'J2', 'J3', 'wrist'") as caught:
+        with pytest.raises(
+            InputError, match="q has along dimension 'joint' 'J1', 'J2', 'J3', 'wrist'"
+        ) as caught:
             robot.gravity(q)
-        assert caught.value.hint == "the robot has J1, J2, J3, J4"
+        assert "the robot has no 'wrist', and 'J4' is missing" in caught.value.message
+        assert caught.value.hint == "the names are J1, J2, J3, J4"
 
     def test_a_missing_dimension_is_named(self, xr, robot: CompiledRobot) -> None:
         with pytest.raises(

@@ -175,7 +175,7 @@ def _log_parts(
 def _torque(found: Delivered, states: States, rows: slice) -> Array:
     """(rows, n) motor torque before the filter: rigid bodies, friction, springs."""
     q, qd, qdd = states.q[rows], states.qd[rows], states.qdd[rows]
-    rigid = recursive.torques(found.model.mechanism, found.model.standard_parameters(), [q, qd, qdd])
+    rigid = recursive.torques(found.model.mechanism, found.model.equivalent_parameters(), [q, qd, qdd])
     law = found.prediction
     coupling = coupling_of(law.coupling)
     speed = qd if coupling is None else coupling.to_motors(qd)

@@ -34,6 +34,8 @@ class Free(WideJoint):
         "; rates: linear (m/s) and angular velocity (rad/s) along its own axes"
         "; efforts: force (N) and moment (N m)"
     )
+    q_names: ClassVar[tuple[str, ...]] = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    v_names: ClassVar[tuple[str, ...]] = ("vx", "vy", "vz", "wx", "wy", "wz")
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     unit: ClassVar[slice] = slice(3, 7)
     twists: ClassVar[tuple[Twist, ...]] = (*SLIDES, *TURNS)

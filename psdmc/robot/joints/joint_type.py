@@ -48,6 +48,8 @@ class JointType:
     only_axis      the only direction that a URDF's <axis> may have, in the child link; None: any
     nq, nv         numbers of coordinates and of rates
     coordinates    what q and its rates are, in words, where there are several
+    q_names        nq names of its coordinates, and
+    v_names        nv names of its rates, where there are several
     neutral        nq coordinates at which the frame has not moved
     unit           those of its coordinates whose length must be one: a quaternion's, or a cosine and a sine
     about_z        whether it is moved about and along z by one coordinate
@@ -72,6 +74,8 @@ class JointType:
     nq: ClassVar[int] = 1
     nv: ClassVar[int] = 1
     coordinates: ClassVar[str] = ""
+    q_names: ClassVar[tuple[str, ...]] = ()
+    v_names: ClassVar[tuple[str, ...]] = ()
     neutral: ClassVar[tuple[float, ...]] = (0.0,)
     unit: ClassVar[slice] = slice(0, 0)
     about_z: ClassVar[bool] = True

@@ -28,6 +28,8 @@ class Planar(WideJoint):
         "; rates: velocity along its own x and y (m/s), angular velocity (rad/s)"
         "; efforts: force (N) and moment (N m)"
     )
+    q_names: ClassVar[tuple[str, ...]] = ("x", "y", "cos", "sin")
+    v_names: ClassVar[tuple[str, ...]] = ("vx", "vy", "wz")
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 1.0, 0.0)
     unit: ClassVar[slice] = slice(2, 4)
     twists: ClassVar[tuple[Twist, ...]] = (SLIDES[0], SLIDES[1], TURNS[2])

@@ -33,6 +33,8 @@ class Spherical(WideJoint):
         "; rates: angular velocity (rad/s) along its own axes"
         "; efforts: moment (N m)"
     )
+    q_names: ClassVar[tuple[str, ...]] = ("qx", "qy", "qz", "qw")
+    v_names: ClassVar[tuple[str, ...]] = ("wx", "wy", "wz")
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 1.0)
     unit: ClassVar[slice] = slice(0, 4)
     twists: ClassVar[tuple[Twist, ...]] = TURNS

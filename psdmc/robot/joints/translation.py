@@ -19,6 +19,8 @@ class Translation(WideJoint):
     nq: ClassVar[int] = 3
     nv: ClassVar[int] = 3
     coordinates: ClassVar[str] = "q: x y z (m); rates: velocity (m/s); efforts: force (N)"
+    q_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    v_names: ClassVar[tuple[str, ...]] = ("vx", "vy", "vz")
     neutral: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0)
     twists: ClassVar[tuple[Twist, ...]] = SLIDES
     verb: ClassVar[str] = "goes along every axis"
