@@ -24,7 +24,17 @@ from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.motions.trajectory import Trajectory
-from psdmc.calibration.plant.spoiled import ALL, MOVED, decimated, noise_only, scaled, swapped, turned
+from psdmc.calibration.plant.spoiled import (
+    ALL,
+    MOVED,
+    clipped,
+    decimated,
+    late,
+    noise_only,
+    scaled,
+    swapped,
+    turned,
+)
 from psdmc.calibration.plant.virtual_robot import VirtualRobot, load_virtual_robot, simulate
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.verdict.record import Calibration
@@ -104,20 +114,6 @@ def urdf_plant(urdf: Path, constants: tuple[float, ...], noise: float) -> tuple[
         plant = Path(folder) / "plant.toml"
         plant.write_text("\n".join(lines), encoding="utf-8")
         return model, load_virtual_robot(plant)
-
-
-def clipped(log: Log, share: float) -> Log:
-    """The log with every joint's effort cut off at a share of its peak."""
-    peak = share * np.abs(log.effort).max(axis=0)
-    return replace(log, effort=np.clip(log.effort, -peak, peak))
-
-
-def late(log: Log, rows: int) -> Log:
-    """The log whose effort comes so many rows late."""
-    velocity = None if log.velocity is None else log.velocity[rows:]
-    return replace(
-        log, time=log.time[rows:], position=log.position[rows:], velocity=velocity, effort=log.effort[:-rows]
-    )
 
 
 def timing(ur10: Path | None) -> Iterator[tuple[str, Calibration | str]]:

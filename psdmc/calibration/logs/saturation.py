@@ -76,9 +76,9 @@ def _piled(effort: Array, onwards: Array, smallest_share: float) -> tuple[float,
     share = float(at.mean())
     if share < smallest_share:
         return None
-    steps = np.diff(np.unique(effort))
-    step = float(steps[steps > SAME * reach].min(initial=reach))
-    beside = np.count_nonzero(effort >= level - max(BESIDE * reach, 1.5 * step)) - np.count_nonzero(at)
+    steps: Array = np.diff(np.unique(effort))
+    step = float(np.min(steps[steps > SAME * reach], initial=reach))
+    beside: int = np.count_nonzero(effort >= level - max(BESIDE * reach, 1.5 * step)) - np.count_nonzero(at)
     if np.count_nonzero(at) < PILED * max(beside, 1):
         return None
     is_one_way = onwards.all() or not onwards.any()

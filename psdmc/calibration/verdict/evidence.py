@@ -182,7 +182,7 @@ def delays_tried(cutoff: float) -> Array:
     """(D,) s."""
     step = 1.0 / (PER_CYCLE * cutoff)
     count = int(np.ceil(REACH / step))
-    return step * np.arange(-count, count + 1)
+    return np.asarray(step * np.arange(-count, count + 1), dtype=np.float64)
 
 
 def _samples(
@@ -210,13 +210,10 @@ def _samples(
         if springs is not None:
             other = other + springs(states, at)
         torque = motors.torque(states.effort)[at] - other
-        used, reach = np.flatnonzero(states.use), lags[-1]
-        times = states.time[at]
-        inside = (times >= states.time[used[0]] + reach) & (times <= states.time[used[-1]] - reach)
-        some = np.flatnonzero(inside)[::every]
-        late = interpolate.CubicSpline(states.time, states.effort)(times[some, None] + lags)
-        at_others = motors.torque(late) - other[some, None]
-        moved.append((*(x[at[some]] for x in (states.q, states.qd, states.qdd, speed, sign)), at_others))
+        some, later = _at_other_times(states, at, lags, every)
+        rows = at[some]
+        shifted = motors.torque(later) - other[some, None]
+        moved.append((states.q[rows], states.qd[rows], states.qdd[rows], speed[rows], sign[rows], shifted))
         own = slice(at[0], at[-1] + 1)
         above += np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
         count += at[-1] + 1 - at[0]
@@ -224,6 +221,16 @@ def _samples(
     q, qd, qdd, sign, torque = (np.concatenate(values) for values in zip(*parts, strict=True))
     share = options.cutoff / (0.5 / states.period - options.cutoff)
     noise = motors.torque(np.sqrt(share * above / count))
-    others = [np.concatenate(values) for values in zip(*moved, strict=True)]
-    shifted = Shifted(log.name, lags, *others[:5], others[5].transpose(0, 2, 1))
-    return q, qd, qdd, sign, torque, np.abs(noise), shifted
+    *others, shifted = (np.concatenate(values) for values in zip(*moved, strict=True))
+    moved_log = Shifted(log.name, lags, *others, torque=shifted.transpose(0, 2, 1))
+    return q, qd, qdd, sign, torque, np.abs(noise), moved_log
+
+
+def _at_other_times(
+    states: States, at: NDArray[np.intp], lags: Array, every: int
+) -> tuple[NDArray[np.intp], Array]:
+    """Which of some rows have efforts at all these times from them (every so many of those), and these (rows, D, n)."""
+    used, times = states.time[states.use], states.time[at]
+    some = np.flatnonzero((times >= used[0] - lags[0]) & (times <= used[-1] - lags[-1]))[::every]
+    later = interpolate.CubicSpline(states.time, states.effort)(times[some, None] + lags)
+    return some, np.asarray(later, dtype=np.float64)

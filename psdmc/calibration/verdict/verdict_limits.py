@@ -40,6 +40,6 @@ class VerdictOptions:
     sure: float = 3.0
     friction_share: float = 0.02
     of_limit: tuple[float, float] = (0.01, 3.0)
-    late: float = 0.02
-    hardly_late: float = 0.012
+    late: float = 0.03
+    hardly_late: float = 0.02
     acceleration_lost: float = 0.05
