@@ -88,11 +88,11 @@ REACH = 3.4
 
 def urdf_plant(urdf: Path, constants: tuple[float, ...], noise: float) -> tuple[DynamicsModel, VirtualRobot]:
     """A URDF as a virtual robot: friction a tenth of each joint's largest weight torque, noise (A) as a share of it."""
-    tip = {"tip": "panda_link7"} if urdf.name == "panda.urdf" else {}
-    model = derive(urdf, drive_inertia=True, expand=False, **tip)
+    tip = "panda_link7" if urdf.name == "panda.urdf" else None
+    model = derive(urdf, drive_inertia=True, expand=False, tip=tip)
     poses = np.random.default_rng(0).uniform(-1.5, 1.5, (200, model.n))
     weight = np.abs(model.inverse_dynamics(poses, 0 * poses, 0 * poses)).max(axis=0)
-    lines = [f'robot = "{urdf}"', *(f'tip = "{name}"' for name in tip.values())]
+    lines = [f'robot = "{urdf}"', *([] if tip is None else [f'tip = "{tip}"'])]
     lines += ["[sensors]", "position_step = 5e-6", "current_step = 1e-4", "effort_delay = 1e-3"]
     lines += [f"current_noise = {noise * float(np.median(weight / constants))}"]
     for name, constant, most in zip(model.joint_names, constants, weight, strict=True):

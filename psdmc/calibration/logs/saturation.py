@@ -78,8 +78,9 @@ def _piled(effort: Array, onwards: Array, smallest_share: float) -> tuple[float,
         return None
     steps: Array = np.diff(np.unique(effort))
     step = float(np.min(steps[steps > SAME * reach], initial=reach))
-    beside: int = np.count_nonzero(effort >= level - max(BESIDE * reach, 1.5 * step)) - np.count_nonzero(at)
-    if np.count_nonzero(at) < PILED * max(beside, 1):
+    near = effort >= level - max(BESIDE * reach, 1.5 * step)
+    beside = int(near.sum() - at.sum())
+    if int(at.sum()) < PILED * max(beside, 1):
         return None
     is_one_way = onwards.all() or not onwards.any()
     by_sense = not is_one_way and abs(np.corrcoef(at, onwards)[0, 1]) > BY_SENSE

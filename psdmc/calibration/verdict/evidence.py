@@ -212,7 +212,7 @@ def _samples(
         torque = motors.torque(states.effort)[at] - other
         some, later = _at_other_times(states, at, lags, every)
         rows = at[some]
-        shifted = motors.torque(later) - other[some, None]
+        shifted = (motors.torque(later) - other[some, None]).transpose(0, 2, 1)
         moved.append((states.q[rows], states.qd[rows], states.qdd[rows], speed[rows], sign[rows], shifted))
         own = slice(at[0], at[-1] + 1)
         above += np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
@@ -221,8 +221,7 @@ def _samples(
     q, qd, qdd, sign, torque = (np.concatenate(values) for values in zip(*parts, strict=True))
     share = options.cutoff / (0.5 / states.period - options.cutoff)
     noise = motors.torque(np.sqrt(share * above / count))
-    *others, shifted = (np.concatenate(values) for values in zip(*moved, strict=True))
-    moved_log = Shifted(log.name, lags, *others, torque=shifted.transpose(0, 2, 1))
+    moved_log = Shifted(log.name, lags, *(np.concatenate(values) for values in zip(*moved, strict=True)))
     return q, qd, qdd, sign, torque, np.abs(noise), moved_log
 
 
