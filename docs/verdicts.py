@@ -1,6 +1,7 @@
 """The verdict on good logs and on logs made wrong on purpose: the table of docs/calibration.md.
 
 python docs/verdicts.py logs [UR10.csv]     plain logs: the virtual Denso's, and a real UR10's where its log is at hand
+python docs/verdicts.py timing [UR10.csv]   twenty good logs of four virtual robots, the same clipped and late (minutes)
 python docs/verdicts.py campaigns           the virtual Denso's campaign: ideal sensors, real ones, a cable harness (minutes)
 
 Columns: exit status of `psdmc calibrate`, verdict, and the first line that speaks against the log.
@@ -23,8 +24,18 @@ from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.motions.trajectory import Trajectory
-from psdmc.calibration.plant.spoiled import ALL, MOVED, decimated, noise_only, scaled, swapped, turned
-from psdmc.calibration.plant.virtual_robot import load_virtual_robot, simulate
+from psdmc.calibration.plant.spoiled import (
+    ALL,
+    MOVED,
+    clipped,
+    decimated,
+    late,
+    noise_only,
+    scaled,
+    swapped,
+    turned,
+)
+from psdmc.calibration.plant.virtual_robot import VirtualRobot, load_virtual_robot, simulate
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.compiler import compile as compile_model
@@ -58,27 +69,92 @@ def wrong_logs(log: Log, constants: np.ndarray) -> Iterator[tuple[str, Log]]:
     yield "noise in the effort columns", noise_only(log)
 
 
-def denso_log(seconds: float = 25.0, rate: float = 125.0) -> tuple[DynamicsModel, Log, np.ndarray]:
+def denso_log(
+    seconds: float = 25.0, rate: float = 125.0, seed: int | None = None
+) -> tuple[DynamicsModel, Log, np.ndarray]:
     """The virtual Denso through sums of sines; its currents times the true torque constants."""
     model = derive(ROBOT, drive_inertia=True)
     robot = load_virtual_robot(PLANT)
     constants = np.array([joint.torque_constant for joint in robot.joints])
-    log = simulate(robot, sines(model, seconds, rate))
+    log = simulate(robot, sines(model, seconds, rate, seed), seed=seed or 0)
     return model, replace(log, effort=log.effort * constants, quantity="motor_torque"), constants
 
 
-def sines(model: DynamicsModel, seconds: float, rate: float) -> Trajectory:
-    """Two sines per joint about the middle of its range, of frequencies that no two joints share."""
+PLANTS = {"ur10_robot.urdf": UR10_GAINS, "panda.urdf": (20.0,) * 7, "double_pendulum.urdf": (1.0, 1.0)}
+"""URDFs of the wheel example-robot-data, and torque constants (N m/A) for virtual robots of them."""
+REACH = 3.4
+"""rad either way, of joints without limits or with wider ones."""
+
+
+def urdf_plant(urdf: Path, constants: tuple[float, ...], noise: float) -> tuple[DynamicsModel, VirtualRobot]:
+    """A URDF as a virtual robot: friction a tenth of each joint's largest weight torque, noise (A) as a share of it."""
+    tip = "panda_link7" if urdf.name == "panda.urdf" else None
+    model = derive(urdf, drive_inertia=True, expand=False, tip=tip)
+    poses = np.random.default_rng(0).uniform(-1.5, 1.5, (200, model.n))
+    weight = np.abs(model.inverse_dynamics(poses, 0 * poses, 0 * poses)).max(axis=0)
+    lines = [f'robot = "{urdf}"', *([] if tip is None else [f'tip = "{tip}"'])]
+    lines += ["[sensors]", "position_step = 5e-6", "current_step = 1e-4", "effort_delay = 1e-3"]
+    lines += [f"current_noise = {noise * float(np.median(weight / constants))}"]
+    for name, constant, most in zip(model.joint_names, constants, weight, strict=True):
+        rub = 0.1 * max(most, 0.1 * weight.max())
+        lines += [
+            "[[joint]]",
+            f'name = "{name}"',
+            f"torque_constant = {constant}",
+            f"drive_inertia = {0.1 * rub}",
+        ]
+        lines += [
+            f"coulomb = {rub}",
+            f"static = {1.3 * rub}",
+            "stribeck_velocity = 0.03",
+            f"viscous = {1.2 * rub}",
+        ]
+        lines += ["viscous_exponent = 0.8", f"stiffness = {2e3 * rub}", f"damping = {2 * rub}"]
+    with tempfile.TemporaryDirectory() as folder:
+        plant = Path(folder) / "plant.toml"
+        plant.write_text("\n".join(lines), encoding="utf-8")
+        return model, load_virtual_robot(plant)
+
+
+def timing(ur10: Path | None) -> Iterator[tuple[str, Calibration | str]]:
+    """Good logs of several seeds, rates and noises, and of each robot one clipped and one late."""
+    sources: list[tuple[str, DynamicsModel, Log]] = []
+    for seed, rate in enumerate((125.0, 200.0, 250.0, 500.0, 1000.0)):
+        model, log, _ = denso_log(25.0, rate, seed)
+        sources.append((f"virtual Denso, {rate:g} Hz", model, log))
+    for urdf, constants in PLANTS.items():
+        for seed, (rate, noise) in enumerate(
+            ((125.0, 1e-3), (125.0, 1e-2), (200.0, 3e-3), (250.0, 3e-2), (500.0, 1e-3))
+        ):
+            model, robot = urdf_plant(example_urdf(urdf), constants, noise)
+            log = simulate(robot, sines(model, 25.0, rate, seed), seed=seed)
+            log = replace(log, effort=log.effort * np.array(constants), quantity="motor_torque")
+            sources.append((f"virtual {urdf.partition('.')[0]}, {rate:g} Hz, noise {noise:.1%}", model, log))
+    if ur10 is not None:
+        model = derive(example_urdf("ur10_robot.urdf"), drive_inertia=True, expand=False)
+        sources.append(("real UR10", model, read_log(ur10).ordered(model.joint_names)))
+    for what, model, log in sources:
+        for how, made in (
+            ("", log),
+            (", clipped at 40 %", clipped(log, 0.4)),
+            (", 25 rows late", late(log, 25)),
+        ):
+            yield f"{what}{how}", _calibrated(lambda: _of_log(model, made, ChainRegressor(model)))  # noqa: B023
+
+
+def sines(model: DynamicsModel, seconds: float, rate: float, seed: int | None = None) -> Trajectory:
+    """Two sines per joint about the middle of its range, of frequencies that no two joints share; a seed draws phases."""
     time = np.arange(round(seconds * rate)) / rate
     n = model.n
     limits = [joint.limits for joint in model.mechanism.joints]
-    middle = np.array([0.5 * (limit.lower + limit.upper) for limit in limits])
-    reach = np.array([0.25 * (limit.upper - limit.lower) for limit in limits])
+    low_end, high_end = np.clip([(limit.lower, limit.upper) for limit in limits], -REACH, REACH).T
+    middle, reach = 0.5 * (low_end + high_end), 0.25 * (high_end - low_end)
+    start = np.arange(n) if seed is None else np.random.default_rng(seed).uniform(0, 2 * np.pi, n)
     q = np.tile(middle, (len(time), 1))
     qd, qdd = np.zeros_like(q), np.zeros_like(q)
     for share, low in ((0.6, 0.1), (0.3, 0.25)):
         w = 2 * np.pi * (low + 0.11 * low * np.arange(n))
-        phase = w * time[:, None] + np.arange(n)
+        phase = w * time[:, None] + start
         q += share * reach * np.sin(phase)
         qd += share * reach * w * np.cos(phase)
         qdd -= share * reach * w**2 * np.sin(phase)
@@ -89,7 +165,7 @@ def logs(ur10: Path | None) -> Iterator[tuple[str, Calibration | str]]:
     """Every wrong log of every robot."""
     sources: list[tuple[str, DynamicsModel, Log, np.ndarray]] = [("virtual Denso", *denso_log())]
     if ur10 is not None:
-        model = derive(ur10_urdf(), drive_inertia=True, expand=False)
+        model = derive(example_urdf("ur10_robot.urdf"), drive_inertia=True, expand=False)
         sources.append(("UR10", model, read_log(ur10).ordered(model.joint_names), np.array(UR10_GAINS)))
     for robot, model, log, constants in sources:
         regressor = ChainRegressor(model)
@@ -110,12 +186,12 @@ def _calibrated(run: Callable[[], Calibration]) -> Calibration | str:
         return str(error)
 
 
-def ur10_urdf() -> Path:
+def example_urdf(name: str) -> Path:
     """From the wheel example-robot-data."""
     import cmeel
 
     prefix = Path(cmeel.__path__[0]).parent / "cmeel.prefix"
-    return sorted(prefix.rglob("ur10_robot.urdf"))[0]
+    return sorted(prefix.rglob(name))[0]
 
 
 def campaigns(_: Path | None) -> Iterator[tuple[str, Calibration | str]]:
@@ -139,6 +215,7 @@ def campaigns(_: Path | None) -> Iterator[tuple[str, Calibration | str]]:
 
 TABLES: dict[str, Callable[[Path | None], Iterator[tuple[str, Calibration | str]]]] = {
     "logs": logs,
+    "timing": timing,
     "campaigns": campaigns,
 }
 
@@ -146,11 +223,11 @@ TABLES: dict[str, Callable[[Path | None], Iterator[tuple[str, Calibration | str]
 def row(what: str, found: Calibration | str) -> str:
     """One line of the table."""
     if isinstance(found, str):
-        return f"{what:<58} 2  refused               {found}"
+        return f"{what:<62} 2  refused               {found}"
     verdict = found.verdict
     assert verdict is not None
     why = next(iter((*verdict.suspects, *verdict.reasons, *verdict.doubts)), "")
-    return f"{what:<58} {verdict.exit_status}  {verdict.word:<20}  {why}"
+    return f"{what:<62} {verdict.exit_status}  {verdict.word:<20}  {why}"
 
 
 def main() -> None:

@@ -93,7 +93,13 @@ ROOMS = {
         "description": {"logs", "identify"},
         "motions": {"logs", "identify"},
         "plant": {"logs", "identify", "motions"},
-        "verdict": {"logs", "columns", "identify"},
+        "verdict": {
+            "logs",
+            "columns",
+            "identify",
+            "campaign_file",
+            "sources",
+        },  # paths that it is given: 0117
     },
     "lower": {"expanded": set()},
 }

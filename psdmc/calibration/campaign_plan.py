@@ -22,6 +22,7 @@ from psdmc.calibration.motions.fit_columns import all_columns, inertial_columns
 from psdmc.calibration.motions.given_limits import GivenLimits, bounded
 from psdmc.calibration.motions.lead_in import from_rest_to_rest
 from psdmc.calibration.motions.looked_at import allowed_of, looked_at
+from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.sweeps import (
     SineOptions,
     SweepOptions,
@@ -130,9 +131,12 @@ def plan_campaign(
     regressor: Regressor,
     options: CampaignOptions,
     progress: Progress = lambda step: None,
+    began: float | None = None,
 ) -> Plan:
     """All runs of the four steps, or of one log, each checked against limits of joints, torques and clearance, and the
     search for the exciting motion.
+
+    began  cpu_seconds() from which the search's seconds count; None: now
 
     InputError where a joint has no limits to keep, or no motion is allowed; of motions that need no search, before it.
     """
@@ -141,6 +145,7 @@ def plan_campaign(
             f"{shown(model.mechanism.name)}: campaigns are for joints that follow no other",
             "derive the model with such joints held: --lock JOINT=0",
         )
+    began = cpu_seconds() if began is None else began
     chain = bounded(model.mechanism, options.limits)
     progress("shapes")
     allowed = allowed_of(model, chain, regressor, options.excite.torque_margin, options.shapes, options.floor)
@@ -159,12 +164,12 @@ def plan_campaign(
         if options.one_log
         else inertial_columns(chain, regressor, model.l)
     )
-    found = excite(chain, columns, options.excite, _spoken(progress), allowed)
+    found = excite(chain, columns, options.excite, _spoken(progress), allowed, began)
     planner.exciting(found)
     said = (
         []
         if not found.ended_by_clock
-        else ["the clock ended the search: another time it finds another motion"]
+        else ["--seconds ended the search: another time it finds another motion"]
     )
     return Plan(
         tuple(planner.runs),
@@ -285,10 +290,10 @@ def _spoken(progress: Progress) -> Callable[[float, float, float], None]:
         nonlocal said
         if seconds - said >= SPOKEN_EVERY:
             said = seconds
-            progress(Share(f"exciting motion: {score:.4g} after {seconds:.0f} s", share))
+            progress(Share(f"exciting motion: {score:.4g} after {seconds:.0f} s of CPU", share))
 
     return say
 
 
 SPOKEN_EVERY = 5.0
-"""Seconds between two reports on the search."""
+"""Seconds of CPU between two reports on the search."""

@@ -82,7 +82,8 @@ def excite(
         bool, typer.Option("--collisions/--no-collisions", help="whether self-collision is looked at")
     ] = True,
     seconds: Annotated[
-        float, typer.Option(min=1.0, help="s, longest search; it ends by its count where that is sooner")
+        float,
+        typer.Option(min=1.0, help="s of CPU in all; the search ends by its count where that is sooner"),
     ] = ExciteOptions().seconds,
     condition: Annotated[
         bool, typer.Option("--condition", help="smallest condition number alone, however slow the motion")

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.linear_friction import viscous_name
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Joint
 
@@ -68,7 +69,9 @@ def _of(values: Mapping[str, float], joint: Joint, exponents: Sequence[float]) -
         terms = [(values.get("viscous", 0.0), values.get("viscous_exponent", 1.0))]
         lost += ["the Stribeck effect and bristles of LuGre friction"]
     else:
-        terms = [(value, d) for name, d in _names(exponents) if (value := values.get(name)) is not None]
+        terms = [
+            (value, d) for d in exponents or (1.0,) if (value := values.get(viscous_name(d))) is not None
+        ]
     top = joint.limits.speed if math.isfinite(joint.limits.speed) else ORDINARY_SPEED
     damping = sum(value * _line(d, top) for value, d in terms)
     if any(d != 1.0 and value for value, d in terms):
@@ -82,11 +85,6 @@ def _of(values: Mapping[str, float], joint: Joint, exponents: Sequence[float]) -
     if constant < 0.0 or damping < 0.0:
         lost.append("friction that is negative")
     return JointFriction(max(constant, 0.0), max(damping, 0.0), tuple(lost))
-
-
-def _names(exponents: Sequence[float]) -> list[tuple[str, float]]:
-    """Names and exponents of a linear fit's viscous terms."""
-    return [("viscous" if k == 0 else f"viscous^{d:g}", float(d)) for k, d in enumerate(exponents or (1.0,))]
 
 
 def _line(exponent: float, top: float) -> float:

@@ -56,9 +56,12 @@ def refuse_outside(chain: Mechanism, vectors: Sequence[Array], who: str) -> None
         excluded |= set(np.flatnonzero(missed > SPAN_TOLERANCE * largest).tolist())
     if excluded:
         names = parameter_names([joint.link_name for joint in chain.joints])
+        remedy = "derive the model again without those assumptions; drive inertias (Im) by --drive-inertia"
+        if chain.massless:
+            remedy += "; links without <inertial> by --unknown missing"
         raise InputError(
             f"{who} what the model assumes zero: {limits.joined([names[k] for k in sorted(excluded)])}",
-            "derive the model again without those assumptions; drive inertias (Im) by --drive-inertia",
+            remedy,
         )
 
 

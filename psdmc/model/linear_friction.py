@@ -87,6 +87,29 @@ def beyond_friction(model: DynamicsModel) -> tuple[str, ...]:
     return tuple(filter(None, (f"{springs} spring(s)" if springs else "", by_load)))
 
 
+def viscous_name(exponent: float) -> str:
+    """The name of the term |v|^exponent: viscous alone is the one that grows with the speed itself."""
+    return "viscous" if exponent == 1.0 else f"viscous^{exponent:g}"
+
+
+def with_names_of_exponents(calibration: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A calibration as model files hold it, its viscous terms called by their exponents. psdmc 0.1 called the first one
+    viscous, whatever its exponent."""
+    exponents, rows = calibration["prediction"].get("exponents", ()), calibration["friction"]
+    if not exponents or viscous_name(exponents[0]) in {row["name"] for row in rows}:
+        return calibration
+    first = float(exponents[0])
+    units = {"Nms/rad": f"Nm (s/rad)^{first:g}", "Ns/m": f"N (s/m)^{first:g}"}
+    renamed = {"viscous": viscous_name(first), "viscous^1": "viscous"}
+    found = [
+        row | {"name": renamed[row["name"]], "unit": units.get(row["unit"], row["unit"])}
+        if row["name"] in renamed
+        else row
+        for row in rows
+    ]
+    return {**calibration, "friction": found}
+
+
 def linear_friction(model: DynamicsModel) -> LinearFriction:
     """The friction that the model's calibration found; InputError where it was not calibrated from plain logs, or what its
     file says of friction is damaged."""
@@ -124,7 +147,7 @@ def _read(kept: Mapping[str, Any], joints: tuple[str, ...]) -> LinearFriction:
         raise ValueError(f"sign_speed {speed:g}, {len(exponents)} exponents")
     if any(not 0.0 <= d <= LARGEST_EXPONENT for d in exponents):
         raise ValueError(f"exponents {exponents}")
-    names = ["viscous" if k == 0 else f"viscous^{d:g}" for k, d in enumerate(exponents)]
+    names = [viscous_name(d) for d in exponents]
     return LinearFriction(
         coulomb=np.array([values[joint, "coulomb"] for joint in joints]),
         viscous=np.array([[values[joint, name] for name in names] for joint in joints]).reshape(

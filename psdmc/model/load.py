@@ -15,6 +15,7 @@ from psdmc.errors import InputError
 from psdmc.model.archive import BEGINS, LARGEST, BrokenArchiveError, opened, read_arrays
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.from_parts import model_from
+from psdmc.model.linear_friction import with_names_of_exponents
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
 from psdmc.reading import read_file
 
@@ -62,7 +63,7 @@ def load_bytes(data: bytes, source: Path) -> DynamicsModel:
         arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):
             raise BrokenArchiveError("its content does not match its hash")
-        return model_from(arrays, _migrated(manifest))
+        return model_from(arrays, _with_names(_migrated(manifest)))
     except BrokenArchiveError as error:
         raise _damaged(source, str(error)) from error
     except (ValueError, RecursionError) as error:
@@ -124,6 +125,16 @@ def _migrated(manifest: dict[str, Any]) -> dict[str, Any]:
     while manifest["schema"] < SCHEMA:
         manifest = _MIGRATIONS[manifest["schema"]](manifest)
     return manifest
+
+
+def _with_names(manifest: dict[str, Any]) -> dict[str, Any]:
+    """The manifest with the present names of a calibration's friction; what is damaged stays for its readers."""
+    try:
+        provenance = manifest["provenance"]
+        kept = with_names_of_exponents(provenance["calibration"])
+        return manifest | {"provenance": {**provenance, "calibration": kept}}
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return manifest
 
 
 def _damaged(source: Path, why: str) -> InputError:

@@ -19,6 +19,7 @@ from psdmc.calibration.campaign import (
 from psdmc.calibration.given_load import given_load
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.trajectory import write_trajectory
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign
 from psdmc.calibration.sources import LogNaming
@@ -45,12 +46,13 @@ def excite_command(
 
     force   replace the plan of an existing campaign; without it, InputError before the search
     """
+    began = cpu_seconds()
     options = options or CampaignOptions()
     if not force:
         require_free(folder)
     known = load(model)
     require_axes(known.mechanism, "a campaign")
-    plan = plan_campaign(known, regressor_of(known, progress), options, progress)
+    plan = plan_campaign(known, regressor_of(known, progress), options, progress, began)
     one_period = plan.found.motion.sampled(known.joint_names, options.sweep.period)
     picture = excitation_figure(plan.found, known.joint_names, [joint.limits for joint in plan.chain.joints])
     with being_written(folder):

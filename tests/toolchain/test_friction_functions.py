@@ -22,7 +22,9 @@ from psdmc.emit.package import PackageView, package_view
 from psdmc.errors import InputError
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.linear_friction import linear_friction
 from psdmc.model.load import load
+from psdmc.model.store import save
 from psdmc.robot.reference import reference
 from psdmc.toolchain.build_package import build_package
 
@@ -227,3 +229,36 @@ def test_packages_without_it_say_nothing(tmp_path: Path) -> None:
     assert not [
         path for path in (tmp_path / "c").rglob("*") if path.is_file() and "friction(" in path.read_text()
     ]
+
+
+@pytest.mark.parametrize("exponents", [(0.5, 1.0), (1.0, 0.5), (0.5,), (0.5, 2.0)])
+def test_viscous_terms_are_called_by_their_exponents_and_those_of_psdmc_0_1_are_read(
+    exponents: tuple[float, ...], tmp_path: Path
+):
+    """Files of 0.1 call the first term viscous, whatever its exponent."""
+    model = bundled_model("two_link_full")
+    values = {d: 1.0 + d * np.arange(1.0, 3.0) for d in exponents}
+    names = {"0.1": ["viscous", *(f"viscous^{d:g}" for d in exponents[1:])]}
+    names["now"] = ["viscous" if d == 1.0 else f"viscous^{d:g}" for d in exponents]
+    speed = np.linspace(-2.0, 2.0, 9)[:, None] * np.ones(2)
+    size = sum(value * np.abs(speed) ** d for d, value in values.items())
+
+    for version, called in names.items():
+        columns = {"coulomb": COULOMB, **dict(zip(called, values.values(), strict=True)), "offset": OFFSET}
+        rows = [
+            {"joint": joint, "name": name, "value": float(column[k]), "unit": "Nms/rad"}
+            for name, column in columns.items()
+            for k, joint in enumerate(model.joint_names)
+        ]
+        law = {"law": "linear", "exponents": list(exponents), "sign_speed": SIGN_SPEED}
+        kept = {"friction": rows, "prediction": law}
+        save(
+            replace(model, provenance={**model.provenance, "calibration": kept}), tmp_path / f"{version}.npz"
+        )
+
+        found = load(tmp_path / f"{version}.npz")
+
+        expected = np.tanh(speed / SIGN_SPEED) * (COULOMB + size) + OFFSET
+        assert np.allclose(linear_friction(found).torque(speed), expected, rtol=1e-14)
+        said = [row["name"] for row in found.provenance["calibration"]["friction"]][2:-2:2]
+        assert said == names["now"]

@@ -21,7 +21,7 @@ from psdmc.robot.mechanism import Mechanism
 class LinearOptions:
     """Options of the linear fit of one log.
 
-    exponents   of the viscous terms |qd|^d sign(qd), each with a coefficient of its own; the first is `viscous`
+    exponents   of the viscous terms |qd|^d sign(qd), each with a coefficient of its own
     sign_speed  rad/s over which Coulomb friction changes sign: tanh(qd / sign_speed)
     offset      whether each joint's torque has a constant of its own
     stretch     rows of a log that are filtered at once

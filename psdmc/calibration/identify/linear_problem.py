@@ -18,6 +18,7 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.model.linear_friction import viscous_name
 from psdmc.progress import Step
 from psdmc.robot.mechanism import Mechanism
 
@@ -68,8 +69,7 @@ class LinearProblem:
 
 def friction_names(exponents: Sequence[float], offset: bool) -> tuple[str, ...]:
     """Names of a joint's friction columns, in order."""
-    viscous = tuple("viscous" if k == 0 else f"viscous^{d:g}" for k, d in enumerate(exponents))
-    return ("coulomb", *viscous, *(("offset",) if offset else ()))
+    return ("coulomb", *(viscous_name(d) for d in exponents), *(("offset",) if offset else ()))
 
 
 def friction_terms(qd: Array, sign_speed: float, exponents: Sequence[float], offset: bool) -> list[Array]:

@@ -15,7 +15,7 @@ class CheckOptions:
     free_position      rad, largest believable position of a joint without limits
     free_speed         rad/s, largest believable speed of a joint without a limit
     rate_disagreement  share by which the logged velocity may differ from the position's slope
-    saturated_share    share of samples at the largest effort from which it counts as saturated
+    saturated_share    share of a moving joint's samples at one extreme effort from which it may be saturated
     shortest           s, shortest log that is read
     samples_per_cycle  smallest sampling rate in units of the filter's cut-off
     smallest_motion    rad or m, peak to peak; below it a joint is at rest

@@ -41,7 +41,7 @@ def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions
             f"{log.name}: too short: {len(log)} row(s)", f"at least {options.shortest:g} s are needed"
         )
     log = log.ordered(chain.joint_names)
-    survey = surveyed(log)
+    survey = surveyed(log, options.saturated_share)
     for stage in _FAULTS:
         found = [check(log, survey, chain, cutoff, options) for check in stage]
         # the first of each kind before the others: one wrong unit gives a fault for every joint
@@ -183,12 +183,8 @@ def _jitter(log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, option
 def _saturation(
     log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[str]:
-    notes = []
-    for k, name in enumerate(log.joint_names):
-        largest, share = float(survey.largest_effort[k]), float(survey.saturated[k])
-        if largest > 0 and share > options.saturated_share:
-            notes.append(f"joint {name}: {share:.0%} of its {log.quantity} sits at {largest:.4g}: saturated?")
-    return notes
+    names = listed([found.words for found in survey.saturated])
+    return [f"{log.quantity} saturated? {names} of its moving rows"] if survey.saturated else []
 
 
 def _still(log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions) -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array, Log
+from psdmc.calibration.logs.saturation import Saturated, saturated
 from psdmc.calibration.logs.stored_log import AnyLog
 
 STRETCH_ROWS = 32_768
@@ -37,7 +38,7 @@ class Survey:
     slope_power     (n,)  sum of squared slopes
     slope_velocity  (n,)  sum of slope times logged velocity; None where there is none
     largest_effort  (n,)  |effort|
-    saturated       (n,)  share of rows with the largest effort
+    saturated       efforts that stay at an extreme value while their joint moves
     """
 
     no_numbers: tuple[NoNumber, ...]
@@ -47,7 +48,7 @@ class Survey:
     slope_power: Array
     slope_velocity: Array | None
     largest_effort: Array
-    saturated: Array
+    saturated: tuple[Saturated, ...]
 
     @property
     def velocity_ratios(self) -> dict[int, float]:
@@ -62,15 +63,19 @@ SEEN_MOTION = 1e-2
 """rad or m, peak to peak, from which a joint's slope is compared with its velocity."""
 
 
-def surveyed(log: AnyLog) -> Survey:
-    """The survey of a log of two rows or more."""
+def surveyed(log: AnyLog, saturated_share: float) -> Survey:
+    """The survey of a log of two rows or more.
+
+    saturated_share  of rows at an extreme effort from which it counts as saturated
+    """
     n = len(log.joint_names)
     bad: dict[str, NoNumber] = {}
     low, high, reach = np.full(n, np.inf), np.full(n, -np.inf), np.zeros(n)
     power, by_velocity, has_velocity = np.zeros(n), np.zeros(n), False
-    largest, at_largest = np.zeros(n), np.zeros(n)
+    largest = np.zeros(n)
     every = -(-len(log) // MOST_SLOPES)
     slopes: list[Array] = []
+    efforts: list[Array] = []
     with np.errstate(all="ignore"):
         for start in range(0, len(log), STRETCH_ROWS):
             part = log.rows(max(start - 1, 0), start + STRETCH_ROWS + 1)
@@ -86,9 +91,10 @@ def surveyed(log: AnyLog) -> Survey:
                 by_velocity += np.sum(slope * part.velocity[1:-1], axis=0)
             first = max(start, 1)
             slopes.append(slope[(-first) % every :: every])
+            efforts.append(part.effort[1:-1][(-first) % every :: every])
             own = part.rows(start - max(start - 1, 0), start - max(start - 1, 0) + STRETCH_ROWS)
             _note_no_numbers(bad, own, start)
-            largest, at_largest = _saturation(np.abs(own.effort), largest, at_largest)
+            largest = np.maximum(largest, np.abs(own.effort).max(axis=0))
         ranked = np.concatenate(slopes)
         speed = np.quantile(np.abs(ranked), FAST_SHARE, axis=0) if len(ranked) else np.zeros(n)
         return Survey(
@@ -99,24 +105,17 @@ def surveyed(log: AnyLog) -> Survey:
             power,
             by_velocity if has_velocity else None,
             largest,
-            at_largest / len(log),
+            ()
+            if bad
+            else saturated(
+                log.joint_names, np.concatenate(efforts), ranked, np.asarray(speed), saturated_share
+            ),
         )
 
 
 def position_slope(log: Log) -> Array:
     """(N - 2, n) central differences over two periods: too coarse for dynamics, enough to distinguish units."""
     return np.asarray((log.position[2:] - log.position[:-2]) / (log.time[2:] - log.time[:-2])[:, None])
-
-
-SAME = 1e-9
-"""Relative difference up to which two efforts count as equal."""
-
-
-def _saturation(effort: Array, largest: Array, count: Array) -> tuple[Array, Array]:
-    """The largest effort so far, and rows that have it."""
-    now = np.maximum(largest, effort.max(axis=0))
-    kept = np.where(largest >= now * (1 - SAME), count, 0.0)
-    return now, kept + np.sum(effort >= now * (1 - SAME), axis=0)
 
 
 def _note_no_numbers(bad: dict[str, NoNumber], part: Log, start: int) -> None:

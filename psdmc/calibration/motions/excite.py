@@ -3,7 +3,8 @@ limits that every candidate keeps."""
 
 from __future__ import annotations
 
-import time
+import bisect
+import heapq
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,7 +17,7 @@ from psdmc.calibration.motions.criterion import Scaled, scaled
 from psdmc.calibration.motions.excite_options import ExciteOptions as ExciteOptions
 from psdmc.calibration.motions.fit_columns import FitColumns
 from psdmc.calibration.motions.limited_sines import LimitedSines
-from psdmc.calibration.motions.search import Criterion, SearchProgress, search
+from psdmc.calibration.motions.search import Criterion, SearchProgress, cpu_seconds, search
 from psdmc.calibration.motions.sine_sum import SineSum as SineSum
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Joint, Mechanism
@@ -39,8 +40,10 @@ class Excitation:
 
     condition         of the scaled columns along it
     random_conditions (random,) of random motions within the same limits, ascending; infinite where a motion asks too
-                      much torque at any amplitude
+                      much torque at any amplitude. None that is better by the objective than the best allowed one is left
+                      where it hits something
     history           (k, 2) evaluations and best score so far: the objective
+    seconds           of CPU, since the count of the options began
     ended_by_clock    whether the clock ended the search: another machine, or another day, finds another motion
     deviation         bound on standard deviations along it (criterion.Scaled);  random_deviation of the best random motion
     """
@@ -72,56 +75,55 @@ def excite(
     options: ExciteOptions | None = None,
     progress: SearchProgress | None = None,
     allowed: Allowed | None = None,
+    began: float | None = None,
 ) -> Excitation:
     """Search for an exciting motion by quasi-Newton descents, started from the best random ones.
 
     model    columns that count; or a regressor, all of whose columns do
     allowed  limits of torque and clearance beside the joints' own; None: none
+    began    cpu_seconds() from which the options' seconds count; None: now
 
-    The result depends on the options alone where the clock does not end the search. InputError where a joint has no
-    limits to keep, or no motion is allowed.
+    The result is never worse than the best of the random motions, which keep the same limits and hit nothing. It depends on
+    the options alone where the clock does not end the search. InputError where a joint has no limits to keep, or no motion
+    is allowed.
     """
     options, allowed = options or ExciteOptions(), allowed or Allowed(chain)
     require_limits(chain.joints)
     columns = model if isinstance(model, FitColumns) else _all_of(model, len(chain))
     space = LimitedSines(chain, options)
-    begin = time.monotonic()
+    begin = cpu_seconds() if began is None else began
     drawn = space.drawn(options.random, np.random.default_rng(options.seed))
     torques_alone = Allowed(chain, allowed.torques, allowed.torque_margin)
     random = [_within(space.motion(point), space, columns, torques_alone) for point in drawn]
-    conditions = np.array([np.inf if seen is None else seen[1].condition for seen in random])
-    deviations = [np.inf if seen is None else seen[1].deviation for seen in random]
     scores = [np.inf if seen is None else seen[1].score(options.objective) for seen in random]
     starts = drawn[np.argsort(scores, kind="stable")]
+    best_random = _best_allowed(random, space, columns, allowed)
+    seen = [np.inf if each is None else each[1].condition for each in random]
+    deviations = [np.inf if each is None else each[1].deviation for each in random]
     criterion = Criterion(space, columns, options, allowed.torques)
     is_free = None if allowed.clearance is None else _free(space, allowed)
     if is_free is not None:
         cleared = [_cleared(space, point, is_free) for point in starts[:STARTS_FREE]]
         kept = [point for point in cleared if point is not None]
         starts = np.array(sorted(kept, key=criterion.score)).reshape(-1, space.size)
-    found = search(criterion, starts, is_free, progress)
-    reached = [
-        _within(space.motion(point), space, columns, allowed) for point in (*found.points, *starts[:1])
-    ]
-    usable = [
-        (seen.score(options.objective), k, motion, seen)
-        for k, (motion, seen) in enumerate(filter(None, reached))
-    ]
-    if not usable:
+    found = search(criterion, starts, begin, is_free, progress)
+    reached = [_within(space.motion(point), space, columns, torques_alone) for point in found.points]
+    best = _best_allowed([*reached, best_random], space, columns, allowed)
+    if best is None:
         raise InputError(
             f"no exciting motion is allowed: {_why_not(space, drawn[0], allowed)}",
             "give other limits (--range, --effort, --torque-margin), or a floor that is lower",
         )
-    _, _, motion, seen = min(usable, key=lambda each: each[:2])
+    motion, reached_columns = best
     return Excitation(
         motion,
-        seen.condition,
-        np.sort(conditions),
+        reached_columns.condition,
+        np.sort(seen),
         found.history,
         found.evaluations,
-        time.monotonic() - begin,
+        cpu_seconds() - begin,
         found.ended_by_clock,
-        seen.deviation,
+        reached_columns.deviation,
         min(deviations),
     )
 
@@ -160,11 +162,47 @@ def _seen(motion: SineSum, space: LimitedSines, columns: FitColumns) -> Scaled:
 def _within(
     motion: SineSum, space: LimitedSines, columns: FitColumns, allowed: Allowed
 ) -> tuple[SineSum, Scaled] | None:
-    """The motion with the largest amplitude that is allowed, and its columns; None where none is."""
-    for share in SHRINKS:
-        shrunk = motion.shrunk(share)
-        if not _faults(shrunk, space, allowed):
-            return shrunk, _seen(shrunk, space, columns)
+    """The motion with the largest amplitude that is allowed, and its columns; None where none is. Where the smallest is
+    allowed, each smaller one than an allowed one is taken to be."""
+
+    def is_allowed(share: float) -> bool:
+        return not _faults(motion.shrunk(share), space, allowed)
+
+    if is_allowed(SHRINKS[0]):
+        share = SHRINKS[0]
+    elif is_allowed(SHRINKS[-1]):
+        share = SHRINKS[bisect.bisect_left(SHRINKS, True, key=is_allowed)]
+    else:
+        share = next(filter(is_allowed, SHRINKS), 0.0)
+    if not share:
+        return None
+    shrunk = motion.shrunk(share)
+    return shrunk, _seen(shrunk, space, columns)
+
+
+def _best_allowed(
+    motions: list[tuple[SineSum, Scaled] | None], space: LimitedSines, columns: FitColumns, allowed: Allowed
+) -> tuple[SineSum, Scaled] | None:
+    """The best motion by the objective, each with the largest amplitude at which it is allowed; None where none is.
+
+    The best is looked at first. What hits something becomes smaller, in the list, too, and waits for its turn with what its
+    columns are then: smaller motions excite less.
+    """
+    objective = space.options.objective
+    waiting = [(each[1].score(objective), k, 1.0) for k, each in enumerate(motions) if each is not None]
+    heapq.heapify(waiting)
+    while waiting:
+        _, k, share = heapq.heappop(waiting)
+        found = motions[k]
+        assert found is not None
+        if not _faults(found[0], space, allowed):
+            return found
+        motions[k] = None
+        if share > SHRINKS[-1]:
+            smaller = found[0].shrunk(SHRINKS[1])
+            seen = _seen(smaller, space, columns)
+            motions[k] = smaller, seen
+            heapq.heappush(waiting, (seen.score(objective), k, share * SHRINKS[1]))
     return None
 
 

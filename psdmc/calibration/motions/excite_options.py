@@ -40,8 +40,10 @@ class ExciteOptions:
                    deviations; condition: smallest condition number, whatever the lengths; log_det: largest log determinant
     margin         share of the limits of position, speed and acceleration that is used
     torque_margin  share of the torque limits; friction that the model does not know and the controller need the rest
-    seconds        s, wall-clock limit of the search
-    evaluations    of the criterion with its gradient: they, and not the clock, end the search where `seconds` are enough
+    seconds        s of CPU in all, child processes included, after which the search ends; the random motions and the checks
+                   of limits and collisions are made all the same
+    evaluations    of the criterion with its gradient: they, and not the clock, end the search where `seconds` are enough;
+                   only then does a seed give the same motion again
     seed           of the random trajectories, which are compared with and started from
     random         number of random trajectories
     """
@@ -52,7 +54,7 @@ class ExciteOptions:
     objective: Objective = "deviation"
     margin: float = 0.98
     torque_margin: float = 0.8
-    seconds: float = 600.0
+    seconds: float = 60.0
     evaluations: int = 6000
     seed: int = 1
     random: int = 1000

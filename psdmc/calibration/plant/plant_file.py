@@ -1,6 +1,7 @@
 """A virtual robot's files: the plant (motors, friction, sensors, harness) and the DH table that it names.
 
-The robot's values are read by code of its own here, so that the virtual robot shares none with the calibration.
+A DH table's values are read by code of its own here and a URDF's by Pinocchio, so that the virtual robot shares none with
+the calibration.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
 from psdmc.reading import read_rest
 from psdmc.robot.dh import read_dh
+from psdmc.robot.tree import default_tip
+from psdmc.robot.urdf import read_urdf
 
 Triple = tuple[float, float, float]
 WHAT = "a plant (.toml), such as examples/plants/denso_virtual.toml"
@@ -40,15 +43,22 @@ LARGEST_BODY = 1e6
 """kg, kg m^2 of a link or drive."""
 ROUNDED = 1e-12
 """Share of an inertia's largest entry by which a principal moment may be negative: rounding."""
+MOVABLE = ("revolute", "continuous", "prismatic")
+"""Types of a URDF's joints that a plant can move."""
 SLIDES = {"revolute": False, "prismatic": True}
 """By a row's type."""
+LARGEST_URDF = 16 * 1024**2
+"""Bytes: a thousand times an ordinary robot's."""
 LARGEST_PLANT = 100
 """Joints of a virtual robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointTruth:
-    """One joint's motor and friction: K_t (N m/A) and the seven LuGre parameters in the order of (12) to (14), SI."""
+    """One joint's motor and friction: K_t (N m/A) and the seven LuGre parameters in the order of (12) to (14), SI.
+
+    drive_inertia  kg m^2 (kg) at the joint, which a URDF cannot state; a DH table states its own
+    """
 
     name: str
     torque_constant: float
@@ -59,6 +69,7 @@ class JointTruth:
     damping: float
     viscous: float
     viscous_exponent: float
+    drive_inertia: float = 0.0
 
     def bristle_limit(self, v: float) -> float:
         """g(v), (13)."""
@@ -119,10 +130,22 @@ class PlantRobot:
 
 
 @dataclass(frozen=True, slots=True)
+class PlantUrdf:
+    """A URDF's text; joints that the plant does not list are held at zero.
+
+    tip  link that carries a load
+    """
+
+    name: str
+    text: str
+    tip: str
+
+
+@dataclass(frozen=True, slots=True)
 class Plant:
     """The content of both files."""
 
-    robot: PlantRobot
+    robot: PlantRobot | PlantUrdf
     joints: tuple[JointTruth, ...]
     sensors: Sensors
     harness: Harness | None
@@ -136,7 +159,7 @@ def read_plant(path: Path) -> Plant:
 def plant_of(content: dict[str, Any], path: Path) -> Plant:
     """The plant of a file's content; `path` is the file that it came from."""
     faults: list[str] = []
-    table = TomlTable(content, "plant", ("robot", "sensors", "harness", "joint"), faults)
+    table = TomlTable(content, "plant", ("robot", "tip", "sensors", "harness", "joint"), faults)
     where = path.parent / table.text("robot")
     rows = table.items("joint")
     if len(rows) > LARGEST_PLANT:
@@ -146,7 +169,15 @@ def plant_of(content: dict[str, Any], path: Path) -> Plant:
     sensors = _sensors(table.content.get("sensors", {}), faults)
     names = [joint.name for joint in joints]
     held = _harness(table.content["harness"], names, faults) if table.has("harness") else None
+    tip = table.text("tip") if table.has("tip") else None
+    is_table = where.suffix.lower() == ".toml"
+    if is_table and tip is not None:
+        faults.append("tip: found with a DH table, whose last link is the tip; expected with a URDF only")
+    if is_table and any(joint.drive_inertia for joint in joints):
+        faults.append("drive_inertia: found with a DH table, which states its own; expected with a URDF only")
     require_none(faults, str(path), HINT)
+    if not is_table:
+        return Plant(read_plant_urdf(where, names, tip), joints, sensors, held)
     robot = read_plant_robot(where)
     wanted = [row.name for row in robot.rows]
     if names != wanted:
@@ -162,13 +193,12 @@ def plant_texts(path: str | Path) -> tuple[bytes, bytes]:
     """The bytes that a plant depends on: its own file's and its robot's."""
     path = Path(path)
     robot = path.parent / str(read_toml(path, WHAT).get("robot"))
-    own, other = (_bytes_of(file) for file in (path, robot))
-    return own, other
+    return _bytes_of(path), _bytes_of(robot, LARGEST_URDF)
 
 
-def _bytes_of(path: Path) -> bytes:
-    with opened(path, LARGEST_TOML) as file:
-        return read_rest(file, LARGEST_TOML, str(path), SHORTER)
+def _bytes_of(path: Path, limit: int = LARGEST_TOML) -> bytes:
+    with opened(path, limit) as file:
+        return read_rest(file, limit, str(path), SHORTER)
 
 
 def _truth(value: object, where: str, faults: list[str]) -> JointTruth:
@@ -186,6 +216,7 @@ def _truth(value: object, where: str, faults: list[str]) -> JointTruth:
         viscous_exponent=table.number("viscous_exponent", 0.0, LARGEST_EXPONENT),
         stiffness=table.number("stiffness", SMALLEST, LARGEST),
         damping=table.number("damping", 0.0, LARGEST),
+        drive_inertia=table.number("drive_inertia", 0.0, LARGEST_BODY, 0.0),
     )
 
 
@@ -215,6 +246,26 @@ def _harness(value: object, names: Sequence[str], faults: list[str]) -> Harness:
         table.number("torque", 0.0, LARGEST),
         table.number("angle", SMALLEST, LARGEST, 1.0),
     )
+
+
+def read_plant_urdf(path: Path, names: Sequence[str], tip: str | None) -> PlantUrdf:
+    """A virtual robot's URDF; InputError where it is none, or lacks the plant's joints or the tip."""
+    data = _bytes_of(path, LARGEST_URDF)
+    with decoding(str(path), "a robot (.toml or .urdf)"):
+        text = data.decode("utf-8-sig")
+    robot = read_urdf(text, str(path))
+    movable = [joint.name for joint in robot.joints if joint.type in MOVABLE and joint.mimic is None]
+    odd = [quoted(name) for name in names if name not in movable]
+    if odd or not names:
+        raise InputError(
+            f"{path}: no joint(s) {listed(odd) or 'in the plant'} that turn or slide on their own",
+            f"it has {listed([quoted(name) for name in movable]) or 'none'}",
+        )
+    if tip is None:
+        tip, _ = default_tip(robot, robot.root, str(path))
+    if tip not in robot.inertials:
+        raise InputError(f"{path}: no link {quoted(tip)}", "give tip = the link that carries a load")
+    return PlantUrdf(robot.name, text, tip)
 
 
 def read_plant_robot(path: Path) -> PlantRobot:

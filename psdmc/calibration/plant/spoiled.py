@@ -50,3 +50,17 @@ def _changed(log: Log, columns: Sequence[str], change: Callable[[Array], Array])
     if velocity is not None and "velocity" in columns:
         velocity = change(velocity)
     return replace(log, position=position, velocity=velocity, effort=effort)
+
+
+def clipped(log: Log, share: float) -> Log:
+    """The log with every joint's effort cut off at a share of its peak."""
+    peak = share * np.abs(log.effort).max(axis=0)
+    return replace(log, effort=np.clip(log.effort, -peak, peak))
+
+
+def late(log: Log, rows: int) -> Log:
+    """The log whose effort comes so many rows late."""
+    velocity = None if log.velocity is None else log.velocity[rows:]
+    return replace(
+        log, time=log.time[rows:], position=log.position[rows:], velocity=velocity, effort=log.effort[:-rows]
+    )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,16 @@ from scipy.integrate import ODEintWarning, odeint
 from psdmc.calibration.logs.foreign_bytes import decoding
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.motions.trajectory import Trajectory
-from psdmc.calibration.plant.plant_file import Harness, JointTruth, PlantRobot, Sensors, read_plant
+from psdmc.calibration.plant.plant_file import (
+    Harness,
+    JointTruth,
+    PlantRobot,
+    PlantUrdf,
+    Sensors,
+    read_plant,
+)
 from psdmc.errors import InputError
+from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 
 Array = NDArray[np.float64]
 
@@ -62,13 +70,13 @@ class VirtualRobot:
         """Names of the joints that slide."""
         kinds = [self.model.joints[k].shortname() for k in range(1, self.model.njoints)]
         pairs = zip(self.joint_names, kinds, strict=True)
-        return tuple(name for name, kind in pairs if kind == "JointModelPZ")
+        return tuple(name for name, kind in pairs if kind.startswith("JointModelP"))
 
 
 def load_virtual_robot(
     path: str | Path, *, ideal_sensors: bool = False, harness: bool = False
 ) -> VirtualRobot:
-    """A plant from its TOML file; `robot` there names a DH file beside it.
+    """A plant from its TOML file; `robot` there names a DH table or a URDF beside it.
 
     ideal_sensors  no noise, no steps, no delay
     harness        with the file's cable harness
@@ -81,10 +89,29 @@ def load_virtual_robot(
             f"{path}: no [harness] in this file", "leave --harness out, or add a [harness] to the plant"
         )
     with decoding(str(path), "a robot that Pinocchio takes", "correct the robot's file"):
-        model, tip = _pinocchio_model(plant.robot)
+        if isinstance(plant.robot, PlantUrdf):
+            model, tip = _model_of_urdf(plant.robot, plant.joints)
+        else:
+            model, tip = _pinocchio_model(plant.robot)
     sensors = Sensors() if ideal_sensors else plant.sensors
     held = plant.harness if harness else None
     return VirtualRobot(plant.robot.name, model, tip, plant.joints, sensors, held)
+
+
+def _model_of_urdf(robot: PlantUrdf, joints: Sequence[JointTruth]) -> tuple[Any, Any]:
+    """Pinocchio's model of a URDF with the plant's joints, and the tip's placement in the last one."""
+    names = [JOINT_PREFIX + joint.name for joint in joints]
+    model = pinocchio_model(robot.text, robot.name, [joint.name for joint in joints])
+    if list(model.names)[1:] != names:
+        order = ", ".join(name.removeprefix(JOINT_PREFIX) for name in list(model.names)[1:])
+        raise InputError(f"{robot.name}: joints in another order than the plant's", f"list them as {order}")
+    model.armature = np.array([joint.drive_inertia for joint in joints])
+    frame = model.frames[model.getFrameId(robot.tip, pin.FrameType.BODY)]
+    if frame.parentJoint != model.njoints - 1:
+        raise InputError(
+            f"{robot.name}: link {robot.tip} does not hang on the last joint", "give another tip"
+        )
+    return model, frame.placement
 
 
 def _pinocchio_model(robot: PlantRobot) -> tuple[Any, Any]:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.columns.columns import Columns, read_columns
 from psdmc.calibration.identify.coupling import coupling_of
 from psdmc.calibration.identify.extra import motion_of
@@ -22,6 +23,7 @@ from psdmc.calibration.identify.friction import FrictionResult, judge_friction, 
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import judge_gravity
 from psdmc.calibration.identify.inertial import judge_inertial
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import friction_names, friction_terms
 from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
 from psdmc.calibration.identify.motor import judge_motors
@@ -34,11 +36,13 @@ from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, st
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.load import load
+from psdmc.model.load import load, model_of
 from psdmc.model.store import save
+from psdmc.progress import silent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,16 +128,37 @@ def reread(model: DynamicsModel) -> DynamicsModel:
 
 
 def delivered_quality(
-    model: DynamicsModel, source: Sequence[AnyLog] | Runs, check: CheckOptions | None = None
+    model: DynamicsModel | str | Path,
+    source: str | Path | Sequence[AnyLog | str | Path] | Runs,
+    check: CheckOptions | None = None,
 ) -> tuple[StepQuality, ...]:
     """R^2 and RMSE of a calibrated model on logs, or on a campaign's runs, from the content of its file.
 
-    InputError where the model holds no calibration, or a log cannot be used.
+    model   or the path of its file
+    source  logs, or their paths; a campaign's runs, or its path; or the path of a log description
+
+    InputError where the model holds no calibration, or a file is missing or a log cannot be used.
     """
-    found = delivered(model)
-    if isinstance(source, Runs):
-        return _campaign_quality(found, source)
-    return (_log_quality(found, source, check or CheckOptions()),)
+    found = delivered(model_of(model))
+    given = [source] if isinstance(source, str | Path) else source
+    if not isinstance(given, Runs):
+        given = _read(found, given)
+    if isinstance(given, Runs):
+        return _campaign_quality(found, given)
+    return (_log_quality(found, given, check or CheckOptions()),)
+
+
+def _read(found: Delivered, given: Sequence[AnyLog | str | Path]) -> Sequence[AnyLog] | Runs:
+    """What was given, with paths read."""
+    paths = [Path(each) for each in given if isinstance(each, str | Path)]
+    names, law = found.model.joint_names, found.prediction
+    campaign = campaign_of(paths) if paths else None
+    if campaign is not None:
+        return read_campaign(campaign, names)
+    options = LinearOptions(exponents=law.exponents, offset=law.offset)
+    read = iter(plain_sources(paths, names, options, silent).logs if paths else ())
+    logs = [next(read) if isinstance(each, str | Path) else each for each in given]
+    return [*logs, *read]
 
 
 def log_parts(

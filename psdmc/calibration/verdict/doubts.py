@@ -8,6 +8,7 @@ import numpy as np
 
 from psdmc.calibration.identify.residuals import CORRELATED
 from psdmc.calibration.verdict.findings import Findings
+from psdmc.calibration.verdict.reasons import late
 from psdmc.calibration.verdict.verdict import listed
 
 ALONE = ("Motor", "Friction")
@@ -18,6 +19,8 @@ MOST_LISTED = 4
 
 def doubts(found: Findings) -> Iterator[str]:
     """All doubts."""
+    yield from _perhaps_saturated(found)
+    yield from _a_little_late(found)
     yield from _sampled_slowly(found)
     yield from _few(found)
     yield from _fair(found)
@@ -30,6 +33,22 @@ def doubts(found: Findings) -> Iterator[str]:
     yield from _open_parameters(found)
     yield from _indefinite(found)
     yield from _unchecked(found)
+
+
+def _perhaps_saturated(found: Findings) -> Iterator[str]:
+    """A doubt about efforts that friction of a constant size explains as well as a limit does."""
+    piled = found.evidence.saturated
+    if piled and not any(each.certain for each in piled):
+        yield (
+            f"the effort may saturate: {listed([each.words for each in piled])} of the rows in which it moves; "
+            "friction alone would look the same"
+        )
+
+
+def _a_little_late(found: Findings) -> Iterator[str]:
+    for delay in found.delays:
+        if delay.shown and found.limits.hardly_late < abs(delay.value) <= found.limits.late:
+            yield late(delay)
 
 
 def fits_poorly(found: Findings) -> bool:

@@ -7,15 +7,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import interpolate
 
 from psdmc.calibration.identify.coupling import Coupling
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
+from psdmc.calibration.logs.check_options import CheckOptions
 from psdmc.calibration.logs.filter import States, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.log_survey import surveyed
 from psdmc.calibration.logs.low_pass import FilterOptions
+from psdmc.calibration.logs.saturation import Saturated
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.model.dynamics_model import DynamicsModel
 
@@ -23,6 +27,12 @@ SIGN_SPEED = 0.03
 """rad/s over which Coulomb friction changes sign, as in the linear fit."""
 MOST_ROWS = 4000
 """Samples that a verdict uses; longer logs are thinned further, evenly."""
+MOST_SHIFTED = 12_000
+"""Samples of single joints whose torque is also taken at other times."""
+REACH = 0.5
+"""s, the longest delay that is looked for, either way."""
+PER_CYCLE = 16
+"""Delays that are tried in a period of the filter's cut-off; between them the residual is a parabola."""
 
 
 Torque = Callable[[States, NDArray[np.intp]], Array]
@@ -38,6 +48,24 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Shifted:
+    """A log's independent samples with torques of other times. N samples, n joints, D delays.
+
+    lags         (D,) s, evenly spaced about zero;  torque (N, n, D) so much later than the motion
+    q, qd, qdd   (N, n);  speed, sign (N, n) of the motors, as Evidence has them
+    """
+
+    log: str
+    lags: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    speed: Array
+    sign: Array
+    torque: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
     """Independent samples, one per half period of the cut-off. N samples, n joints.
 
@@ -48,6 +76,8 @@ class Evidence:
     torque      (N, n)  of the motors, N m (N), filtered, without what the tool weighs and springs take
     noise       (n,)    RMS of the sensor noise that passes the filter, from what lies above its cut-off
     coupling    of the motors that drive several joints together; None: motor k drives joint k
+    shifted     fewer samples, log by log, with torques of other times
+    saturated   where efforts stay at an extreme value
     """
 
     model: DynamicsModel
@@ -59,6 +89,8 @@ class Evidence:
     torque: Array
     noise: Array
     coupling: Coupling | None = None
+    shifted: tuple[Shifted, ...] = ()
+    saturated: tuple[Saturated, ...] = ()
 
     def __len__(self) -> int:
         return len(self.q)
@@ -134,10 +166,23 @@ def evidence_of(
 
     springs   their torque (rows, n) at rows of states; it is taken off, as what a tool weighs. None: no springs
     """
-    parts = [_samples(model, motion, motors, options, coupling, springs) for motion in motions]
+    most = max(1, MOST_SHIFTED // model.n // len(motions))
+    parts = [_samples(model, motion, motors, options, coupling, springs, most) for motion in motions]
     q, qd, qdd, sign, torque = (np.concatenate(x) for x in zip(*(part[:5] for part in parts), strict=True))
     noise = np.sqrt(np.mean([part[5] ** 2 for part in parts], axis=0))
-    return Evidence(model, regressor, q, qd, qdd, sign, torque, noise, coupling).thinned(MOST_ROWS)
+    shifted = tuple(part[6] for part in parts)
+    share = CheckOptions().saturated_share
+    logs = [motion.log.ordered(model.joint_names) for motion in motions]
+    piled = tuple(found for log in logs for found in surveyed(log, share).saturated)
+    whole = Evidence(model, regressor, q, qd, qdd, sign, torque, noise, coupling, shifted, piled)
+    return whole.thinned(MOST_ROWS)
+
+
+def delays_tried(cutoff: float) -> Array:
+    """(D,) s."""
+    step = 1.0 / (PER_CYCLE * cutoff)
+    count = int(np.ceil(REACH / step))
+    return np.asarray(step * np.arange(-count, count + 1), dtype=np.float64)
 
 
 def _samples(
@@ -147,20 +192,28 @@ def _samples(
     options: FilterOptions,
     coupling: Coupling | None,
     springs: Torque | None,
-) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """For one motion: q, qd, qdd, sign and torque of its samples, and the RMS noise that passes the filter if noise has
-    the same density below the cut-off as above."""
+    most: int,
+) -> tuple[Array, Array, Array, Array, Array, Array, Shifted]:
+    """For one motion: q, qd, qdd, sign and torque of its samples, the RMS noise that passes the filter if noise has the
+    same density below the cut-off as above, and at most about so many samples with torques of other times."""
     log = checked(motion.log, model.mechanism, options.cutoff)
     parts, above, count = [], np.zeros(model.n), 0
+    lags, moved = delays_tried(options.cutoff), []
+    every = max(1, round(2.0 * options.cutoff * log.duration / most))
     for stretch in stretches(log, options):
         states, at = stretch.states, stretch.at
         speed = states.qd if coupling is None else coupling.to_motors(states.qd)
         sign = states.low_pass(np.tanh(speed / SIGN_SPEED))
-        torque = motors.torque(states.effort)[at]
+        other = np.zeros((len(at), model.n))
         if motion.tool is not None:
-            torque = torque - payload_torque(model.mechanism, states.q[at], motion.tool.mass, motion.tool.com)
+            other = other + payload_torque(model.mechanism, states.q[at], motion.tool.mass, motion.tool.com)
         if springs is not None:
-            torque = torque - springs(states, at)
+            other = other + springs(states, at)
+        torque = motors.torque(states.effort)[at] - other
+        some, later = _at_other_times(states, at, lags, every)
+        rows = at[some]
+        shifted = (motors.torque(later) - other[some, None]).transpose(0, 2, 1)
+        moved.append((states.q[rows], states.qd[rows], states.qdd[rows], speed[rows], sign[rows], shifted))
         own = slice(at[0], at[-1] + 1)
         above += np.sum((states.raw[own] - states.effort[own]) ** 2, axis=0)
         count += at[-1] + 1 - at[0]
@@ -168,4 +221,15 @@ def _samples(
     q, qd, qdd, sign, torque = (np.concatenate(values) for values in zip(*parts, strict=True))
     share = options.cutoff / (0.5 / states.period - options.cutoff)
     noise = motors.torque(np.sqrt(share * above / count))
-    return q, qd, qdd, sign, torque, np.abs(noise)
+    moved_log = Shifted(log.name, lags, *(np.concatenate(values) for values in zip(*moved, strict=True)))
+    return q, qd, qdd, sign, torque, np.abs(noise), moved_log
+
+
+def _at_other_times(
+    states: States, at: NDArray[np.intp], lags: Array, every: int
+) -> tuple[NDArray[np.intp], Array]:
+    """Which of some rows have efforts at all these times from them (every so many of those), and these (rows, D, n)."""
+    used, times = states.time[states.use], states.time[at]
+    some = np.flatnonzero((times >= used[0] - lags[0]) & (times <= used[-1] - lags[-1]))[::every]
+    later = interpolate.CubicSpline(states.time, states.effort)(times[some, None] + lags)
+    return some, np.asarray(later, dtype=np.float64)

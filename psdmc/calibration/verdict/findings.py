@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.quality import Quality
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.verdict.delay import delays_of
 from psdmc.calibration.verdict.evidence import Evidence
 from psdmc.calibration.verdict.gains import friction_powers, joint_gains
 from psdmc.calibration.verdict.record import Calibration
@@ -36,6 +37,7 @@ class Demand:
 class Findings:
     """A record and the log that it was fitted to, with figures of both.
 
+    delays             of torques behind the motion, log by log, beyond what the record's own prediction has
     variation, speed   (n,) standard deviation of the torque; RMS speed
     fitted, held_out   per joint, of the whole torque: RMSE and R^2
     """
@@ -47,6 +49,8 @@ class Findings:
         self.names = record.joint_names
         self.gains = joint_gains(evidence)
         self.powers = friction_powers(evidence)
+        known = record.facts.get("delay_s", 0.0)
+        self.delays = delays_of(evidence.regressor, evidence.shifted, evidence.coupling, known)
         self.variation: Array = np.std(evidence.torque, axis=0)
         self.speed: Array = np.sqrt(np.mean(evidence.qd**2, axis=0))
         self.fitted = [_whole_torque(record, name, held_out=False) for name in self.names]

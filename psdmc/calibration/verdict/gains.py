@@ -76,7 +76,7 @@ def _line(evidence: Evidence, by_file: Array, k: int) -> _Line:
         return _Line(np.nan, np.inf, 0.0, variation, 0.0)
     gain = float(x @ y) / power
     left = y - gain * x
-    std = float(np.sqrt(_clustered(x[:, None] * left[:, None])[0, 0])) / power
+    std = float(np.sqrt(clustered(x[:, None] * left[:, None])[0, 0])) / power
     explained = abs(gain) * np.sqrt(power)
     whole = float(np.hypot(explained, np.linalg.norm(left)))
     correlation = explained / whole if whole > 0 else 0.0
@@ -126,7 +126,7 @@ def _power(evidence: Evidence, rigid: Array, k: int) -> Power:
         return unknown
     inverse = np.linalg.pinv((x / size).T @ (x / size), rcond=RANK_TOLERANCE**2) / np.outer(size, size)
     values = inverse @ (x.T @ y)
-    covariance = inverse @ _clustered(x * (y - x @ values)[:, None]) @ inverse
+    covariance = inverse @ clustered(x * (y - x @ values)[:, None]) @ inverse
     weight = rubbing.T @ evidence.qd[:, k] / len(evidence)
     return Power(float(weight @ values), float(np.sqrt(np.maximum(weight @ covariance @ weight, 0.0))))
 
@@ -146,7 +146,7 @@ def _less(explained: Array, values: Array) -> Array:
     return np.asarray(values - explained @ (explained.T @ values))
 
 
-def _clustered(scores: Array) -> Array:
+def clustered(scores: Array) -> Array:
     """Covariance of the scores' sum when neighbours in time depend on each other (Liang and Zeger 1986)."""
     count = min(CLUSTERS, len(scores))
     sums = np.zeros((count, scores.shape[1]))

@@ -39,6 +39,7 @@ def judge(
         suspects=likely,
         joints=tuple(found.figures(k) for k in range(len(found.names))),
         samples_per_unknown=min((demand.per_unknown for demand in found.demands), default=float("inf")),
+        delays=found.delays,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from psdmc.calibration.verdict.findings import Findings
-from psdmc.calibration.verdict.verdict import listed
+from psdmc.calibration.verdict.verdict import Delay, listed
 
 NOT_PHYSICAL = "not_physical"
 """Name of the fact that tells why a record has no physically consistent version."""
@@ -13,11 +13,37 @@ NOT_PHYSICAL = "not_physical"
 
 def reasons(found: Findings) -> Iterator[str]:
     """All reasons; none where it is usable."""
+    yield from _saturated(found)
+    yield from _late(found)
     yield from _unphysical(found)
     yield from _too_few(found)
     yield from _wrong_gains(found)
     yield from _powered(found)
     yield from _poor(found)
+
+
+def _saturated(found: Findings) -> Iterator[str]:
+    piled = found.evidence.saturated
+    if any(each.certain for each in piled):
+        yield (
+            f"the effort saturates: {listed([each.words for each in piled])} of the rows in which it moves: "
+            "record slower motions or smaller loads, or raise the limit that cuts it off"
+        )
+
+
+def _late(found: Findings) -> Iterator[str]:
+    for delay in found.delays:
+        if delay.shown and abs(delay.value) > found.limits.late:
+            yield late(delay)
+
+
+def late(delay: Delay) -> str:
+    """A delay, and how to take it out."""
+    columns = "[effort]" if delay.value > 0 else "[position] and [velocity]"
+    return (
+        f"{delay.log}: the torque comes {delay.words}: "
+        f"add that to `delay` of {columns} in a log description (--describe)"
+    )
 
 
 def _unphysical(found: Findings) -> Iterator[str]:

@@ -40,6 +40,27 @@ class JointFigures:
 
 
 @dataclass(frozen=True, slots=True)
+class Delay:
+    """s by which the torque of logs comes after their motion; std infinite where it may be longer still.
+
+    shown  whether the logs show that there is one
+    """
+
+    log: str
+    value: float
+    std: float
+    shown: bool
+
+    @property
+    def words(self) -> str:
+        side = "after" if self.value > 0 else "before"
+        if not math.isfinite(self.std):
+            return f"{abs(self.value):.3g} s or more {side} its motion"
+        digits = max(0, 1 - math.floor(math.log10(max(self.std, 1e-6))))
+        return f"{abs(self.value):.{digits}f} +- {self.std:.{digits}f} s {side} its motion"
+
+
+@dataclass(frozen=True, slots=True)
 class Verdict:
     """The verdict with all reasons and doubts.
 
@@ -48,6 +69,7 @@ class Verdict:
     suspects   possible explanations of a bad fit: joints swapped, signs reversed, units
     joints     figures, in the model's order
     samples_per_unknown   independent samples per fitted unknown, the smallest of all steps
+    delays     of torques behind the motion, log by log
     """
 
     reasons: tuple[str, ...]
@@ -55,6 +77,7 @@ class Verdict:
     suspects: tuple[str, ...]
     joints: tuple[JointFigures, ...]
     samples_per_unknown: float
+    delays: tuple[Delay, ...] = ()
 
     @property
     def usable(self) -> bool:
@@ -89,6 +112,9 @@ class Verdict:
             "suspects": list(self.suspects),
             "doubts": list(self.doubts),
             "samples_per_unknown": _plain(self.samples_per_unknown),
+            "delays": [
+                {"log": delay.log, "seconds": delay.value, "std": _plain(delay.std)} for delay in self.delays
+            ],
             "joints": {figures.joint: _figures(figures) for figures in self.joints},
         }
 

@@ -21,6 +21,7 @@ class VerdictOptions:
     sure                         standard deviations by which friction's power must be negative
     friction_share               of the motor's power below which friction is not judged
     of_limit                     largest torque over the file's effort limit: doubted outside
+    late, hardly_late            s between motion and torque: above, refused; doubted
     acceleration_lost            share by which differences of samples lose acceleration at the cut-off: doubted above
     """
 
@@ -39,4 +40,6 @@ class VerdictOptions:
     sure: float = 3.0
     friction_share: float = 0.02
     of_limit: tuple[float, float] = (0.01, 3.0)
+    late: float = 0.03
+    hardly_late: float = 0.02
     acceleration_lost: float = 0.05

@@ -11,11 +11,16 @@ import pytest
 from arms import LENGTH, pinocchio_of, urdf
 
 from psdmc.calibration.campaign_plan import CampaignOptions, plan_campaign
+from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions.clearance import APART, clearance_of, floor_points, spread
 from psdmc.calibration.motions.collision_shapes import mesh_file
-from psdmc.calibration.motions.excite import ExciteOptions
-from psdmc.calibration.motions.given_limits import GivenLimits
+from psdmc.calibration.motions.criterion import scaled
+from psdmc.calibration.motions.excite import ExciteOptions, excite
+from psdmc.calibration.motions.fit_columns import all_columns
+from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.limited_sines import LimitedSines
+from psdmc.calibration.motions.looked_at import allowed_of
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.compiler import derive
 from psdmc.errors import InputError
@@ -148,3 +153,31 @@ def test_poses_between_rows_are_looked_at():
     assert np.abs(np.diff(poses, axis=0)).max() <= 0.02 + 1e-12
     for row in path:
         assert np.abs(poses - row).max(axis=1).min() <= 0.02
+
+
+@pytest.mark.parametrize("random", [pytest.param(1000, marks=pytest.mark.slow), 30])
+def test_a_motion_is_never_worse_than_the_best_random_one_that_hits_nothing(tmp_path: Path, random: int):
+    """Each random motion here is made smaller until nothing forbids it, without the search's shortcuts; and the search has
+    no time."""
+    model = model_of(tmp_path, urdf())
+    regressor = ChainRegressor(model)
+    chain = bounded(model.mechanism, GivenLimits(acceleration=12.0))
+    allowed = allowed_of(model, chain, regressor, 0.8, (), None)
+    columns = all_columns(regressor, model.l, LinearOptions())
+    options = ExciteOptions(duration=5.0, samples=50, evaluations=1, random=random, seconds=0.0)
+
+    found = excite(chain, columns, options, allowed=allowed)
+
+    space, scores = LimitedSines(chain, options), []
+    stricter = replace(allowed, torque_margin=0.99 * 0.8)
+    for point in space.drawn(random, np.random.default_rng(options.seed)):
+        motion = space.motion(point)
+        for share in 0.97 ** np.arange(60):
+            small = motion.shrunk(share)
+            if not stricter.faults(small.sampled(chain.joint_names, 5.0 / 200)):
+                states = small.at(np.arange(space.samples) * 5.0 / space.samples)
+                scores.append(scaled(columns.at(*states)).deviation)
+                break
+    assert len(scores) > 0.5 * random
+    assert found.deviation <= 1.001 * min(scores)
+    assert allowed.faults(found.motion.sampled(chain.joint_names, 5.0 / 1000)) == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -67,15 +66,15 @@ class Bowl:
 
 
 def test_it_ends_by_the_clock_and_tells_how_far_it_is(monkeypatch):
-    """`--seconds` is the longest search, the walk included."""
+    """The search, the walk included, has four fifths of `--seconds`, which began two seconds before."""
     bowl = Bowl()
-    monkeypatch.setattr(search, "time", SimpleNamespace(monotonic=lambda: bowl.now))
+    monkeypatch.setattr(search, "cpu_seconds", lambda: bowl.now)
 
-    found = search.search(bowl, np.ones((1, 3)), lambda point: True, bowl.progress)
+    found = search.search(bowl, np.ones((1, 3)), -2.0, lambda point: True, bowl.progress)
 
     assert found.ended_by_clock
-    assert 20.0 < bowl.now < 23.0
-    assert bowl.told[-1][1] == pytest.approx(20.0, abs=1.5)
+    assert 14.0 < bowl.now < 17.0
+    assert bowl.told[-1][1] == pytest.approx(16.0, abs=1.5)
     assert all(earlier <= later for (earlier, _), (later, _) in pairwise(bowl.told))
 
 

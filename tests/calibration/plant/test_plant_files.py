@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from psdmc.calibration.plant.virtual_robot import load_virtual_robot
+from psdmc.calibration.motions.sweeps import SweepOptions, gravity_sweep
+from psdmc.calibration.plant.virtual_robot import Payload, load_virtual_robot, simulate
 from psdmc.errors import InputError
+from psdmc.export.export_urdf import export_urdf
 from psdmc.model.store import save
 
 
@@ -114,3 +117,52 @@ def test_angles_may_be_written_as_the_robot_files_do(arm, tmp_path: Path):
     (tmp_path / "plant.toml").write_text(arm.plant.read_text(encoding="utf-8"), encoding="utf-8")
 
     assert load_virtual_robot(tmp_path / "plant.toml").joint_names == ("shoulder", "elbow")
+
+
+def urdf_plant(arm, folder: Path, change: tuple[str, str] = ("", "")) -> Path:
+    """The arm's plant with a URDF that was exported from its model, and the drives' inertias with the joints."""
+    export_urdf(arm.model, folder / "two_link.urdf", mjcf=False)
+    text = arm.plant.read_text(encoding="utf-8").replace("two_link.toml", "two_link.urdf")
+    for name, drive in (("shoulder", 0.3), ("elbow", 0.1)):
+        text = text.replace(f'name = "{name}"', f'name = "{name}"\ndrive_inertia = {drive}')
+    (folder / "plant.toml").write_text(text.replace(*change) if change[0] else text, encoding="utf-8")
+    return folder / "plant.toml"
+
+
+def test_a_plant_of_a_urdf_logs_what_the_same_robots_table_does(arm, tmp_path: Path):
+    """Two readings: rows of a DH table here, the URDF's by Pinocchio; with a load on the tip and without."""
+    motion = gravity_sweep(arm.model.chain, 1, SweepOptions(speed=0.5, seconds=3.0, period=0.01))
+    robots = [load_virtual_robot(path, ideal_sensors=True) for path in (arm.plant, urdf_plant(arm, tmp_path))]
+
+    for load in (None, Payload(2.0, (0.1, 0.05, 0.02))):
+        table, urdf = (simulate(robot, motion, payload=load) for robot in robots)
+        assert urdf.joint_names == table.joint_names
+        assert np.abs(urdf.effort - table.effort).max() < 1e-7 * np.abs(table.effort).max()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('name = "shoulder"', 'name = "hip"'), "no joint(s) 'hip' that turn or slide on their own"),
+        (("[sensors]", 'tip = "hand"\n[sensors]'), "no link 'hand'"),
+        (("two_link.urdf", "none.urdf"), "none.urdf: no such file"),
+        (("drive_inertia = 0.3", "drive_inertia = -1"), "joint 'shoulder': drive_inertia: found -1"),
+    ],
+)
+def test_what_a_urdfs_plant_lacks_is_named(arm, tmp_path: Path, change: tuple[str, str], message: str):
+    with pytest.raises(InputError) as raised:
+        load_virtual_robot(
+            urdf_plant(arm, tmp_path, (change[0], change[1])), harness=message[:8] == "no joint"
+        )
+
+    assert message in raised.value.message
+
+
+def test_a_tables_plant_states_no_drive_inertia_and_no_tip(arm, tmp_path: Path):
+    plant = arm.plant.read_text(encoding="utf-8")
+
+    twice = plant.replace('name = "elbow"', 'name = "elbow"\ndrive_inertia = 0.1')
+    assert "drive_inertia: found with a DH table" in refused(arm, tmp_path, twice)
+    assert "tip: found with a DH table" in refused(
+        arm, tmp_path, plant.replace("[sensors]", 'tip = "x"\n[sensors]')
+    )

@@ -229,3 +229,22 @@ def test_a_log_of_currents_in_pieces(arm, log: Log, tmp_path: Path, capsys: pyte
     require_delivered(record, [stored], tmp_path, capsys)
     require_delivered(record, [currents], tmp_path, capsys)
     require_package(record, tmp_path)
+
+
+def test_files_may_be_given_by_their_paths(arm, plant_log: Log, noisy, tmp_path: Path):
+    """Of a model, a log, a description, and a campaign."""
+    record = calibrate_logs(
+        arm.model, [plant_log], CalibrateOptions(), arm.regressor, None, lambda step: None
+    )
+    save(record.model, tmp_path / "calibrated.npz")
+    written = written_log(plant_log, tmp_path / "log.npz")
+    (tmp_path / "log.toml").write_text('[[log]]\nfile = "log.npz"\n', encoding="utf-8")
+    (wanted,) = delivered_quality(record.model, [plant_log])
+
+    for source in (written, str(written), [written], tmp_path / "log.toml"):
+        (found,) = delivered_quality(tmp_path / "calibrated.npz", source)
+        assert found.joints == wanted.joints
+
+    folder, of_campaign = noisy
+    given = [delivered_quality(of_campaign.model, source) for source in (folder, read_campaign(folder))]
+    assert [step.joints for step in given[0]] == [step.joints for step in given[1]]
