@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,8 +28,8 @@ from psdmc.toolchain.call_arguments import bound_arguments, signature_of
 from psdmc.toolchain.compiled_functions import results
 from psdmc.toolchain.stubs import documentation
 
-KEPT = 8
-"""Models whose refusals are remembered: the mass matrix is looked at in hundreds of states for each."""
+_ADMITTED: WeakKeyDictionary[DynamicsModel, set[str]] = WeakKeyDictionary()
+"""Functions that each living model is known to have: the mass matrix is looked at in hundreds of states to find out."""
 
 
 def provider() -> Provider:
@@ -65,7 +65,8 @@ def evaluated(
     sizes = _sizes(model, recipe)
     lead, given = _states(signature, sizes, inputs)
     _refuse_other_lengths(model, signature, given)
-    _admit(model, recipe.name, theta_b is None)
+    if theta_b is None:
+        _admit(model, recipe.name)
     theta = _parameters(model, signature, theta_b)
     robot = RobotOnArrays.of(model, theta)
     found = _values(recipe, robot, given, sizes)
@@ -73,11 +74,12 @@ def evaluated(
     return outputs[0] if len(outputs) == 1 else results(signature)(*outputs)
 
 
-@lru_cache(2 * KEPT * len(RECIPES))
-def _admit(model: DynamicsModel, name: str, with_own_parameters: bool) -> None:
+def _admit(model: DynamicsModel, name: str) -> None:
     """InputError where the model cannot have a function."""
-    if with_own_parameters:
+    admitted = _ADMITTED.setdefault(model, set())
+    if name not in admitted:
         require(model, [name])
+        admitted.add(name)
 
 
 def _refuse_other_lengths(model: DynamicsModel, signature: Signature, given: Mapping[str, Array]) -> None:

@@ -101,7 +101,7 @@ def _near(word: str, names: Sequence[str]) -> str:
 
 
 def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> InputError:
-    joint = model.joint_names[singular.joint]
+    joint = model.joint_names[model.mechanism.rate_joints[singular.rate]]
     return InputError(
         f"{model.mechanism.name}: {name}: joint {joint!r} moves no inertia, the mass matrix is singular for every q",
         f"give its link an inertia, add --drive-inertia, or leave {name} out of --functions",

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, weakref_slot=True, eq=False)
 class DynamicsModel(Answers):
     """Inverse dynamics as monomials times constants: tau[i] = y(state) @ P[i] @ theta_b.
 
