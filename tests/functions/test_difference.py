@@ -141,7 +141,10 @@ def test_compiled_code_keeps_them_too() -> None:
         q0, q1 = own.given["q0"][0].copy(), own.given["q1"][0].copy()
         q0[3:7], q1[3:7] = first, second
         expected = turn_between(first, second)
-        for found in (robot.difference(q0, q1), robot.difference(np.tile(q0, (9, 1)), np.tile(q1, (9, 1)))[4]):
+        for found in (
+            robot.difference(q0, q1),
+            robot.difference(np.tile(q0, (9, 1)), np.tile(q1, (9, 1)))[4],
+        ):
             assert np.linalg.norm(found[3:6] - expected) < 16 * EPSILON * np.linalg.norm(expected)
 
 

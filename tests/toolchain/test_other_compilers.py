@@ -80,7 +80,7 @@ def test_tcc_builds_a_package_without_limits_and_its_self_test_passes(tmp_path: 
     psdmc.emit_c(psdmc.derive(tmp_path / "wheel.urdf"), package, functions=["inverse_dynamics"], real=real)
     (tmp_path / "limits.c").write_text(
         "#include <stdio.h>\n#include <wheel/wheel.h>\n"
-        "int main(void) { printf(\"%g %g %g\", (double)wheel_position_lower[0], (double)wheel_position_upper[0],"
+        'int main(void) { printf("%g %g %g", (double)wheel_position_lower[0], (double)wheel_position_upper[0],'
         " (double)wheel_effort_limit[0]); return 0; }\n",
         encoding="utf-8",
     )
