@@ -305,7 +305,8 @@ def _package(
     adapters: Sequence[str] = (),
     friction: bool = False,
 ) -> PackageView:
-    names = wanted(with_needed(wanted(functions, model.mechanism), adapters), model.mechanism)
+    wide = model.nq > model.nv
+    names = wanted(with_needed(wanted(functions, model.mechanism), adapters, wide), model.mechanism)
     require(model, names)
     costs = options.target.costs
     kernels = lowered_once(

@@ -214,8 +214,10 @@ def emit_c(
     """Write a model's C package: header, sources, build files, self-test."""
     from psdmc import compiler
     from psdmc.cli.one_line import one_line
+    from psdmc.emit.adapters import lacking
     from psdmc.emit.names import identifier
     from psdmc.emit.write import require_own_folder
+    from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction
     from psdmc.model.load import load
@@ -255,6 +257,9 @@ def emit_c(
         print(f"note: in C '{one_line(asked)}' is {in_c}")
     elif output is None and asked != folder.name:
         print(f"note: in C it is {asked}; --name gives it another name")
+    for reason in lacking(found.mechanism, names(adapters)):
+        work = ", ".join(kernels.wanted(wanted, found.mechanism))
+        print(f"note: {reason}; CasADi can call, without derivatives: {work}")
     for note in run_time_only(found, wanted):
         print(f"note: {note}")
     for what in beyond_friction(found):
