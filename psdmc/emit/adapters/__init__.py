@@ -11,8 +11,8 @@ from psdmc.robot.mechanism import Mechanism
 
 ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView], bool], str]] = {"casadi": casadi.source}
 """By name, the function that makes an adapter's C file, <name>/<robot>_<name>.c, from the robot's identifier, the
-package's real type, its kernels and whether q is longer than the rates. The file includes the library's sources and becomes a shared library of its own,
-lib<robot>_<name>."""
+package's real type, its kernels and whether q is longer than the rates. The file includes the library's sources and
+becomes a shared library of its own, lib<robot>_<name>."""
 
 NEEDS = {"casadi": casadi.needed}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""

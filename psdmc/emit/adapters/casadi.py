@@ -109,7 +109,9 @@ def lacking(robot: Mechanism) -> str | None:
     if robot.nq == robot.nv:
         return None
     wide = next(joint for joint in robot.joints if joint.type.nq > joint.type.nv)
-    what = "a floating base" if robot.has_free_root else f"joint {wide.name!r}, whose q is longer than its rates"
+    what = (
+        "a floating base" if robot.has_free_root else f"joint {wide.name!r}, whose q is longer than its rates"
+    )
     return f"CasADi derivatives are not available for {what}"
 
 
