@@ -25,6 +25,9 @@ if sys.platform != "win32":
 
 _TEMPORARY = re.compile(r"\.psdmc-[0-9a-f]{16}\.part(\.[a-z]{1,8})?")
 
+SHOWN = 3
+"""Names that a message lists of a folder's."""
+
 _THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE)
 """Errors of the disk: writing under another name would not help."""
 
@@ -77,6 +80,20 @@ def make_folder(path: str | os.PathLike[str]) -> None:
     """Make a folder and those above it where they are missing; errors as write_whole."""
     with system_errors_at(path):
         Path(path).mkdir(parents=True, exist_ok=True)
+
+
+def refuse_foreign_folder(path: str | os.PathLike[str], remedy: str) -> None:
+    """InputError where a folder holds anything but dot files, or is no folder. One that is missing or empty is free."""
+    with system_errors_at(path):
+        try:
+            found = sorted(name for name in os.listdir(path) if not name.startswith("."))
+        except FileNotFoundError:
+            return
+    if found:
+        more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+        raise InputError(
+            f"{os.fspath(path)}: not a folder of psdmc's: it holds {', '.join(found[:SHOWN])}{more}", remedy
+        )
 
 
 def check_place(path: str | os.PathLike[str]) -> None:

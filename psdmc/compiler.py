@@ -24,7 +24,7 @@ from psdmc.emit.package import PackageView, package_view
 from psdmc.emit.package_files import package_files
 from psdmc.emit.reference_load import reference_load
 from psdmc.emit.reference_states import reference_states
-from psdmc.emit.write import write_package
+from psdmc.emit.write import Changes, require_own_folder, write_package
 from psdmc.errors import InputError
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
@@ -133,8 +133,8 @@ def emit_c(
     target: str | Target = NATIVE,
     friction: bool = False,
     bodies: bool = False,
-) -> list[str]:
-    """Write the model's C package; returns the paths of the files that changed.
+) -> Changes:
+    """Write the model's C package; returns the paths of the files that changed, as a list that says more about them.
 
     model      or the path of a model file
     lowering   which arithmetic: "auto" takes the cheaper per function
@@ -145,7 +145,8 @@ def emit_c(
     trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"; None: the
                target's
     name       the robot's name in C; None: the robot's own
-    force      whether to overwrite files that psdmc did not write
+    force      whether to write into a folder of other files, and over files of the package that were edited; other files
+               are never deleted: one that is in the way is kept as NAME.orig
     progress   called with the name of each step as it begins
     payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
                do not admit every load
@@ -157,6 +158,7 @@ def emit_c(
     bodies     whether the package has a function that computes theta_b from all bodies; InputError where the model's
                assumptions exclude some body's parameter
     """
+    require_own_folder(directory, force)
     model = model_of(model)
     options = _options(lowering, real, trig, target)
     adapters = _names(adapters)
@@ -320,7 +322,8 @@ def _package(
     friction: bool = False,
     bodies: bool = False,
 ) -> PackageView:
-    names = wanted(with_needed(wanted(functions, model.mechanism), adapters), model.mechanism)
+    wide = model.nq > model.nv
+    names = wanted(with_needed(wanted(functions, model.mechanism), adapters, wide), model.mechanism)
     require(model, names)
     costs = options.target.costs
     kernels = lowered_once(

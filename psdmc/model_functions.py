@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,8 +38,8 @@ from psdmc.toolchain.compiled_functions import results
 from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
 from psdmc.toolchain.stubs import documentation
 
-KEPT = 8
-"""Models whose refusals are remembered: the mass matrix is looked at in hundreds of states for each."""
+_ADMITTED: WeakKeyDictionary[DynamicsModel, set[str]] = WeakKeyDictionary()
+"""Functions that each living model is known to have: the mass matrix is looked at in hundreds of states to find out."""
 
 
 def provider() -> Provider:
@@ -89,8 +89,8 @@ def evaluated(
         )
         for quantity, array in zip(signature.inputs, arrays, strict=True)
     }
-    if recipe.needs is not None:
-        _admit(model, recipe.name, theta_b is None)
+    if recipe.needs is not None and theta_b is None:
+        _admit(model, recipe.name)
     found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
     outputs = [found[o.name].reshape(lead + tail) for o, tail in zip(signature.outputs, tails, strict=True)]
     if out is not None:
@@ -109,11 +109,12 @@ def _on_arrays(model: DynamicsModel, recipe: Recipe, theta_b: ArrayLike | None) 
     return lambda *arrays: evaluated(model, recipe, arrays, theta_b)
 
 
-@lru_cache(2 * KEPT * len(RECIPES))
-def _admit(model: DynamicsModel, name: str, with_own_parameters: bool) -> None:
+def _admit(model: DynamicsModel, name: str) -> None:
     """InputError where the model cannot have a function."""
-    if with_own_parameters:
+    admitted = _ADMITTED.setdefault(model, set())
+    if name not in admitted:
         require(model, [name])
+        admitted.add(name)
 
 
 def _axes(model: DynamicsModel, recipe: Recipe) -> RobotAxes:

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import ast
 import copy
+import gc
 import inspect
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -206,6 +208,29 @@ def test_what_a_model_cannot_have_is_refused_with_the_reason() -> None:
     upside_down = replace(bundled_model("scara"), theta_b=-bundled_model("scara").theta_b)
     with pytest.raises(InputError, match=r"no forward_dynamics: .*not positive definite"):
         upside_down.forward_dynamics(*np.zeros((3, 4)))
+
+
+def test_models_that_are_used_no_more_are_let_go() -> None:
+    """A loop over loads makes a model each; none stays because it was asked."""
+    model = bundled_model("scara")
+    alive = []
+    for mass in range(1, 13):
+        loaded = model.with_payload(0.1 * mass, (0.0, 0.0, 0.1))
+        loaded.forward_dynamics(*np.zeros((3, 4)))
+        loaded.gravity(np.zeros(4))
+        alive.append(weakref.ref(loaded))
+    del loaded
+    gc.collect()
+    assert [found() for found in alive] == [None] * 12
+
+
+def test_what_a_model_can_have_is_found_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr("psdmc.model_functions.require", lambda model, names: asked.extend(names))
+    model = replace(bundled_model("scara"))
+    for _ in range(3):
+        model.forward_dynamics(*np.zeros((3, 4)))
+    assert asked == ["forward_dynamics"]
 
 
 def test_a_misspelt_name_is_an_attribute_error() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.atomic import make_folder, write_whole
+from psdmc.atomic import make_folder, refuse_foreign_folder, write_whole
 from psdmc.calibration.campaign_file import FILE
 from psdmc.calibration.campaign_plan import CampaignOptions as CampaignOptions
 from psdmc.calibration.campaign_plan import Plan as Plan
@@ -43,8 +43,8 @@ def being_written(folder: str | Path) -> Iterator[None]:
 
 
 def require_free(folder: str | Path) -> None:
-    """InputError where a folder holds a campaign, which writing another one would replace; the message lists what is
-    there.
+    """InputError where a folder holds a campaign, which writing another one would replace, or files of others; the
+    message lists what is there.
 
     A campaign that an earlier run left unfinished, and that has no recorded logs, does not count.
     """
@@ -60,6 +60,9 @@ def require_free(folder: str | Path) -> None:
                 f"{root}: holds a campaign already: {', '.join(found)}",
                 "choose another folder; with --force its plan and trajectories are replaced, its logs stay",
             )
+    refuse_foreign_folder(
+        root, "choose a new or empty folder with -o, or write the campaign beside these files with --force"
+    )
 
 
 def _count(folder: Path) -> int:

@@ -62,7 +62,8 @@ def simulate_campaign(
 ) -> int:
     """Write the log of every run of a campaign; returns how many had to be simulated, the others being up to date.
 
-    InputError, before anything is written, where the campaign is another robot's or a log would leave its folder.
+    InputError, before anything is written, where the campaign is another robot's, a log would leave its folder, or one is
+    there that was not simulated.
     """
     plant = Path(plant)
     if not 0 <= options.seed <= LARGEST_SEED:
@@ -80,11 +81,19 @@ def simulate_campaign(
     stale = [
         job for job in jobs if known.get(job.run.log.name) != keys[job.run.log] or not job.run.log.exists()
     ]
+    measured = [job.run.log.name for job in stale if job.run.log.exists() and job.run.log.name not in known]
+    if measured:
+        raise InputError(
+            f"{campaign}: not overwriting log(s) {listed(measured)}: psdmc did not simulate them",
+            "move them away, or simulate a copy of the campaign",
+        )
+    index = {path.name: key for path, key in sorted(keys.items())}
+    make_folder(index_path.parent)
+    unfinished = index | {job.run.log.name: "" for job in stale}
+    write_whole(index_path, json.dumps(unfinished, indent=1) + "\n")
     done = in_processes(_simulated, stale, min(options.workers, len(stale)))
     for count, name in enumerate(done, start=1):
         progress(Step(f"simulated {name}, {count} of {len(stale)}", count / len(stale)))
-    index = {path.name: key for path, key in sorted(keys.items())}
-    make_folder(index_path.parent)
     write_whole(index_path, json.dumps(index, indent=1) + "\n")
     return len(stale)
 
@@ -127,7 +136,7 @@ def _require_robot(run: ListedRun, robot: VirtualRobot, plant: Path) -> None:
 
 
 def _index(path: Path) -> dict[str, str]:
-    """Digests by log; none where the file is missing or damaged, so that everything is simulated again."""
+    """Digests by log, empty ones where the log may be half done; none where the file is missing or damaged."""
     try:
         found = json.loads(read_file(path, LARGEST_INDEX, "remove it: the logs are simulated again"))
     except (OSError, ValueError):

@@ -266,7 +266,9 @@ def emit_c(
         ),
     ] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
-    force: Annotated[bool, typer.Option(help="overwrite files that psdmc did not write")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="write beside other files, and over edited ones of the package")
+    ] = False,
     payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
     bodies: Annotated[
         bool, typer.Option("--bodies", help="also R_theta_from_bodies: theta_b from masses and inertias")
@@ -291,14 +293,18 @@ def emit_c(
     """Write a model's C package: header, sources, build files, self-test."""
     from psdmc import compiler
     from psdmc.cli.one_line import one_line
+    from psdmc.emit.adapters import lacking
     from psdmc.emit.names import identifier
+    from psdmc.emit.write import require_own_folder
+    from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction
     from psdmc.model.load import load
 
-    found = load(model)
     folder = output or Path(model.stem)
-    wanted = names(functions) or None
+    require_own_folder(folder, force)
+    found = load(model)
+    wanted = names(functions) if functions else None
     with steps() as progress:
         changed = compiler.emit_c(
             found,
@@ -316,12 +322,24 @@ def emit_c(
             friction,
             bodies,
         )
-    print(f"{folder}: {len(changed)} files written" if changed else f"{folder}: nothing changed")
+    written = len(changed) - len(changed.removed)
+    print(f"{folder}: {written} files written" if changed else f"{folder}: nothing changed")
+    if changed.removed:
+        print(f"{folder}: removed, as the package has them no more: {', '.join(changed.removed)}")
+    for path, name_now in changed.kept.items():
+        print(f"note: {path} was not psdmc's and is kept as {name_now}")
+    for before, now in changed.renamed:
+        print(f"note: renamed since the package that was there: {before} is now {now}")
     asked = name or found.mechanism.name
-    if identifier(asked) != asked:
-        print(f"note: in C '{one_line(asked)}' is {identifier(asked)}")
+    in_c = identifier(asked)
+    print(f"{folder / 'include' / in_c / in_c}.h: the header, #include <{in_c}/{in_c}.h>")
+    if in_c != asked:
+        print(f"note: in C '{one_line(asked)}' is {in_c}")
     elif output is None and asked != folder.name:
-        print(f"note: in C it is {asked}: #include <{asked}/{asked}.h>; --name gives it another name")
+        print(f"note: in C it is {asked}; --name gives it another name")
+    for reason in lacking(found.mechanism, names(adapters)):
+        work = ", ".join(kernels.wanted(wanted, found.mechanism))
+        print(f"note: {reason}; CasADi can call, without derivatives: {work}")
     for note in run_time_only(found, wanted):
         print(f"note: {note}")
     for what in beyond_friction(found):

@@ -125,7 +125,7 @@ class _Inward:
         try:
             return factorize(block)
         except SingularMassMatrix as singular:
-            raise SingularMassMatrix(first_rates(self.frames)[i] + singular.joint) from None
+            raise SingularMassMatrix(first_rates(self.frames)[i] + singular.rate) from None
 
     def _hand_on(self, i: int, inertia: Articulated) -> None:
         frame, state = self.frames[i], self.forward.states[i]

@@ -16,11 +16,11 @@ Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class SingularMassMatrix(Exception):
-    """A pivot is zero for every q; `joint` is its number, the one at the base being 0."""
+    """A pivot is zero for every q; `rate` is its row of the mass matrix, the first at the base being 0."""
 
-    def __init__(self, joint: int) -> None:
-        super().__init__(f"pivot {joint} is zero for every q")
-        self.joint = joint
+    def __init__(self, rate: int) -> None:
+        super().__init__(f"pivot {rate} is zero for every q")
+        self.rate = rate
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,12 +11,16 @@ from typing import Any
 from psdmc.emit.describe import option_items
 from psdmc.emit.function_view import FunctionView
 from psdmc.emit.info import JointInfo, PackageInfo
+from psdmc.emit.names import identifier
 from psdmc.emit.options import EmitOptions
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 
 SCHEMA = 1
 GENERATOR = "psdmc"
+
+RENAMED: Mapping[str, str] = {}
+"""Functions that packages of an earlier release have by another name, and their name now. From 0.1 to this one, none."""
 
 
 def manifest(
@@ -49,6 +53,29 @@ def manifest(
         "files": {path: digest(text) for path, text in files.items()},
     }
     return json.dumps(content, indent=2, ensure_ascii=True, allow_nan=False) + "\n"
+
+
+def renamed(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Symbols of one manifest's package and their names in another's: of all, `R_*`, where the robot has another name, and
+    of functions that have one. The first manifest may be forged."""
+    old, new = before.get("robot"), after["robot"]
+    if not isinstance(old, str) or identifier(old) != old:
+        return []
+    pairs = [(f"{old}_*", f"{new}_*")] if old != new else []
+    kernels, there = _kernel_names(before), _kernel_names(after)
+    names = {f"{was}{form}": f"{now}{form}" for was, now in RENAMED.items() for form in ("", "_theta")}
+    own = ((was, now) for was, now in names.items() if was in kernels and now in there)
+    return [*pairs, *((f"{old}_{was}", f"{new}_{now}") for was, now in own)]
+
+
+def _kernel_names(content: Mapping[str, Any]) -> list[object]:
+    functions = content.get("functions")
+    found = [each.get("kernels") for each in _objects(functions)]
+    return [kernel.get("name") for kernels in found for kernel in _objects(kernels)]
+
+
+def _objects(values: object) -> list[dict[str, object]]:
+    return [each for each in values if isinstance(each, dict)] if isinstance(values, list) else []
 
 
 def _target(target: Target) -> dict[str, Any]:

@@ -86,9 +86,14 @@ def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
     return edited if entries else None
 
 
+def content_of(directory: str | os.PathLike[str]) -> dict[str, object]:
+    """What the manifest of a package says; empty where the folder holds no package."""
+    return _content(Path(directory) / MANIFEST)
+
+
 def target_of(directory: str | os.PathLike[str]) -> str | None:
     """The name of the machine that a package says it was made for; None where it names none."""
-    target = _content(Path(directory) / MANIFEST).get("target")
+    target = content_of(directory).get("target")
     name = target.get("name") if isinstance(target, dict) else None
     return name if isinstance(name, str) else None
 

@@ -81,10 +81,10 @@ def _cpp_number(value: float | None, real: str) -> str:
 
 def number(value: float | None, real: str) -> str:
     """A real constant. None (unknown) is written as NaN; a number that `real` cannot hold as the infinity or zero it
-    rounds to."""
+    rounds to. tcc takes no minus before INFINITY in a constant, so that minus infinity is a product."""
     if value is None or math.isnan(value):
         return f"({real})NAN"
     value = rounded_out(value, real)
     if math.isinf(value):
-        return f"({real})INFINITY" if value > 0 else f"-({real})INFINITY"
+        return f"({real})INFINITY" if value > 0 else f"({real})(-1e300 * 1e300) /* -INFINITY */"
     return f"{float(value)!r}{'' if real == 'double' else 'f'}"

@@ -90,6 +90,8 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
     unknown = [name for name in names if name not in RECIPES]
     if unknown:
         raise InputError(f"function {unknown[0]!r} is not known", _near(unknown[0], (*RECIPES, *groups)))
+    if not names:
+        raise InputError("no function is named", f"psdmc generates {', '.join(RECIPES)}")
     called = {RECIPES[name].signature.calls for name in names}
     return tuple(name for name in RECIPES if name in names or name in called)
 
@@ -101,7 +103,7 @@ def _near(word: str, names: Sequence[str]) -> str:
 
 
 def _refusal(model: DynamicsModel, name: str, singular: SingularMassMatrix) -> InputError:
-    joint = model.joint_names[singular.joint]
+    joint = model.joint_names[model.mechanism.rate_joints[singular.rate]]
     return InputError(
         f"{model.mechanism.name}: {name}: joint {joint!r} moves no inertia, the mass matrix is singular for every q",
         f"give its link an inertia, add --drive-inertia, or leave {name} out of --functions",

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 RENAMED = "standard_parameters() is called equivalent_parameters(); theta_for(masses, coms, inertias) is the way back"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, weakref_slot=True, eq=False)
 class DynamicsModel(Answers):
     """Inverse dynamics as monomials times constants: tau[i] = y(state) @ P[i] @ theta_b.
 

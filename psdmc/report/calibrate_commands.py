@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from psdmc.atomic import write_together, write_whole
+from psdmc.atomic import refuse_foreign_folder, write_together, write_whole
 from psdmc.calibration.actuators import actuator_files, calibrated_actuators
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.campaign import (
@@ -25,6 +25,8 @@ from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campai
 from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
+from psdmc.emit.names import identifier
+from psdmc.emit.own_files import content_of
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
@@ -98,6 +100,8 @@ def calibrate_command(
     naming     topic and joint names of plain logs
     """
     known = model_of(model)
+    if actuators is not None:
+        require_actuators_folder(known, actuators)
     record = calibrate(
         known,
         list(sources),
@@ -125,10 +129,18 @@ def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
     found = model.provenance.get("calibration")
     if found is None:
         raise InputError(f"{model.mechanism.name}: not calibrated", "run `psdmc calibrate` first")
+    require_actuators_folder(model, folder)
     view = calibrated_actuators(model.mechanism.name, model.joint_names, found)
     files = actuator_files(view)
     write_together(Path(folder), files)
     return [Path(folder) / path for path in files]
+
+
+def require_actuators_folder(model: DynamicsModel, folder: str | Path) -> None:
+    """InputError where a folder holds files, but no package of psdmc's and no such C of this robot."""
+    header = Path(folder) / "include" / f"{identifier(model.mechanism.name)}_actuators.h"
+    if not content_of(folder) and not header.is_file():
+        refuse_foreign_folder(folder, "choose a new or empty folder, or that of the robot's package")
 
 
 class CompiledWhenAsked:

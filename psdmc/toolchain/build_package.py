@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import shlex
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from psdmc.atomic import make_folder, system_errors_at
+from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at
 from psdmc.emit.own_files import edited_files
 from psdmc.errors import InputError, ToolchainError
 from psdmc.progress import Progress, silent
@@ -20,8 +21,14 @@ FAILED = ": FAILED"
 SHOWN = 3
 """Failed checks that a message names."""
 
+NOT_FOR_CMAKE = re.compile(r'["\\;:<>|?\x00-\x1f\x7f]|\[(?![^/]*\])')
+"""Characters of a path with which CMake 3.25 and the Makefiles that it writes fail; of brackets an open one."""
+
 UNFINISHED = ".psdmc-unfinished"
 """Marks a build folder while psdmc builds there, and after it was killed or failed."""
+
+MARKS = (UNFINISHED, "CMakeCache.txt", "CMakeFiles", "compiled_by")
+"""What psdmc, CMake and the package's Makefile first write into a build folder."""
 
 
 def build_package(directory: str | Path, edited: bool = False, progress: Progress = silent) -> str:
@@ -39,6 +46,8 @@ def build_package(directory: str | Path, edited: bool = False, progress: Progres
     build = root / "build"
     for tool in ("cmake", "make"):
         if shutil.which(tool):
+            if tool == "cmake":
+                _check_name(root)
             with _own_build(build), told(build, _files(root), progress):
                 return _with_cmake(root) if tool == "cmake" else _with_make(root, compiler)
     raise ToolchainError("neither cmake nor make was found", "install one (Debian: apt install cmake)")
@@ -64,9 +73,23 @@ def _check_files(root: Path, edited: bool) -> None:
         )
 
 
+def _check_name(root: Path) -> None:
+    """InputError where CMake cannot take the folder's path."""
+    path = Path(os.path.abspath(root))
+    found = NOT_FOR_CMAKE.search(path.as_posix().removeprefix(path.drive))
+    if found:
+        raise InputError(
+            f"{root}: CMake cannot take {found[0]!r} in a folder's path",
+            "move the package to a folder without it, or build it with make in the package's folder",
+        )
+
+
 @contextlib.contextmanager
 def _own_build(folder: Path) -> Iterator[None]:
-    """Hold the build folder, emptied first where an interrupted build left it: it may hold half an object file."""
+    """Hold the build folder, emptied first where an interrupted build left it: it may hold half an object file. InputError
+    where it holds files and no build."""
+    if not any((folder / mark).exists() for mark in MARKS):
+        refuse_foreign_folder(folder, "move these files away: emitted packages are built there")
     with system_errors_at(folder):
         if (folder / UNFINISHED).is_file() and not folder.is_symlink():
             shutil.rmtree(folder)
@@ -78,9 +101,10 @@ def _own_build(folder: Path) -> Iterator[None]:
 
 def _with_cmake(root: Path) -> str:
     """Build with CMake, which reads CC itself; returns its output."""
-    build = str(root / "build")
+    source = os.path.abspath(root)  # CMake takes -a, ~ and a:b alone for other things
+    build = os.path.join(source, "build")
     steps = [
-        ["cmake", "-S", str(root), "-B", build, "-DCMAKE_BUILD_TYPE=Release"],
+        ["cmake", "-S", source, "-B", build, "-DCMAKE_BUILD_TYPE=Release"],
         ["cmake", "--build", build, "--parallel"],
     ]
     built = "".join(run(step, str(root)) for step in steps)

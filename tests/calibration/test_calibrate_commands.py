@@ -53,6 +53,13 @@ def test_from_a_model_without_parameters_to_one_with_them(arm, tmp_path: Path):
     assert len(record.friction) == 14
 
 
+def test_actuators_keep_out_of_folders_of_others(arm, tmp_path: Path):
+    """Before the fit: there is no log to read."""
+    arm.model.save(tmp_path / "arm.npz")
+    with pytest.raises(InputError, match=r"not a folder of psdmc's: it holds arm.npz"):
+        calibrate_command(tmp_path / "arm.npz", [tmp_path / "no.csv"], tmp_path / "o.npz", actuators=tmp_path)
+
+
 def test_actuators_need_a_calibration(tmp_path: Path):
     with pytest.raises(InputError, match="two_link: not calibrated"):
         write_actuators(bundled_model("two_link"), tmp_path)

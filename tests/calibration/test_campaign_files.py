@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -135,6 +136,22 @@ def test_a_campaign_is_overwritten_only_when_told_to(tmp_path: Path):
     require_free(path)
 
 
+def test_a_campaign_is_not_written_among_files_of_others(tmp_path: Path):
+    folder = tmp_path / "thesis"
+    folder.mkdir()
+    (folder / "chapter.tex").write_text("mine", encoding="utf-8")
+
+    for refused in (lambda: small_campaign(folder), lambda: excite_command(tmp_path / "no.npz", folder)):
+        with pytest.raises(InputError) as raised:
+            refused()
+        assert raised.value.message == f"{folder}: not a folder of psdmc's: it holds chapter.tex"
+        assert "--force" in (raised.value.hint or "")
+
+    assert [path.name for path in folder.iterdir()] == ["chapter.tex"]
+    (folder / "chapter.tex").rename(folder / ".chapter.tex")
+    assert small_campaign(folder).is_file()
+
+
 def test_force_replaces_the_plan_and_keeps_the_logs(tmp_path: Path):
     folder = tmp_path / "campaign"
     small_campaign(folder)
@@ -215,6 +232,43 @@ def test_a_damaged_index_of_simulated_logs_is_written_again(arm, tmp_path: Path,
     assert simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True)) == 2
     assert simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True)) == 0
     assert set(json.loads((folder / "logs" / "simulated.json").read_bytes())) == {"one.csv", "two.csv"}
+
+
+@pytest.mark.parametrize("index", [None, "{", '{"two.csv": ""}'])
+def test_measured_logs_are_not_simulated_over(arm, tmp_path: Path, index: str | None):
+    """A log that the index does not name was recorded, or psdmc cannot know."""
+    folder = tmp_path / "campaign"
+    small_campaign(folder)
+    (folder / "logs").mkdir()
+    (folder / "logs" / "one.csv").write_text("a day's work", encoding="utf-8")
+    if index is not None:
+        (folder / "logs" / "simulated.json").write_text(index, encoding="utf-8")
+
+    with pytest.raises(InputError, match=r"not overwriting log\(s\) one.csv: psdmc did not simulate them"):
+        simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True))
+
+    assert (folder / "logs" / "one.csv").read_text(encoding="utf-8") == "a day's work"
+    assert not (folder / "logs" / "two.csv").exists()
+
+
+def test_a_simulation_that_was_killed_is_done_again(
+    arm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its logs are known as psdmc's, and not as done."""
+    folder = tmp_path / "campaign"
+    small_campaign(folder)
+
+    def killed(work: object, jobs: list[object], workers: int) -> Iterator[str]:
+        log = next(iter(listed_runs(folder))).log
+        log.write_text("half", encoding="utf-8")
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("psdmc.calibration.simulate_campaign.in_processes", killed)
+        with pytest.raises(KeyboardInterrupt):
+            simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True))
+
+    assert simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True)) == 2
 
 
 def test_a_seed_that_is_none_is_refused(arm, tmp_path: Path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -32,9 +33,55 @@ def test_a_package_goes_where_its_model_is_called(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("arm: ")
     assert (tmp_path / "arm" / MANIFEST).is_file()
-    assert "note: in C it is two_link: #include <two_link/two_link.h>" in done.stdout
+    assert "note: in C it is two_link; --name gives it another name" in done.stdout
+    header = "arm/include/two_link/two_link.h"
+    assert f"{header}: the header, #include <two_link/two_link.h>\n" in done.stdout
     assert (tmp_path / "arm" / "include" / "two_link" / "two_link.h").is_file()
     assert done.stderr.splitlines()[-1] == "next: psdmc build arm"
+
+
+def test_a_folder_of_others_is_refused_before_the_work(tmp_path: Path) -> None:
+    saved(tmp_path)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("all of it")
+
+    for where in ("mine", ".", "mine/../mine/.", "/", "mine/thesis.tex"):
+        done = typed("emit-c", "arm.npz", "-o", where, "--functions", "gravity", cwd=tmp_path)
+        assert done.returncode == 2, done.stdout
+        assert re.match(
+            r"error: \S+: (not a folder of psdmc's: it holds|cannot be written: Not a dir)", done.stderr
+        )
+        assert len(done.stderr.splitlines()) == 2, "there was progress"
+
+    assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
+    done = typed("emit-c", "arm.npz", "-o", "mine", "--functions", "gravity", "--force", cwd=tmp_path)
+    assert done.returncode == 0
+    assert (tmp_path / "mine" / "thesis.tex").read_text() == "all of it"
+    assert (tmp_path / "mine" / MANIFEST).is_file()
+
+
+def test_what_a_second_emission_removes_and_renames_is_said(tmp_path: Path) -> None:
+    saved(tmp_path)
+    typed("emit-c", "arm.npz", "--functions", "gravity,jacobian", cwd=tmp_path)
+    (tmp_path / "arm" / "README.md").unlink()
+    (tmp_path / "arm" / "notes.txt").write_text("mine")
+
+    done = typed("emit-c", "arm.npz", "--functions", "gravity", "--name", "elbow", cwd=tmp_path)
+
+    removed = next(line for line in done.stdout.splitlines() if ": removed, " in line)
+    assert removed.startswith("arm: removed, as the package has them no more: ")
+    assert {"src/jacobian.c", "include/two_link/two_link.h"} <= set(removed.split(": ")[2].split(", "))
+    assert not (tmp_path / "arm" / "src" / "jacobian.c").exists()
+    assert "note: renamed since the package that was there: two_link_* is now elbow_*\n" in done.stdout
+    assert (tmp_path / "arm" / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("given", ["", ",", " "])
+def test_no_function_is_not_the_default_set(given: str, tmp_path: Path) -> None:
+    done = typed("emit-c", saved(tmp_path), "--functions", given, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: no function is named\nhint: psdmc generates inverse_dynamics, ")
+    assert not (tmp_path / "arm").exists()
 
 
 @pytest.mark.parametrize("more", [(), ("-o", "other.npz")])

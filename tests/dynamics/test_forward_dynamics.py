@@ -70,7 +70,7 @@ def test_a_joint_that_moves_no_inertia_is_named() -> None:
         forward_dynamics(
             tree.frames, [*tree.bodies[:2], bodies[2]], [0.0] * 3, [0.3] * 9, [0.1] * 8, [0.0] * 8, tree.up
         )
-    assert caught.value.joint == 7
+    assert caught.value.rate == 7
 
 
 def test_joints_that_follow_others_are_left_to_the_mass_matrix() -> None:

@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 import os
 import signal
+import stat
 from pathlib import Path
 
 import pytest
 from small import pendulum, pendulum_info
 
-from psdmc.emit.manifest import digest
+from psdmc.emit.manifest import RENAMED, digest
 from psdmc.emit.options import EmitOptions
 from psdmc.emit.own_files import OWN_NAME, edited_files
 from psdmc.emit.package_files import package_files
 from psdmc.emit.write import write_package
 from psdmc.errors import InputError, ToolchainError
+from psdmc.functions import RECIPES
 
 FILES = package_files(pendulum())
 
@@ -68,15 +70,116 @@ def _with(files: dict[str, str], path: str, text: str) -> str:
     return json.dumps(content)
 
 
-def test_a_file_that_psdmc_did_not_write_stays(tmp_path: Path) -> None:
-    (tmp_path / "README.md").write_text("mine")
-    with pytest.raises(InputError, match=r"not overwriting README\.md") as caught:
+def test_a_folder_of_others_is_not_written_to(tmp_path: Path) -> None:
+    """Whatever its files are called: nothing of the package would be in their way."""
+    for name in ("thesis.tex", "data", "zoo", "notes.txt", "a.c"):
+        (tmp_path / name).write_text("mine")
+    with pytest.raises(InputError) as caught:
         write_package(tmp_path, FILES)
+    expected = f"{tmp_path}: not a folder of psdmc's: it holds a.c, data, notes.txt and 2 more"
+    assert caught.value.message == expected
+    assert "-o" in str(caught.value.hint)
     assert "--force" in str(caught.value.hint)
-    assert set(_stamps(tmp_path)) == {"README.md"}, "something was written before the refusal"
+    assert len(_stamps(tmp_path)) == 5, "something was written before the refusal"
 
-    write_package(tmp_path, FILES, force=True)
-    assert (tmp_path / "README.md").read_text() == FILES["README.md"]
+
+def test_one_file_of_others_is_enough(tmp_path: Path) -> None:
+    (tmp_path / "src").mkdir()
+    with pytest.raises(InputError, match=r"not a folder of psdmc's: it holds src\b"):
+        write_package(tmp_path, FILES)
+    with pytest.raises(InputError, match=r"/: not a folder of psdmc's: it holds .* and \d+ more"):
+        write_package("/", FILES)
+
+
+def test_a_folder_of_dot_files_is_free(tmp_path: Path) -> None:
+    (tmp_path / ".git").mkdir()
+    (tmp_path / ".git" / "config").write_text("mine")
+    (tmp_path / ".gitignore").write_text("build")
+    assert write_package(tmp_path, FILES) == list(FILES)
+    assert set(_stamps(tmp_path)) == {*FILES, ".git/config", ".gitignore"}
+
+
+def test_a_link_to_a_folder_is_that_folder(tmp_path: Path) -> None:
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs" / "notes.txt").write_text("mine")
+    (tmp_path / "arm").symlink_to(tmp_path / "theirs")
+    with pytest.raises(InputError, match=r"it holds notes\.txt"):
+        write_package(tmp_path / "arm", FILES)
+    (tmp_path / "theirs" / "notes.txt").unlink()
+    assert write_package(tmp_path / "arm", FILES) == list(FILES)
+    assert write_package(tmp_path / "arm", FILES) == []
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    with pytest.raises(InputError, match="nowhere: cannot be written"):
+        write_package(tmp_path / "nowhere", FILES)
+
+
+def test_force_writes_beside_files_of_others_and_deletes_none(tmp_path: Path) -> None:
+    """Those in the way are kept under other names, every time."""
+    theirs = {"README.md": "mine", "src/tables.c": "mine, too", "manifest.json": "{}", "notes.txt": "keep"}
+    (tmp_path / "src").mkdir()
+    for path, text in theirs.items():
+        (tmp_path / path).write_text(text)
+    (tmp_path / "README.md.orig").write_text("older")
+
+    changes = write_package(tmp_path, FILES, force=True)
+
+    kept = {
+        "README.md": "README.md.orig1",
+        "src/tables.c": "src/tables.c.orig",
+        "manifest.json": "manifest.json.orig",
+    }
+    assert changes.kept == kept
+    assert {path: (tmp_path / kept.get(path, path)).read_text() for path in theirs} == theirs
+    assert (tmp_path / "README.md.orig").read_text() == "older"
+    assert {path: (tmp_path / path).read_text() for path in FILES} == FILES
+    before = _stamps(tmp_path)
+    assert write_package(tmp_path, FILES) == [], "the folder has a package now"
+    assert _stamps(tmp_path) == before
+
+
+def test_what_was_removed_is_said(tmp_path: Path) -> None:
+    write_package(tmp_path, FILES)
+    fewer = {path: text for path, text in FILES.items() if not path.startswith("src/forward_dynamics")}
+    fewer["manifest.json"] = FILES["manifest.json"].replace("pendulum_forward_dynamics", "pendulum_fd")
+    changes = write_package(tmp_path, fewer)
+    assert set(changes.removed) == set(FILES) - set(fewer)
+    assert set(changes) == {"manifest.json", *changes.removed}
+    assert (changes.kept, changes.renamed) == ({}, ())
+
+
+def test_renamed_symbols_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package that an earlier psdmc wrote: its robot was called otherwise in C, and one of its functions was."""
+    old = FILES["manifest.json"].replace('"robot": "pendulum"', '"robot": "swing"')
+    old = old.replace('"name": "inverse_dynamics', '"name": "torques')
+    write_package(tmp_path, {**FILES, "manifest.json": old})
+    monkeypatch.setattr("psdmc.emit.manifest.RENAMED", {"torques": "inverse_dynamics", "gone": "gravity"})
+    assert write_package(tmp_path, FILES).renamed == (
+        ("swing_*", "pendulum_*"),
+        ("swing_torques", "pendulum_inverse_dynamics"),
+        ("swing_torques_theta", "pendulum_inverse_dynamics_theta"),
+    )
+
+
+@pytest.mark.parametrize(
+    "forged",
+    ['"robot": "a\\nb"', '"robot": 7', '"robot": "pendulum", "functions": {"name": [[]]}',
+     '"robot": "pendulum", "functions": [{"kernels": 3}, {"kernels": [[], {"name": []}]}, 1]'],
+)  # fmt: skip
+def test_a_forged_manifest_renames_nothing(forged: str, tmp_path: Path) -> None:
+    text = f'{{"generator": "psdmc", "files": {{"LICENSE": "0"}}, {forged}}}'
+    (tmp_path / "manifest.json").write_text(text)
+    assert write_package(tmp_path, FILES).renamed == ()
+
+
+DEFAULT_OF_0_1 = (
+    *("inverse_dynamics", "forward_dynamics", "mass_matrix", "nonlinear_effects", "coriolis_matrix"),
+    *("gravity", "regressor", "regressor_slotine_li", "jacobian"),
+)
+"""Functions of the packages that psdmc 0.1 wrote, by its CHANGELOG and its emitted headers."""
+
+
+def test_every_function_of_release_0_1_is_there_or_known_as_renamed() -> None:
+    assert [name for name in DEFAULT_OF_0_1 if RENAMED.get(name, name) not in RECIPES] == []
 
 
 def test_a_file_edited_since_stays_too(tmp_path: Path) -> None:
@@ -88,7 +191,7 @@ def test_a_file_edited_since_stays_too(tmp_path: Path) -> None:
 
 def test_another_programs_manifest_is_foreign(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text('{"name": "web app"}')
-    with pytest.raises(InputError, match=r"not overwriting manifest\.json"):
+    with pytest.raises(InputError, match=r"not a folder of psdmc's: it holds manifest\.json"):
         write_package(tmp_path, FILES)
 
 
@@ -147,11 +250,12 @@ def test_every_name_of_a_package_is_one_that_psdmc_gives() -> None:
 def test_what_is_no_file_is_foreign(tmp_path: Path) -> None:
     (tmp_path / "src" / "tables.c").mkdir(parents=True)
     os.mkfifo(tmp_path / "Makefile")
-    with pytest.raises(InputError, match=r"not overwriting src/tables\.c, Makefile"):
-        write_package(tmp_path, FILES)
-    with pytest.raises(InputError, match="cannot be written"):
-        write_package(tmp_path, FILES, force=True)
+    (tmp_path / "manifest.json").write_text('{"generator": "psdmc", "files": {"LICENSE": "0"}}')
+    for force in (False, True):
+        with pytest.raises(InputError, match=r"not overwriting src/tables\.c, Makefile"):
+            write_package(tmp_path, FILES, force=force)
     assert (tmp_path / "src" / "tables.c").is_dir()
+    assert stat.S_ISFIFO((tmp_path / "Makefile").stat().st_mode)
 
 
 OTHER = package_files(pendulum(pendulum_info(joint="elbow"), options=EmitOptions(real="float32")))

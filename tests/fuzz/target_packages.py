@@ -14,7 +14,11 @@ from psdmc.emit.own_files import JOURNAL, MANIFEST, edited_files
 from psdmc.emit.write import write_package
 
 EARLIER = {"Makefile": "old:\n", "src/b.c": "/* old b.c */\n", "src/stale.c": "/* stale */\n"}
-NEW = {"Makefile": "new:\n", "src/b.c": "/* new b.c */\n", MANIFEST: '{"generator": "psdmc"}\n'}
+NEW = {
+    "Makefile": "new:\n",
+    "src/b.c": "/* new b.c */\n",
+    MANIFEST: '{"generator": "psdmc", "robot": "arm"}\n',
+}
 VICTIM, FOREIGN = "/* outside, with a digest that a manifest lists */\n", "/* written by somebody else */\n"
 OTHERS = {"outside/arm/victim.h": VICTIM, "package/src/foreign.c": FOREIGN}
 """No manifest may have these changed: the one is not in the folder, the other has a digest that none lists."""

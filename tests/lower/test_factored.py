@@ -200,7 +200,7 @@ def test_every_choice_gives_pinocchios_torques():
 def test_a_mass_matrix_without_inertia_is_named_singular():
     with pytest.raises(SingularMassMatrix) as caught:
         factorize([[1.0, 0.0], [0.0, 0.0]])
-    assert caught.value.joint == 1
+    assert caught.value.rate == 1
 
 
 def tilted(chain: Mechanism, angle: float) -> Mechanism:

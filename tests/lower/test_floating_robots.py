@@ -14,14 +14,16 @@ from slow_cases import slow_but_for
 from whole_robots import ROBOTS, WHOLE, derived, lowered
 
 from psdmc.derivation.derive import derive_model
-from psdmc.errors import DerivationError
+from psdmc.errors import DerivationError, InputError
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics
+from psdmc.lower.kernels import lower
 from psdmc.lower.scoring import SINGLE
 from psdmc.lower.search import Search
 from psdmc.program.cost import cost
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import Sizes
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 COUNT = 20
 AT_MOST = {
@@ -234,3 +236,16 @@ def test_lowered_trees_with_joints_of_every_type_are_pinocchios(parents, kinds: 
             found = interpret(program, given, sizes)
             np.testing.assert_allclose(found["qdd"], qdd, atol=1e-6)
             assert np.all(found["pivot"] > 0.0)
+
+
+@pytest.mark.parametrize(("kinds", "massless"), [("FRR", 2), ("FRR", 1), ("RSR", 2), ("RRS", 2)])
+def test_the_joint_that_moves_no_inertia_is_named(kinds: str, massless: int) -> None:
+    """By its name, although its rate's number is another joint's, or none's: a free root has six, a ball joint three."""
+    robot = RandomTree(34, TREES["a fork"], kinds).mechanism()
+    own = slice(PARAMETERS_PER_LINK * massless, PARAMETERS_PER_LINK * (massless + 1))
+    parameters = robot.parameters.copy()
+    parameters[massless] = 0.0
+    span = np.delete(robot.parameter_span, own, axis=1)
+    model = derive_model(replace(robot, parameters=parameters, parameter_span=span))
+    with pytest.raises(InputError, match=f"forward_dynamics: joint 'joint{massless}' moves no inertia"):
+        lower(replace(model, theta_b=None), functions=["forward_dynamics"])

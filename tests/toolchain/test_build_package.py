@@ -250,6 +250,38 @@ def test_a_folder_without_a_package_is_said(tmp_path: Path) -> None:
     assert "emit-c" in str(caught.value.hint)
 
 
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [('a"b', "'\"'"), ("a;b", "';'"), ("a\nb", r"'\\n'"), ("a[b", "'\\['"), ("a:b/c", "':'")],
+)
+def test_a_path_that_cmake_cannot_take_is_refused(name: str, shown: str, tmp_path: Path) -> None:
+    _need("cmake")
+    folder = _emit(tmp_path / name)
+    with pytest.raises(InputError, match=f"CMake cannot take {shown} in a folder's path") as caught:
+        build_package(folder)
+    assert "make" in str(caught.value.hint)
+    assert not (folder / "build").exists()
+
+
+@pytest.mark.usefixtures("unoptimised")
+@pytest.mark.parametrize("name", slow_but_for(["~"], ["~", "-a", "a [b] 'c' $d #e"]))
+def test_cmake_takes_other_names(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also those that are something else on its command line."""
+    _need("cmake")
+    monkeypatch.chdir(tmp_path)
+    assert ": ok" in build_package(_emit(Path(name)))
+
+
+def test_a_folder_of_others_is_not_built_in(tmp_path: Path) -> None:
+    folder = _emit(tmp_path / "arm")
+    (folder / "build").mkdir()
+    (folder / "build" / "plan.dwg").write_text("mine")
+    with pytest.raises(InputError, match=r"build: not a folder of psdmc's: it holds plan.dwg") as caught:
+        build_package(folder)
+    assert "move" in str(caught.value.hint)
+    assert [path.name for path in (folder / "build").iterdir()] == ["plan.dwg"]
+
+
 def test_a_machine_without_build_tools_is_said(emitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "psdmc.toolchain.build_package.shutil.which", lambda name: "/usr/bin/cc" if name == "cc" else None

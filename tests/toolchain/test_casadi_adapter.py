@@ -5,15 +5,27 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bundled import ROBOTS, bundled_model, bundled_robot
+from command_line import typed
 from pinocchio_in_casadi import acceleration
+from random_trees import RandomTree
+from unoptimised import without_optimisation
 
+import psdmc
 from psdmc.compiler import emit_c
+from psdmc.derivation.derive import derive_model
+from psdmc.emit.adapters import lacking
 from psdmc.errors import InputError
+from psdmc.functions import RECIPES
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_states import on_joints
+from psdmc.model.store import save
+from psdmc.program.signature import Q, Sizes
 from psdmc.robot.reference import Reference, reference
 from psdmc.toolchain.compiler_command import find_compiler
 
@@ -31,9 +43,10 @@ FUNCTIONS = [
 External = Callable[[str], "casadi.Function"]
 
 
-def external(robot: str, folder: Path, functions: list[str]) -> External:
+def external(robot: str, folder: Path, functions: list[str], model: DynamicsModel | None = None) -> External:
     """A robot's functions for CasADi, compiled as the header of the emitted file says."""
-    emit_c(bundled_model(robot), folder, "factored", functions, adapters=["casadi"], name=robot)
+    known = model or bundled_model(robot)
+    emit_c(known, folder, "factored", functions, adapters=["casadi"], name=robot)
     library = folder / f"lib{robot}_casadi.so"
     command = [*find_compiler().command, "-std=c99", "-Wall", "-Wextra", "-Werror", "-O1", "-shared", "-fPIC"]
     words = [
@@ -150,6 +163,93 @@ def test_missing_inputs_are_zero_and_unwanted_outputs_are_not_written(scara: Ext
 def test_a_function_without_derivatives_says_so(scara: External) -> None:
     with pytest.raises(RuntimeError, match="Derivatives cannot be calculated"):
         scara("mass_matrix").jacobian()
+
+
+ON_FLOATING = [
+    *("inverse_dynamics", "forward_dynamics", "mass_matrix", "gravity", "jacobian", "kinetic_energy"),
+    *("inverse_dynamics_derivatives", "inverse_dynamics_vjp", "integrate", "difference", "neutral"),
+]
+
+
+@cache
+def free_tree() -> RandomTree:
+    """A free root with a hinge."""
+    return RandomTree(5, (-1, 0), "FR")
+
+
+@cache
+def free_model() -> DynamicsModel:
+    return derive_model(free_tree().mechanism(), expand=False)
+
+
+@cache
+def free_state() -> dict[str, np.ndarray]:
+    """One state for every input that these functions read."""
+    model, rng = free_model(), np.random.default_rng(2)
+    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.frame_names))
+    read = {q.name: q for name in ON_FLOATING for q in RECIPES[name].signature.inputs}
+    found = {name: rng.uniform(-1.0, 1.0, sizes.shape(quantity.axes)) for name, quantity in read.items()}
+    for name, quantity in read.items():
+        if quantity.axes == Q.axes:
+            found[name] = on_joints(model.mechanism, found[name][None])[0]
+    return found
+
+
+@pytest.fixture(scope="module")
+def floating(tmp_path_factory: pytest.TempPathFactory) -> External:
+    return external("floating", tmp_path_factory.mktemp("casadi") / "floating", ON_FLOATING, free_model())
+
+
+@pytest.mark.parametrize("name", ON_FLOATING)
+def test_functions_on_a_floating_base_are_the_compiled_robots(floating: External, name: str) -> None:
+    """Those are Pinocchio's (tests/functions)."""
+    given = [free_state()[quantity.name] for quantity in RECIPES[name].signature.inputs]
+    found = floating(name)(*given) if given else floating(name)()["q"]
+    with without_optimisation():
+        robot = psdmc.compile(free_model(), functions=ON_FLOATING)
+    expected = getattr(robot, name)(*given)
+    pairs = zip(found, expected, strict=True) if isinstance(found, tuple) else [(found, expected)]
+    for one, other in pairs:
+        close(one, np.asarray(other), 1e-12)
+
+
+def test_on_a_floating_base_they_are_pinocchios(floating: External) -> None:
+    oracle = Reference(free_tree().model, "tip")
+    q, qd, qdd = (free_state()[name] for name in ("q", "qd", "qdd"))
+    rows = [v[None] for v in (q, qd, qdd)]
+    close(floating("inverse_dynamics")(q, qd, qdd), oracle.inverse_dynamics(*rows))
+    close(floating("forward_dynamics")(q, qd, qdd), oracle.forward_dynamics(*rows))
+    close(floating("mass_matrix")(q), oracle.mass_matrix(rows[0]))
+
+
+@pytest.mark.parametrize("name", [name for name in ON_FLOATING if name != "neutral"])
+def test_on_a_floating_base_no_function_offers_a_jacobian(floating: External, name: str) -> None:
+    """CasADi says so when it is asked, for Jacobians and for reverse mode, instead of failing when it calls them."""
+    function = floating(name)
+    for asked in (function.jacobian, lambda: function.reverse(1)):
+        with pytest.raises(RuntimeError, match="Derivatives cannot be calculated"):
+            asked()
+
+
+def test_the_command_says_what_a_floating_base_lacks(tmp_path: Path) -> None:
+    save(free_model(), tmp_path / "free.npz")
+    done = typed("emit-c", "free.npz", "--functions", "gravity,neutral", "--with", "casadi", cwd=tmp_path)
+    assert (
+        "note: CasADi derivatives are not available for a floating base; CasADi can call, without derivatives: "
+        "gravity, neutral\n" in done.stdout
+    )
+    assert not (tmp_path / "free" / "src" / "gravity_derivatives.c").exists(), "nobody asked for it"
+
+
+def test_robots_with_and_without_long_coordinates() -> None:
+    """A ball joint is no floating base; three translations have three rates."""
+    arm = ((-1, 0), "RS"), ((-1, 0), "RT")
+    spherical, sliding = (RandomTree(3, parents, kinds).mechanism() for parents, kinds in arm)
+    assert lacking(sliding, ["casadi"]) == ()
+    assert lacking(spherical, []) == ()
+    assert lacking(spherical, ["casadi"]) == (
+        "CasADi derivatives are not available for joint 'joint1', whose q is longer than its rates",
+    )
 
 
 def test_unknown_parameters_and_single_precision_are_refused(tmp_path: Path) -> None:

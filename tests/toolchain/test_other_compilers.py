@@ -11,6 +11,7 @@ from bundled import bundled_model
 
 import psdmc
 from psdmc.progress import Step
+from psdmc.target.target import Real
 from psdmc.toolchain import build_progress
 from psdmc.toolchain.build_package import build_package
 
@@ -63,6 +64,33 @@ def test_another_compiler_compiles_everything_again(tmp_path: Path, first: str) 
     assert sorted(members(package / "build" / "libarm.a")) == ["gravity.o", "tables.o"]
     assert calls >= 2
     assert "-c src/" not in again, "nothing changed, nothing is compiled"
+
+
+WHEEL = """<robot name="wheel"><link name="base"/><link name="rim"><inertial><mass value="2"/>
+<inertia ixx="0.02" iyy="0.02" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="axle" type="continuous"><parent link="base"/><child link="rim"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("real", ["float64", "float32"])
+def test_tcc_builds_a_package_without_limits_and_its_self_test_passes(tmp_path: Path, real: Real) -> None:
+    """tcc takes no minus before INFINITY in a constant. The limits that it compiles are C's infinities."""
+    need("make", "tcc", "ar")
+    (tmp_path / "wheel.urdf").write_text(WHEEL, encoding="utf-8")
+    package = tmp_path / "wheel"
+    psdmc.emit_c(psdmc.derive(tmp_path / "wheel.urdf"), package, functions=["inverse_dynamics"], real=real)
+    (tmp_path / "limits.c").write_text(
+        "#include <stdio.h>\n#include <wheel/wheel.h>\n"
+        'int main(void) { printf("%g %g %g", (double)wheel_position_lower[0], (double)wheel_position_upper[0],'
+        " (double)wheel_effort_limit[0]); return 0; }\n",
+        encoding="utf-8",
+    )
+
+    said = run("make", "-C", package, "CC=tcc", "all", "check")
+    library = [package / "build" / "libwheel.a", "-lm"]
+    run("tcc", f"-I{package}/include", tmp_path / "limits.c", *library, "-o", tmp_path / "limits")
+
+    assert ", 0 failed" in said
+    assert run(tmp_path / "limits") == "-inf inf inf"
 
 
 @pytest.mark.parametrize("tool", ["cmake", "make"])

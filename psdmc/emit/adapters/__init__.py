@@ -7,14 +7,18 @@ from collections.abc import Callable, Sequence
 from psdmc.emit.adapters import casadi
 from psdmc.emit.kernel_view import KernelView
 from psdmc.errors import InputError
+from psdmc.robot.mechanism import Mechanism
 
-ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView]], str]] = {"casadi": casadi.source}
+ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView], bool], str]] = {"casadi": casadi.source}
 """By name, the function that makes an adapter's C file, <name>/<robot>_<name>.c, from the robot's identifier, the
-package's real type and its kernels. The file includes the library's sources and becomes a shared library of its own,
-lib<robot>_<name>."""
+package's real type, its kernels and whether q is longer than the rates. The file includes the library's sources and
+becomes a shared library of its own, lib<robot>_<name>."""
 
 NEEDS = {"casadi": casadi.needed}
 """By name, the function that returns which functions an adapter needs in the package besides those asked for."""
+
+LACKS = {"casadi": casadi.lacking}
+"""By name, the function that says what an adapter cannot have of a robot."""
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
@@ -25,9 +29,15 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in ADAPTERS if name in names)
 
 
-def with_needed(functions: Sequence[str], adapters: Sequence[str]) -> list[str]:
+def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -> list[str]:
     """The functions, followed by those that the adapters need besides."""
     found = dict.fromkeys(functions)
     for adapter in adapters:
-        found |= dict.fromkeys(NEEDS[adapter](functions))
+        found |= dict.fromkeys(NEEDS[adapter](functions, wide))
     return list(found)
+
+
+def lacking(robot: Mechanism, adapters: Sequence[str]) -> tuple[str, ...]:
+    """What these adapters cannot have of a robot, one clause each."""
+    found = (LACKS[adapter](robot) for adapter in chosen(adapters))
+    return tuple(reason for reason in found if reason is not None)

@@ -3,6 +3,9 @@
 The convention is CasADi's documented one (user guide, "Using the generated code"; Function::jacobian): beside f itself a
 library exports what f_n_in, f_sparsity_out and so on return, and jac_f: inputs of f, then its outputs (not read: empty
 patterns), to one block per output and input. Matrices are column by column, nonzeros only.
+
+CasADi differentiates by the entries of q, psdmc's derivatives are along the tangent. Where q is longer than the rates the
+two differ in size: such robots' functions have no Jacobians here.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from psdmc.emit.kernel_view import KernelView, OutputView, VectorView
 from psdmc.emit.render import render
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
+from psdmc.robot.mechanism import Mechanism
 
 DERIVATIVES, GRADIENT = "_derivatives", "_vjp"
 """Endings of function names: a function that puts out d output / d input as d<output>_d<input>, and one that reads a
@@ -67,6 +71,7 @@ class CasadiView:
 
     robot    identifier that every symbol starts with
     hidden   emitted functions whose names CasADi's take: they are compiled under others
+    wide     whether q is longer than the rates, so that there are no Jacobians
     zeros    length of the longest input: what is not given to a function is zero
     """
 
@@ -76,11 +81,12 @@ class CasadiView:
     hidden: tuple[str, ...]
     sources: tuple[str, ...]
     zeros: int
+    wide: bool
 
 
-def needed(functions: Sequence[str]) -> list[str]:
-    """Functions that compute derivatives of these."""
-    return [name + DERIVATIVES for name in functions if _has_blocks(name)]
+def needed(functions: Sequence[str], wide: bool) -> list[str]:
+    """Functions that compute derivatives of these; none where q is longer than the rates."""
+    return [name + DERIVATIVES for name in functions if not wide and _has_blocks(name)]
 
 
 def _has_blocks(name: str) -> bool:
@@ -93,12 +99,23 @@ def _has_blocks(name: str) -> bool:
     return all(f"d{o.name}_d{i.name}" in names for o in own.outputs for i in own.inputs)
 
 
-def source(robot: str, real: str, kernels: Sequence[KernelView]) -> str:
+def source(robot: str, real: str, kernels: Sequence[KernelView], wide: bool) -> str:
     """The adapter's C file; InputError where CasADi cannot call the package."""
-    return render("adapters/casadi.c.jinja", view=casadi_view(robot, real, kernels))
+    return render("adapters/casadi.c.jinja", view=casadi_view(robot, real, kernels, wide))
 
 
-def casadi_view(robot: str, real: str, every: Sequence[KernelView]) -> CasadiView:
+def lacking(robot: Mechanism) -> str | None:
+    """Why CasADi gets no derivatives of this robot's functions; None where it gets them."""
+    if robot.nq == robot.nv:
+        return None
+    wide = next(joint for joint in robot.joints if joint.type.nq > joint.type.nv)
+    what = (
+        "a floating base" if robot.has_free_root else f"joint {wide.name!r}, whose q is longer than its rates"
+    )
+    return f"CasADi derivatives are not available for {what}"
+
+
+def casadi_view(robot: str, real: str, every: Sequence[KernelView], wide: bool) -> CasadiView:
     """What CasADi's adapter prints of these kernels. InputError for float, and where theta_b is unknown."""
     if real != "double":
         raise InputError("CasADi's numbers are double, the package's float", "leave out --real float32")
@@ -108,7 +125,8 @@ def casadi_view(robot: str, real: str, every: Sequence[KernelView]) -> CasadiVie
             "CasADi gets functions with baked parameters, and this model's are unknown", "calibrate it first"
         )
     patterns = _Patterns()
-    externals = [one for kernel in kernels.values() for one in _externals(kernel, kernels, patterns)]
+    others = {} if wide else kernels
+    externals = [one for kernel in kernels.values() for one in _externals(kernel, others, patterns)]
     used = {external.called for external in externals}
     return CasadiView(
         robot=robot,
@@ -116,7 +134,8 @@ def casadi_view(robot: str, real: str, every: Sequence[KernelView]) -> CasadiVie
         patterns=patterns.all,
         hidden=tuple(sorted(used)),
         sources=tuple(f"{kernel.function.name}.c" for kernel in kernels.values()),
-        zeros=max(vector.size for kernel in kernels.values() for vector in kernel.inputs),
+        zeros=max((vector.size for kernel in kernels.values() for vector in kernel.inputs), default=1),
+        wide=wide,
     )
 
 
@@ -159,7 +178,7 @@ def _numbers(shape: Sequence[int], zero: frozenset[int]) -> tuple[int, ...]:
 def _externals(
     kernel: KernelView, kernels: Mapping[str, KernelView], patterns: _Patterns
 ) -> Iterable[External]:
-    """A function, its Jacobian and its reverse mode where the package has them."""
+    """A function, and its Jacobian and its reverse mode where `kernels` have them."""
     outputs = {output.name: output for output in kernel.outputs}
     own = [(name, name, patterns.of(output.shape)) for name, output in outputs.items()]
     yield _external("", kernel, _given(kernel, patterns), own, kernel)

@@ -56,7 +56,8 @@ class Planar(WideJoint):
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
         (x, y, c, s), (x1, y1, c1, s1) = q, other
-        angle = _angle(c * c1 + s * s1, c * s1 - s * c1)
+        sine = c * (s1 - s) - s * (c1 - c)  # not c s1 - s c1, which loses the digits of a small angle
+        angle = _angle(c * c1 + s * s1, sine)
         half_s, half_c, share = _half(angle)
         dx, dy = (c * (x1 - x) + s * (y1 - y)) / share, (c * (y1 - y) - s * (x1 - x)) / share
         return (half_c * dx + half_s * dy, half_c * dy - half_s * dx, angle)

@@ -47,11 +47,15 @@ def angles_between(quaternion: Sequence[Scalar], other: Sequence[Scalar]) -> tup
     its angle h.
 
     The angle is halved, by square roots of 1 + cos, until few terms of the arcsine are enough: exact near zero, where its
-    cosine says nothing, and near half a turn, where its sine does not.
+    cosine says nothing, and near half a turn, where its sine does not. The sine comes from the difference of the two, whose
+    share along the first one adds nothing to it: where they are nearly equal, their product itself has lost its digits.
     """
-    x, y, z, w = product(inverse(quaternion), other)
-    shorter = sign(w) / root(x * x + y * y + z * z + w * w)
-    sine, cosine = (x * shorter, y * shorter, z * shorter), w * shorter
+    back = inverse(quaternion)
+    w = product(back, other)[3]
+    nearer = sign(w)
+    x, y, z, _ = product(back, [nearer * there - here for here, there in zip(quaternion, other, strict=True)])
+    length = 1.0 / root(x * x + y * y + z * z + w * w)
+    sine, cosine = (x * length, y * length, z * length), w * nearer * length
     share = arc(square_of(sine), cosine)
     angles = (2.0 * share * sine[0], 2.0 * share * sine[1], 2.0 * share * sine[2])
     return angles, share * cosine
