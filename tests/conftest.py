@@ -1,5 +1,5 @@
 """Shared set-up: test helpers beside this file can be imported by name; hypothesis draws the same examples every time,
-or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it; Ctrl-C
+however busy the machine is, or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it; Ctrl-C
 is heard by the commands under test also where a shell runs the tests in the background and has it ignored; Python keeps
 the bytecode of tests and psdmc, which hundreds of processes load, also where the environment says otherwise; commands
 under test tell no progress, which depends on the machine's load."""
@@ -24,7 +24,7 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ["PSDMC_PROGRESS"] = "off"
 
-settings.register_profile("repeatable", derandomize=True)
+settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
