@@ -1,9 +1,9 @@
 """Shared set-up: test helpers beside this file can be imported by name; hypothesis draws the same examples every time,
-however busy the machine is, or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it; Ctrl-C
-is heard by the commands under test also where a shell runs the tests in the background and has it ignored; Python keeps
-the bytecode of tests and psdmc, which hundreds of processes load, also where the environment says otherwise; commands
-under test tell no progress, which depends on the machine's load; tests that need a program which is not installed are
-skipped, and the run ends with how many tests were skipped for which reason."""
+however busy the machine is, or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is
+thrown away with it; Ctrl-C is heard by the commands under test also where a shell runs the tests in the background and
+has it ignored; Python keeps the bytecode of tests and psdmc, which hundreds of processes load, also where the environment
+says otherwise; commands under test tell no progress, which depends on the machine's load; tests that need a program which
+is not installed are skipped, and the run ends with how many tests were skipped for which reason."""
 
 from __future__ import annotations
 
