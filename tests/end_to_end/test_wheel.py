@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-import site
 import shutil
+import site
 import subprocess
 import sys
 import tarfile
