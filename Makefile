@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-lowest test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -117,6 +117,13 @@ check: $(READY) ## format, lint, types and the fast tests: seconds
 	$(RUN)/mypy
 	$(RUN)/reuse lint --quiet
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' $(addprefix --ignore=,$(LATER)) $(FAST)
+
+MACHINES := $(FAST) tests/functions/test_steps_of_free_robots.py $(wildcard tests/derivation/test_same_bytes*.py)
+SETTING ?=
+test-machines: $(READY) ## fast tests as other processors compute, SETTING=haswell for one: OpenBLAS's kernels, NumPy's features, two threads
+	@for setting in $(or $(SETTING),$$($(RUN)/python tests/machines.py names)); do \
+	  $(RUN)/python tests/machines.py run $$setting $(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' \
+	    $(addprefix --ignore=,$(LATER)) $(MACHINES) || exit 1; done
 
 golden: $(READY) ## rewrite the golden files; review their diff like code
 	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit tests/end_to_end/test_reference_robot.py

@@ -13,6 +13,9 @@ from collections.abc import Callable
 
 INTERRUPTED_STATUS = 130
 """Exit status of a process that Ctrl-C ended, as shells define it: 128 + SIGINT."""
+CLOSED_STATUS = 1
+"""Exit status where the reader of the output has closed it (`psdmc show m.npz | head`): nothing failed, but the output
+is incomplete."""
 
 
 class PsdmcError(Exception):
@@ -53,7 +56,9 @@ class InternalError(Exception):
 
 def exit_status_of(action: Callable[[], int | None]) -> int:
     """Run `action`, for `python -m` modules; returns its status (None: 0), or that of its PsdmcError, whose message and
-    hint are printed to standard error, a line each. Ctrl-C and a full standard output are reported in a line, too."""
+    hint are printed to standard error, a line each. Ctrl-C and a full standard output are reported in a line, too; a closed
+    one is not."""
+    discard_output_if_closed()
     try:
         status = action() or 0
         sys.stdout.flush()
@@ -62,11 +67,20 @@ def exit_status_of(action: Callable[[], int | None]) -> int:
         return _said(error.message, error.hint, error.exit_status)
     except KeyboardInterrupt:
         return _said("interrupted", None, INTERRUPTED_STATUS)
+    except BrokenPipeError:
+        _drop_output()
+        return CLOSED_STATUS
     except OSError as error:
         if error.filename is None:
             _drop_output()
         where = error.filename or "standard output"
         return _said(f"{where}: {error.strerror or error}", "free some space", ToolchainError.exit_status)
+
+
+def discard_output_if_closed() -> None:
+    """Write to nowhere where the caller has closed standard output (`psdmc derive robot.urdf >&-`)."""
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 
 
 def _said(message: str, hint: str | None, status: int) -> int:

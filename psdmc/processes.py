@@ -7,8 +7,11 @@ import multiprocessing
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from typing import TypeVar
+from multiprocessing.connection import Connection, wait
+from multiprocessing.resource_tracker import ensure_running
+from typing import Any, TypeVar, cast
+
+from psdmc.errors import ToolchainError
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -33,20 +36,66 @@ def in_a_new_process(work: Callable[[Job], Result], job: Job) -> Result:
 
 
 def _elsewhere(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    spawn, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
-    with ProcessPoolExecutor(workers, spawn, initializer=_leave_interrupts_to_programs) as pool:
-        try:
-            with _deaf_to_interrupts():
-                futures = [pool.submit(work, job) for job in jobs]
-            for future in futures:
-                yield future.result()
-        except BaseException:
-            # The pool notices the ended workers and fails its remaining futures. They must not be cancelled besides, as
-            # pool.map does: a cancelled future raises in the pool's own thread, and another thread then keeps writing
-            # to workers that have ended.
-            for process in set(multiprocessing.active_children()) - others:
-                process.terminate()
-            raise
+    """By one pipe to each worker and no further thread. A pool's thread that writes a long job to a worker which has ended
+    waits for ever (Python before 3.11.5, gh-94777): here writing to an ended worker is an error."""
+    spawn = multiprocessing.get_context("spawn")
+    processes, pipes = [], []
+    try:
+        with _deaf_to_interrupts():
+            for _ in range(min(workers, len(jobs))):
+                ours, theirs = spawn.Pipe()
+                process = spawn.Process(target=_serve, args=(work, theirs))
+                process.start()
+                processes.append(process)
+                pipes.append(ours)
+                theirs.close()
+        yield from _answers(pipes, jobs)
+    except BaseException:
+        for process in processes:
+            process.terminate()
+        raise
+    finally:
+        for pipe in pipes:
+            pipe.close()
+        for process in processes:
+            process.join()
+
+
+def _answers(pipes: Sequence[Connection], jobs: Sequence[Job]) -> Iterator[Any]:
+    """Give each worker that asks its next job; the results, in order."""
+    waiting = iter(enumerate(jobs))
+    answers: dict[int, tuple[Any, Exception | None]] = {}
+    for number in range(len(jobs)):
+        while number not in answers:
+            for pipe in cast(list[Connection], wait(pipes)):
+                try:
+                    answers |= pipe.recv()
+                    following = next(waiting, None)
+                    if following is not None:
+                        pipe.send(following)
+                except (EOFError, ConnectionError):
+                    raise ToolchainError(
+                        "a process that psdmc started was ended from outside",
+                        "close other programs if memory was short, then try again",
+                    ) from None
+        result, error = answers.pop(number)
+        if error is not None:
+            raise error
+        yield result
+
+
+def _serve(work: Callable[[Job], Result], pipe: Connection) -> None:
+    """Ask for a job with the last one's answer, {} at first, until the caller needs no more."""
+    _leave_interrupts_to_programs()
+    answer: dict[int, tuple[Any, Exception | None]] = {}
+    with contextlib.suppress(EOFError, ConnectionError):
+        while True:
+            pipe.send(answer)
+            number, job = pipe.recv()
+            try:
+                answer = {number: (work(job), None)}
+            except Exception as error:
+                answer = {number: (None, error)}
 
 
 @contextlib.contextmanager
@@ -56,6 +105,7 @@ def _deaf_to_interrupts() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):  # Windows: its consoles send Ctrl-C to every process
         yield
         return
+    ensure_running()  # multiprocessing's resource tracker, whose start would unblock the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which new processes inherit
     heard: list[int] = []
     try:

@@ -1,14 +1,17 @@
 """Shared set-up: test helpers beside this file can be imported by name; hypothesis draws the same examples every time,
-or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is thrown away with it; Ctrl-C
-is heard by the commands under test also where a shell runs the tests in the background and has it ignored; Python keeps
-the bytecode of tests and psdmc, which hundreds of processes load, also where the environment says otherwise; commands
-under test tell no progress, which depends on the machine's load."""
+however busy the machine is, or, with HYPOTHESIS_PROFILE=explore, new ones; one compile cache serves the whole run and is
+thrown away with it; Ctrl-C is heard by the commands under test also where a shell runs the tests in the background and
+has it ignored; Python keeps the bytecode of tests and psdmc, which hundreds of processes load, also where the environment
+says otherwise; commands under test tell no progress, which depends on the machine's load; tests that need a program which
+is not installed are skipped, and the run ends with how many tests were skipped for which reason."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,7 +27,7 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ["PSDMC_PROGRESS"] = "off"
 
-settings.register_profile("repeatable", derandomize=True)
+settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("explore", derandomize=False)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
@@ -38,3 +41,19 @@ def compile_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     patch.setenv("PSDMC_CACHE_DIR", str(folder))
     yield folder
     patch.undo()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    for mark in item.iter_markers("needs"):
+        for program in mark.args:
+            if shutil.which(program) is None:
+                pytest.skip(f"{program} is not installed")
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    reasons = Counter(
+        report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.stats.get("skipped", [])
+    )
+    for reason, count in sorted(reasons.items(), key=lambda entry: (-entry[1], entry[0])):
+        terminalreporter.write_line(f"skipped: {count} {'test' if count == 1 else 'tests'}: {reason}")

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from psdmc import processes
+from psdmc.errors import ToolchainError
 from psdmc.processes import in_a_new_process, in_processes
 
 
@@ -43,6 +44,20 @@ def test_a_single_job_can_have_a_process_of_its_own():
     job, process = in_a_new_process(process_of, 3)
     assert job == 3
     assert process != os.getpid()
+
+
+def leave(job: int) -> None:
+    os._exit(1)
+
+
+def test_a_worker_that_ends_is_an_error():
+    with pytest.raises(ToolchainError, match="was ended from outside"):
+        list(in_processes(leave, [1, 2, 3], 2))
+
+
+def test_long_jobs_and_long_results():
+    jobs = [bytes([number]) * 1_000_000 for number in range(7)]
+    assert list(in_processes(bytes, jobs, 3)) == jobs
 
 
 @pytest.mark.parametrize("threads", [0, 3])
@@ -81,20 +96,23 @@ from test_processes import hang
 if __name__ == "__main__":
     try:
         with as_error():
-            list(in_processes(hang, [{marker!r}] * 2, 2))
+            list(in_processes(hang, [({marker!r}, bytes({size}))] * 3, 2))
     except Interrupted:
         print("interrupted")
 """
 
 
-def hang(marker: str) -> None:
-    Path(marker).touch()
+def hang(job: tuple[str, bytes]) -> None:
+    Path(job[0]).touch()
     time.sleep(120)
 
 
-def test_ctrl_c_ends_the_workers_without_a_word(tmp_path: Path):
+@pytest.mark.parametrize("size", [0, 1_000_000])
+def test_ctrl_c_ends_the_workers_without_a_word(size: int, tmp_path: Path):
+    """Also while the next job is longer than a pipe holds: a pool of Python 3.11.2 waits for ever then."""
     marker = tmp_path / "started"
-    (tmp_path / "main.py").write_text(HANGING.format(here=str(Path(__file__).parent), marker=str(marker)))
+    main = HANGING.format(here=str(Path(__file__).parent), marker=str(marker), size=size)
+    (tmp_path / "main.py").write_text(main)
     process = subprocess.Popen(
         [sys.executable, str(tmp_path / "main.py")],
         stdout=subprocess.PIPE,

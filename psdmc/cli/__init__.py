@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from psdmc.cli.interrupt import as_error, at_once
-from psdmc.errors import exit_status_of
+from psdmc.errors import discard_output_if_closed, exit_status_of
 from psdmc.version import psdmc_version
 
 __all__ = ["main"]
@@ -13,6 +13,7 @@ __all__ = ["main"]
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; Ctrl-C ends it without a traceback, from here on. The option --version loads nothing."""
+    discard_output_if_closed()
     if (sys.argv[1:] if arguments is None else arguments) == ["--version"]:
         sys.exit(exit_status_of(_print_version))
     with at_once():

@@ -11,11 +11,8 @@ from psdmc.cli import interrupt
 from psdmc.cli.commands import app
 from psdmc.cli.lists import with_numbers_joined
 from psdmc.cli.one_line import one_line
-from psdmc.errors import INTERRUPTED_STATUS, InternalError, PsdmcError, ToolchainError
+from psdmc.errors import CLOSED_STATUS, INTERRUPTED_STATUS, InternalError, PsdmcError, ToolchainError
 
-CLOSED_STATUS = 1
-"""Exit status where the reader of the output has closed it (`psdmc show m.npz | head`): nothing failed, but the output
-is incomplete."""
 INTERNAL_STATUS = 70
 
 

@@ -20,7 +20,8 @@ def quoted(word: object) -> str:
 
 
 def say_next_line(line: str) -> None:
-    """Print `next: LINE` likewise."""
+    """Print `next: LINE` likewise, below the results: where they cannot be written, nothing is next."""
+    sys.stdout.flush()
     with contextlib.suppress(OSError):  # whoever closed it does not want to know
         if sys.stderr is not None:
             print(f"next: {one_line(line)}", file=sys.stderr)

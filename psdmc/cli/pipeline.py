@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -359,9 +360,8 @@ def build(
     with steps() as progress:
         built = build_package(directory, edited, progress)
     print(f"{directory}: built, self-test passed ({checks_of(built)})")
-    for library in sorted((directory / "build").glob("lib*.*")):
-        if library.suffix in (".a", ".so", ".dylib"):
-            print(f"{library}: written")
+    for library in sorted((directory / "build").glob("lib*.a")):  # which CMake and make both write
+        print(f"{library}: written")
     say_next_line(_after_building(directory))
 
 
@@ -373,7 +373,7 @@ def _after_building(package: Path) -> str:
     if target is not None and target.tools:
         compilers = f"CC={target.tools}gcc AR={target.tools}ar"
         return f"BUILD=board {compilers} make -C {quoted(package)} all"
-    if (package / "build" / "CMakeCache.txt").exists():
+    if shutil.which("make") is None:
         return f'cmake --install {quoted(package / "build")} --prefix "$HOME/.local"'
     return f'make -C {quoted(package)} install PREFIX="$HOME/.local"'
 

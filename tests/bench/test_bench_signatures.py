@@ -22,6 +22,7 @@ def entered(two_link) -> dict[tuple[str, str], Contestant]:
     return {(one.function, one.layout): one for one in found}
 
 
+@pytest.mark.needs("g++")
 def test_every_layout_of_both_is_right(entered, two_link):
     right, errors, wrong = checked(two_link, list(entered.values()), seed=1)
 
@@ -29,6 +30,7 @@ def test_every_layout_of_both_is_right(entered, two_link):
     assert max(errors) < 1e-12
 
 
+@pytest.mark.needs("g++")
 @pytest.mark.parametrize("layout", ["state", "rows", "lanes"])
 def test_a_wrong_entry_of_a_small_block_is_found(layout, entered, two_link, monkeypatch):
     """Each block has its own scale: M is small beside the others where the arm moves fast."""
@@ -43,6 +45,7 @@ def test_a_wrong_entry_of_a_small_block_is_found(layout, entered, two_link, monk
     assert disagreement(runner, fast) == pytest.approx(1e-6, rel=0.5)
 
 
+@pytest.mark.needs("g++")
 def test_the_fourth_input_counts(entered, two_link):
     """Without the wrenches the torques are others."""
     states = States.random(two_link.chain, 64, seed=3)
@@ -52,6 +55,7 @@ def test_the_fourth_input_counts(entered, two_link):
     assert (states.more(FOUR), states.more(SEVERAL)) == (6, 0)
 
 
+@pytest.mark.needs("g++")
 def test_several_outputs_are_timed_over_fewer_states(entered, two_link):
     states = States.random(two_link.chain, 4096, seed=4)
     blocks = {name: len(Runner(entered[name, "state"], states).tail()) for name in (SEVERAL, FOUR)}

@@ -25,6 +25,7 @@ COLDER = 3.0
 needs_nm = pytest.mark.skipif(shutil.which("nm") is None, reason="needs nm")
 
 
+@pytest.mark.needs("g++")
 def test_a_walk_through_memory_takes_longer_cold(two_link: Case) -> None:
     walk = Runner(tiny("walk"), States.random(two_link.chain, 1024, seed=1))
     kept, swept = (walk.cold(CALLS, memory) for memory in (np.ones(8), swept_memory()))
@@ -37,6 +38,7 @@ def test_what_is_swept_is_larger_than_the_caches_within_bounds() -> None:
     assert LEAST <= swept_memory().nbytes <= MOST
 
 
+@pytest.mark.needs("g++")
 @needs_nm
 def test_a_thousand_more_instructions_are_a_thousand_more_bytes(two_link: Case) -> None:
     sizes = code_sizes(tiny("few").library)

@@ -72,6 +72,7 @@ def test_derivatives_of_large_robots_are_left_out_and_said(
     assert "this has 8" in answer.reason
 
 
+@pytest.mark.needs("g++")
 def test_every_layout_is_right(bird: Case) -> None:
     """Strides of q and of rates differ in the loops."""
     contestants = psdmc_c.factored(bird, FLAGS)
@@ -81,6 +82,7 @@ def test_every_layout_is_right(bird: Case) -> None:
     assert max(errors) < 1e-10
 
 
+@pytest.mark.needs("g++")
 def test_latency_reads_every_position(bird: Case, states: States) -> None:
     """More positions than outputs: the loop must not read behind them."""
     one = next(c for c in psdmc_c.factored(bird, FLAGS) if c.function == "gravity" and c.layout == "state")
@@ -89,6 +91,7 @@ def test_latency_reads_every_position(bird: Case, states: States) -> None:
     assert runner.contestant.outputs < bird.chain.nq
 
 
+@pytest.mark.needs("g++")
 def test_mujocos_torques_agree_in_its_own_convention(bird: Case) -> None:
     answer, left_out = mujoco_c.contestants(bird, FLAGS)
     assert isinstance(answer, Contestant)

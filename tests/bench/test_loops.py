@@ -15,6 +15,7 @@ def states(two_link):
     return States.random(two_link.chain, 2048, seed=1)
 
 
+@pytest.mark.needs("g++")
 @pytest.mark.parametrize(("symbol", "layout", "lanes"), [("sums", "state", 1), ("by_lane", "lanes", 4)])
 def test_every_state_is_computed_in_its_place(symbol, layout, lanes, states):
     found = Runner(tiny(symbol, layout=layout, lanes=lanes), states).outputs()
@@ -22,6 +23,7 @@ def test_every_state_is_computed_in_its_place(symbol, layout, lanes, states):
     assert np.array_equal(found, states.q + 10.0 * states.qd + 100.0 * states.qdd)
 
 
+@pytest.mark.needs("g++")
 def test_times_come_block_by_block(states):
     runner = Runner(tiny("sums"), states)
 
@@ -30,6 +32,7 @@ def test_times_come_block_by_block(states):
     assert runner.tail().shape == (2048 // 64,)
 
 
+@pytest.mark.needs("g++")
 def test_more_work_takes_longer(states):
     few, many = (np.median(Runner(tiny(name), states).throughput()) for name in ("few", "many"))
 

@@ -24,6 +24,7 @@ def shares(*values: float):
     return lambda: lambda: next(left)
 
 
+@pytest.mark.needs("g++")
 def test_only_idle_rounds_count(runner, monkeypatch):
     monkeypatch.setattr(measuring, "others_share", shares(0.0, 0.9, 0.0))
 
@@ -32,6 +33,7 @@ def test_only_idle_rounds_count(runner, monkeypatch):
     assert (found.rounds, found.idle) == (2, True)
 
 
+@pytest.mark.needs("g++")
 def test_a_machine_that_is_never_idle_is_said_to_be_busy(runner, monkeypatch):
     monkeypatch.setattr(measuring, "others_share", shares(*[0.9] * PATIENCE * 2))
 
@@ -44,6 +46,7 @@ def test_spread_is_median_quartiles_and_best():
     assert Spread.of([5.0, 1.0, 2.0, 3.0, 4.0]) == Spread(median=3.0, low=2.0, high=4.0, best=1.0)
 
 
+@pytest.mark.needs("g++")
 def test_latency_and_tail_only_where_one_state_is_a_call(runner, two_link, monkeypatch):
     monkeypatch.setattr(measuring, "others_share", shares(*[0.0] * 9))
     by_lane = Runner(tiny("by_lane", layout="lanes", lanes=4), States.random(two_link.chain, 1024, seed=1))

@@ -26,6 +26,7 @@ def with_a_wrong_sign(kernel: Kernel) -> Kernel:
     return replace(kernel, single=wrong, batch=wrong)
 
 
+@pytest.mark.needs("g++")
 def test_every_function_of_psdmc_passes(two_link):
     contestants = psdmc_c.factored(two_link, (*native_flags(), "-O0"))
 
@@ -35,6 +36,7 @@ def test_every_function_of_psdmc_passes(two_link):
     assert max(errors) < 1e-10
 
 
+@pytest.mark.needs("g++")
 def test_a_wrong_sign_in_the_program_is_found_before_timing(two_link, monkeypatch):
     kernels = psdmc_c.kernels_of(two_link.model, "factored", ("inverse_dynamics",))
     broken = {name: with_a_wrong_sign(kernel) for name, kernel in kernels.items()}
@@ -49,6 +51,7 @@ def test_a_wrong_sign_in_the_program_is_found_before_timing(two_link, monkeypatc
     assert "wrong results" in wrong[0].reason
 
 
+@pytest.mark.needs("g++")
 def test_regressors_are_compared_by_the_torques_they_give(two_link):
     contestants = psdmc_c.factored(two_link, (*native_flags(), "-O0"))
     regressor = next(c for c in contestants if c.function == "regressor")

@@ -51,6 +51,7 @@ def test_a_form_too_large_to_compile_is_left_out_with_the_reason(two_link, monke
     )
 
 
+@pytest.mark.needs("g++")
 def test_the_benchmark_works_with_no_rival(two_link):
     with without_optimisation():
         result = run([two_link], Settings(rounds=1, states=2048, rivals=("psdmc factored", "psdmc expanded")))
@@ -84,6 +85,7 @@ def test_mujoco_gets_one_body_a_joint(two_link):
     assert mjcf(generic_chain(two_link.chain, 1)).count("<body ") == 2
 
 
+@pytest.mark.needs("g++")
 def test_mujoco_is_not_asked_for_what_it_leaves_out(two_link):
     (answer,) = mujoco_c.contestants(two_link, ())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -116,6 +117,10 @@ def test_ctrl_c_is_ignored_where_the_shell_says_so(tmp_path: Path):
 # outputs
 
 
+BUFFERED = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+"""What a new user's shell has: Python buffers its output there."""
+
+
 def into(target: str, *words: object, **more: str) -> subprocess.CompletedProcess[str]:
     with open(target, "w", encoding="utf-8") as stream:
         return subprocess.run(
@@ -123,7 +128,7 @@ def into(target: str, *words: object, **more: str) -> subprocess.CompletedProces
             stdout=stream,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | more,
+            env=BUFFERED | more,
             check=False,
         )
 
@@ -141,11 +146,54 @@ def test_a_full_output_is_one_line(words: list[str], model: Path):
 @pytest.mark.parametrize("words", slow_but_for(WRITING[:2], WRITING))
 def test_a_closed_output_is_no_error(words: list[str], model: Path):
     with subprocess.Popen(
-        [*PSDMC, words[0], str(model), *words[1:]], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [*PSDMC, words[0], str(model), *words[1:]],
+        env=BUFFERED,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     ) as process:
         process.stdout.close()
         assert process.stderr.read() == ""
     assert process.returncode == 1
+
+
+@pytest.fixture(scope="module")
+def package(model: Path) -> Path:
+    folder = model.parent / "package"
+    assert status("emit-c", model, "-o", folder, "--functions", "gravity") == 0
+    return folder
+
+
+PRINTING = [
+    ["--version"],
+    ["--help"],
+    ["show", "MODEL", "--json"],
+    ["derive", SCARA, "-o", "derived.npz"],
+    ["emit-c", "MODEL", "-o", "emitted", "--functions", "gravity"],
+    ["build", "PACKAGE"],
+    ["check", "MODEL"],
+    ["doctor"],
+    ["cache"],
+    ["new", "new.toml"],
+]
+SAID_ALWAYS = ("next: ", "note: ", "warning: ")
+
+
+@pytest.mark.parametrize("words", slow_but_for([PRINTING[0], PRINTING[3]], PRINTING))
+@pytest.mark.parametrize("closed", [">&-", "| true"])
+def test_every_command_ends_quietly_with_a_closed_output(
+    words: list[str], closed: str, model: Path, package: Path, tmp_path: Path
+):
+    """Closed before the start, the work is done; closed by its reader meanwhile, the status says that lines are missing."""
+    named = [{"MODEL": str(model), "PACKAGE": str(package)}.get(word, word) for word in words]
+    command = f"{{ {shlex.join([*PSDMC, *named])}; echo $? > status; }} {closed}"
+    own = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    done = subprocess.run(
+        command, shell=True, cwd=tmp_path, env=own, stderr=subprocess.PIPE, text=True, check=False
+    )
+
+    assert [line for line in done.stderr.splitlines() if not line.startswith(SAID_ALWAYS)] == []
+    assert (tmp_path / "status").read_text().strip() in (("0",) if closed == ">&-" else ("0", "1"))
 
 
 def test_a_closed_error_output_is_no_traceback(tmp_path: Path):
