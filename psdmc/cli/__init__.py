@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from psdmc.cli.interrupt import as_error, at_once
+from psdmc.cli.interrupt import at_once
 from psdmc.errors import discard_output_if_closed, exit_status_of
 from psdmc.version import psdmc_version
 
@@ -18,7 +18,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(exit_status_of(_print_version))
     with at_once():
         from psdmc.cli.boundary import run
-    with as_error():
+
         run(arguments)
 
 

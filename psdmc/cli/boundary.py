@@ -21,7 +21,8 @@ def run(arguments: list[str] | None = None) -> None:
     words = sys.argv[1:] if arguments is None else arguments
     _accept_any_text()
     try:
-        _run(words)
+        with interrupt.as_error():
+            _run(words)
     except PsdmcError as error:
         _fail(words, error.message, error.hint, error.exit_status)
     except InternalError as error:

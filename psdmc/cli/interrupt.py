@@ -51,9 +51,13 @@ def _loads_a_module(frame: FrameType | None) -> bool:
 
 @contextlib.contextmanager
 def _handled(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """Replace Python's own handler, and no other: a caller's handler, or a shell's choice to ignore Ctrl-C, stays."""
+    """Replace Python's own handler or the one of `at_once`, and no other: a caller's handler, or a shell's choice to ignore
+    Ctrl-C, stays."""
     before = signal.getsignal(signal.SIGINT)
-    is_ours = before is signal.default_int_handler and threading.current_thread() is threading.main_thread()
+    is_ours = (
+        before in (signal.default_int_handler, _leave)
+        and threading.current_thread() is threading.main_thread()
+    )
     if not is_ours:
         yield
         return
