@@ -126,7 +126,7 @@ test-machines: $(READY) ## fast tests as other processors compute, SETTING=haswe
 	    $(addprefix --ignore=,$(LATER)) $(MACHINES) || exit 1; done
 
 golden: $(READY) ## rewrite the golden files; review their diff like code
-	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit tests/end_to_end/test_reference_robot.py
+	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit tests/end_to_end/test_reference_robot.py tests/derivation/test_same_bytes.py
 	git --no-pager diff --stat -- tests/golden $(GENERATED)
 
 bench: $(READY) ## measure the standard robots against every rival, on an idle machine; page and JSON in generated/

@@ -1,5 +1,5 @@
 """Same input, same bytes: model file and C package, under several PYTHONHASHSEEDs, in processes and with caches of their
-own; and the same operations whatever instructions BLAS takes its sums with."""
+own, and whatever instructions BLAS takes its sums with."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def test_same_model_and_same_c(name: str, tmp_path: Path):
 
 
 @pytest.mark.parametrize("name", slow_but_for(["rounded_arm"], ["kr6", "rounded_arm"]))
-def test_another_processors_blas_gives_the_same_operations(name: str, tmp_path: Path):
-    """Last digits of BLAS differ between processors; which numbers are zero, one or equal must not."""
+def test_another_processors_blas_gives_the_same_bytes(name: str, tmp_path: Path):
+    """The last digits of BLAS differ between processors. tests/derivation/test_same_bytes.py has more robots and settings."""
     cpu = Path("/proc/cpuinfo")
     if not cpu.is_file() or " avx2 " not in cpu.read_text():
         pytest.skip("this processor cannot run both of OpenBLAS's kernels")
-    headers = []
+    made = []
     for kernels in ("Sandybridge", "Haswell"):
         folder = tmp_path / kernels
         folder.mkdir()
@@ -52,11 +52,7 @@ def test_another_processors_blas_gives_the_same_operations(name: str, tmp_path: 
             own = {"OPENBLAS_CORETYPE": kernels, "PSDMC_CACHE_DIR": str(tmp_path / f"cache {kernels}")}
             done = typed(*words, cwd=folder, **own)
             assert done.returncode == 0, done.stderr
-        headers.append([line for line in _text(files_in(folder), ".h") if " mul + " in line])
+        made.append(files_in(folder))
 
-    assert len(headers[0]) == 6
-    assert headers[0] == headers[1]
-
-
-def _text(files: dict[str, bytes], ending: str) -> list[str]:
-    return [line for path in files if path.endswith(ending) for line in files[path].decode().splitlines()]
+    assert len(made[0]) > 20
+    assert made[0] == made[1]
