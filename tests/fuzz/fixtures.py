@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from functools import cache
 from pathlib import Path
 
@@ -17,6 +18,10 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot, load_robot_text
 
 FILES = Path(__file__).parent / "files"
+
+CAMPAIGN_LOGS = ("motor.csv", "motor_loaded.npz", "gravity.csv", "friction.csv", "inertial.parquet")
+SIMULATED = dict.fromkeys(CAMPAIGN_LOGS, "0" * 64)
+"""An index that has them all, of other inputs: psdmc simulates them again."""
 
 SHORT, FIT_TO_READ, FIT_TO_USE = (0.2, 60.0), (2.5, 24.0), (6.0, 40.0)
 """s and Hz of logs: refused as too short, long enough to be looked through, long enough to be fitted."""
@@ -71,8 +76,9 @@ def write_files(folder: Path) -> None:
     write_log(log(*FIT_TO_USE), folder / "log.csv")
     write_log(log(*SHORT), folder / "log.npz")
     (folder / "campaign" / "campaign.toml").write_text(text("campaign.toml"), encoding="utf-8")
-    for name in ("motor.csv", "motor_loaded.npz", "gravity.csv", "friction.csv", "inertial.parquet"):
+    for name in CAMPAIGN_LOGS:
         write_log(log(*SHORT, "current"), folder / "campaign" / "logs" / name)
+    (folder / "campaign" / "logs" / "simulated.json").write_text(json.dumps(SIMULATED), encoding="utf-8")
     write_trajectory(trajectory(), folder / "campaign" / "trajectories" / "short.csv")
 
 

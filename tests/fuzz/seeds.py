@@ -16,7 +16,18 @@ from typing import Any
 
 import fixtures
 import numpy as np
-from fixtures import FILES, FIT_TO_READ, FIT_TO_USE, SHORT, log, text, trajectory, write_bag, write_files
+from fixtures import (
+    FILES,
+    FIT_TO_READ,
+    FIT_TO_USE,
+    SHORT,
+    SIMULATED,
+    log,
+    text,
+    trajectory,
+    write_bag,
+    write_files,
+)
 from target_descriptions import write_described
 from target_packages import manifest_seed
 
@@ -120,7 +131,7 @@ def _seeds(own: Path) -> dict[str, list[bytes]]:
             text(f"described{kind}.toml").encode() for kind in ("", "_tables", "_bag", "_columns")
         ],
         "described-csv": [(own / "described" / "run.csv").read_bytes().replace(b"a1,a2", b"q1,q2")],
-        "simulated": [json.dumps({"motor.csv": "0" * 64, "gravity.csv": "1" * 64}).encode(), b"{}"],
+        "simulated": [json.dumps(SIMULATED).encode(), b"{}"],
         "plant": [
             text("plant.toml").encode(),
             *(path.read_bytes().replace(b"../robots/", b"") for path in plants),
