@@ -11,6 +11,7 @@ toolchain    PackageView                                shared library with its 
 from __future__ import annotations
 
 import hashlib
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -241,7 +242,7 @@ class _Request:
     """The arguments of `compile`: in the place of a compiled robot they go to other processes, which open the library from
     their cache or compile it.
 
-    model       the model, or its file's content, which is read only where there is something to compile
+    model       the model, or its file's content, compressed, which is read only where there is something to compile
     model_hash  the model's content hash
     names       of the functions to compile at once
     """
@@ -256,7 +257,7 @@ class _Request:
     target: str | Target
 
     def __reduce__(self) -> tuple[Any, ...]:
-        filed = self.model if isinstance(self.model, bytes) else file_bytes(self.model)
+        filed = self.model if isinstance(self.model, bytes) else zlib.compress(file_bytes(self.model))
         others = (self.lowering, self.functions, self.real, self.trig, self.target)
         return _Request, (filed, self.model_hash, self.names, *others)
 
@@ -297,7 +298,7 @@ class _Request:
     def opened(self) -> DynamicsModel:
         """The model."""
         if isinstance(self.model, bytes):
-            return load_bytes(self.model, Path("(model of a pickled robot)"))
+            return load_bytes(zlib.decompress(self.model), Path("(model of a pickled robot)"))
         return self.model
 
 

@@ -20,7 +20,10 @@ def read_file(
 ) -> bytes:
     """The content of a file, pipe or device; arguments and errors as of read_rest, and OSError where it cannot be read."""
     with Path(path).open("rb") as file:
-        return read_rest(file, most, name or os.fspath(path), hint, begins)
+        named = name or os.fspath(path)
+        if os.fstat(file.fileno()).st_size > most:
+            raise _too_much(named, most, hint)
+        return read_rest(file, most, named, hint, begins)
 
 
 def read_rest(file: BinaryIO, most: int, name: str, hint: str, begins: bytes = b"") -> bytes:
@@ -38,7 +41,11 @@ def read_rest(file: BinaryIO, most: int, name: str, hint: str, begins: bytes = b
         if not piece:
             return bytes(found)
         found += piece
-    raise InputError(f"{name}: more than {in_words(most)}, which is the most that psdmc reads", hint)
+    raise _too_much(name, most, hint)
+
+
+def _too_much(name: str, most: int, hint: str) -> InputError:
+    return InputError(f"{name}: more than {in_words(most)}, which is the most that psdmc reads", hint)
 
 
 def _up_to(file: BinaryIO, count: int) -> bytes:

@@ -75,7 +75,7 @@ def solved(matrices: Array, right: Array) -> Array:
         for j in reversed(range(n)):
             work[:, j, n:] /= work[:, j, j, None]
             work[:, :j, n:] -= work[:, :j, j, None] * work[:, j, None, n:]
-    return work[:, :, n:].reshape(*shape, n, -1)
+    return work[:, :, n:].reshape(*shape, n, right.shape[-1])
 
 
 def inverse(matrices: Array) -> Array:

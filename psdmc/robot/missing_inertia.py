@@ -16,7 +16,6 @@ from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, Array, Mechanism, Placement
 from psdmc.robot.tree import Route, listed
 from psdmc.robot.urdf import UrdfRobot
-from psdmc.robot.urdf_bodies import bodies_of
 
 ALL = "all"
 MISSING = "missing"
@@ -45,13 +44,19 @@ class JudgedBodies:
 
 
 def judged_bodies(
-    robot: UrdfRobot, route: Route, merged: Sequence[Array], unknown: Sequence[str], source: str
+    robot: UrdfRobot,
+    route: Route,
+    bodies: Sequence[Mapping[str, Placement]],
+    merged: Sequence[Array],
+    unknown: Sequence[str],
+    source: str,
 ) -> JudgedBodies:
     """The bodies (10,) of a route's movable joints, those that `unknown` names or the whole file lacks made unknown.
 
+    bodies   the links of each
+
     InputError where `unknown` names a link that does not move.
     """
-    bodies = bodies_of(robot, route.movable)
     bare = [all(robot.inertials[link] is None for link in body) for body in bodies]
     is_unknown = _unknown(bodies, bare, unknown, source)
     notes: tuple[str, ...] = ()

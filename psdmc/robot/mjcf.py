@@ -155,7 +155,7 @@ def _other_roots(mujoco: Any, model: Any, names: Names, root: str, source: str) 
         )
     if not hasattr(getattr(mujoco, "MjSpec", None), "delete"):
         raise InputError(
-            f"{source}: --root needs a newer MuJoCo than {mujoco.__version__}", "pip install --upgrade mujoco"
+            f"{source}: --root needs a newer MuJoCo than {mujoco.__version__}", "pip install -U mujoco"
         )
     return [b for b in roots if names.body(b) != root]
 

@@ -29,7 +29,7 @@ from psdmc.robot.snap import (
 )
 from psdmc.robot.tree import Route, find_route, listed
 from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
-from psdmc.robot.urdf_bodies import hold_against_pinocchio, merged_parameters, place_of
+from psdmc.robot.urdf_bodies import bodies_of, hold_against_pinocchio, merged_parameters, place_of
 from psdmc.robot.urdf_floating import on_free_root
 from psdmc.robot.urdf_frames import urdf_frames
 
@@ -66,7 +66,7 @@ def urdf_draft(
     root_gravity = np.array(STANDARD_GRAVITY) if gravity is None else gravity
     bodies = merged_parameters(robot, route)
     hold_against_pinocchio(robot, route, bodies, text, source, held_positions(read, lock, source))
-    found = judged_bodies(robot, route, bodies, unknown, source)
+    found = judged_bodies(robot, route, bodies_of(robot, route.movable), bodies, unknown, source)
     return Draft(
         name=robot.name,
         convention="urdf",

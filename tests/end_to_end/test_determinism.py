@@ -36,7 +36,7 @@ def test_same_model_and_same_c(name: str, tmp_path: Path):
 
 @pytest.mark.parametrize("name", slow_but_for(["rounded_arm"], ["kr6", "rounded_arm"]))
 def test_another_processors_blas_gives_the_same_bytes(name: str, tmp_path: Path):
-    """The last digits of BLAS differ between processors. tests/derivation/test_same_bytes.py has more robots and settings."""
+    """OpenBLAS gives other last digits there. tests/derivation/test_same_bytes.py has more robots and settings."""
     cpu = Path("/proc/cpuinfo")
     if not cpu.is_file() or " avx2 " not in cpu.read_text():
         pytest.skip("this processor cannot run both of OpenBLAS's kernels")

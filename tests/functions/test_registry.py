@@ -23,6 +23,8 @@ NAMES_SEVERAL = {
     "bench/rivals/cppadcg_c.py": "what this rival has, and under which names",
     "bench/rivals/mujoco_c.py": "what this rival has",
     "bench/rivals/pinocchio_cpp.py": "what this rival has, and under which names",
+    "model/dynamics_model.py": "methods with documentation of their own: what E and P are defined by",
+    "model_functions.py": "what is computed from E and P where a model has them",
     "report/bench_markdown.py": "the columns of README's table",
 }
 """Files that name more than one function, and why they must."""

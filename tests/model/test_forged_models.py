@@ -264,8 +264,9 @@ def test_a_bomb_beside_a_good_manifest(original: Path, tmp_path: Path):
 
 def test_a_file_of_three_gigabytes_is_not_read(tmp_path: Path):
     with open(tmp_path / "model.npz", "wb") as file:
+        file.write(b"PK")
         file.truncate(3 << 30)
-    with pytest.raises(InputError, match="larger than any model file"):
+    with pytest.raises(InputError, match="more than 2 GiB, which is the most that psdmc reads"):
         load(tmp_path / "model.npz")
 
 

@@ -127,7 +127,7 @@ def test_python_takes_and_gives_arrays_of_these_shapes(tree: RandomTree, model: 
         with pytest.raises(InputError, match=r"q has shape \(16,\), expected \(..., 19\)"):
             robot.inverse_dynamics(qd[0], qd[0], qd[0])
     assert_allclose(model.inverse_dynamics(q, qd, qdd), expected, rtol=0, atol=1e-11)
-    with pytest.raises(InputError, match=r"q has shape \(16,\), expected \(..., 19\) for 5 joints"):
+    with pytest.raises(InputError, match=r"q has shape \(16,\), expected \(..., 19\)"):
         model.inverse_dynamics(qd[0], qd[0], qd[0])
 
 
