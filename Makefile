@@ -74,7 +74,8 @@ test-targets: $(READY) ## self-tests of every function on 64-bit ARM, big-endian
 
 LOWEST := .venv-lowest
 LOWEST_TESTS = $(FAST) tests/test_atomic.py tests/emit/test_package.py tests/emit/test_write.py tests/toolchain/test_call.py \
-  tests/toolchain/test_cache.py tests/bench/test_results.py tests/calibration/logs/test_log_files.py tests/calibration/identify/test_linear_fit.py
+  tests/toolchain/test_cache.py tests/bench/test_results.py tests/calibration/logs/test_log_files.py tests/calibration/identify/test_linear_fit.py \
+  tests/derivation/test_same_bytes.py
 
 $(LOWEST)/ready: pyproject.toml constraints/lowest.txt
 	$(PYTHON) -m venv --clear $(LOWEST)
@@ -118,12 +119,14 @@ check: $(READY) ## format, lint, types and the fast tests: seconds
 	$(RUN)/reuse lint --quiet
 	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' $(addprefix --ignore=,$(LATER)) $(FAST)
 
-MACHINES := $(FAST) tests/functions/test_steps_of_free_robots.py $(wildcard tests/derivation/test_same_bytes*.py)
+BYTES := tests/derivation/test_same_bytes.py
+MACHINES := $(FAST) tests/functions/test_steps_of_free_robots.py
 SETTING ?=
 test-machines: $(READY) ## fast tests as other processors compute, SETTING=haswell for one: OpenBLAS's kernels, NumPy's features, two threads
 	@for setting in $(or $(SETTING),$$($(RUN)/python tests/machines.py names)); do \
 	  $(RUN)/python tests/machines.py run $$setting $(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' \
-	    $(addprefix --ignore=,$(LATER)) $(MACHINES) || exit 1; done
+	    $(addprefix --ignore=,$(LATER)) $(MACHINES) || exit 1; \
+	  $(RUN)/python tests/machines.py run $$setting $(RUN)/python -m pytest -n $(JOBS) $(BYTES) || exit 1; done
 
 golden: $(READY) ## rewrite the golden files; review their diff like code
 	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit tests/end_to_end/test_reference_robot.py tests/derivation/test_same_bytes.py

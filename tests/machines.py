@@ -18,6 +18,8 @@ import tempfile
 from pathlib import Path
 
 DISABLE = "NPY_DISABLE_CPU_FEATURES"
+TUNABLES = "GLIBC_TUNABLES"
+"""By which the C library computes sines without fused multiply-add, as on processors before 2013."""
 FEATURES = "import json, numpy; print(json.dumps(numpy.show_config(mode='dicts')['SIMD Extensions'].get('found', [])))"
 
 
@@ -39,6 +41,8 @@ def settings_of(machine: str, found: tuple[str, ...], cores: int) -> dict[str, d
     avx2 = {"X86_V3", "AVX2"}.intersection(found)
     kernels = ["SkylakeX"] * bool(avx512) + ["Haswell"] * bool(avx2) + ["Nehalem"] * (machine == "x86_64")
     settings = {kernel.lower(): {"OPENBLAS_CORETYPE": kernel} for kernel in kernels}
+    if avx2 and platform.libc_ver()[0] == "glibc":
+        settings["nehalem"][TUNABLES] = "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"
     if avx512:
         settings["numpy-without-avx512"] = {DISABLE: " ".join(avx512)}
     if found:
@@ -52,8 +56,9 @@ def settings_of(machine: str, found: tuple[str, ...], cores: int) -> dict[str, d
 SETTINGS: dict[str, dict[str, str]] = settings_of(platform.machine(), FOUND, len(os.sched_getaffinity(0)))
 
 ASK = """
-import ctypes, json, sys
+import ctypes, hashlib, json, math, sys
 import numpy, scipy.linalg
+sines = hashlib.sha256(repr([math.sin(0.001 * k) for k in range(20_000)]).encode()).hexdigest()
 kernels, threads = [], []
 with open("/proc/self/maps") as maps:
     libraries = sorted({line.split()[-1] for line in maps if "openblas" in line.rsplit("/", 1)[-1]})
@@ -65,15 +70,21 @@ for library in map(ctypes.CDLL, libraries):
                 corename.restype = ctypes.c_char_p
                 kernels.append(corename().decode())
                 threads.append(getattr(library, f"{start}_get_num_threads{end}")())
-print(json.dumps([numpy.show_config(mode="dicts")["SIMD Extensions"].get("found", []), kernels, threads]))
+print(json.dumps([numpy.show_config(mode="dicts")["SIMD Extensions"].get("found", []), kernels, threads, sines]))
 """
+
+
+def _asked(setting: dict[str, str]) -> tuple[list[str], list[str], list[int], str]:
+    """Return NumPy's features, OpenBLAS's kernels and threads, and a digest of sines, of a process under the setting."""
+    command = [sys.executable, "-c", ASK]
+    run = subprocess.run(command, env=os.environ | setting, capture_output=True, text=True, check=True)
+    features, kernels, threads, sines = json.loads(run.stdout)
+    return features, kernels, threads, sines
 
 
 def faults_of(setting: dict[str, str]) -> list[str]:
     """Return how a process under the setting differs from what the setting asks for: nothing, if it takes effect."""
-    command = [sys.executable, "-c", ASK]
-    run = subprocess.run(command, env=os.environ | setting, capture_output=True, text=True, check=True)
-    features, kernels, threads = json.loads(run.stdout)
+    features, kernels, threads, sines = _asked(setting)
     disabled = setting.get(DISABLE, "").split()
     wanted_kernel, wanted_threads = setting.get("OPENBLAS_CORETYPE"), setting.get("OPENBLAS_NUM_THREADS")
     faults = [
@@ -84,6 +95,8 @@ def faults_of(setting: dict[str, str]) -> list[str]:
         faults += ["NumPy and SciPy use no OpenBLAS"]
     if wanted_kernel:
         faults += [f"OpenBLAS uses kernels for {kernel}" for kernel in kernels if kernel != wanted_kernel]
+    if TUNABLES in setting and sines == _asked({TUNABLES: ""})[3]:
+        faults += ["the C library's sines are the same"]
     if wanted_threads:
         faults += [f"OpenBLAS uses {count} threads" for count in threads if str(count) != wanted_threads]
     return faults

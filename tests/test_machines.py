@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 
 import pytest
-from machines import DISABLE, FOUND, SETTINGS, chosen_by, faults_of, run_under, settings_of
+from machines import DISABLE, FOUND, SETTINGS, TUNABLES, chosen_by, faults_of, run_under, settings_of
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -20,6 +20,9 @@ def test_a_setting_without_effect_is_a_fault(
     assert faults_of({DISABLE: "X86_V9"}) == ["NumPy found no feature X86_V9 that could be disabled"]
     assert "OpenBLAS uses kernels for " in faults_of({"OPENBLAS_CORETYPE": "Babbage"})[0]
     assert "OpenBLAS uses " in faults_of({"OPENBLAS_NUM_THREADS": "none"})[0]
+
+    if TUNABLES in SETTINGS["nehalem"]:
+        assert faults_of({TUNABLES: "glibc.cpu.hwcaps=-NOTHING"}) == ["the C library's sines are the same"]
 
     monkeypatch.setitem(SETTINGS, "old", {"OPENBLAS_CORETYPE": "Babbage"})
     assert run_under("old", ["echo", "computed"]) == 1
