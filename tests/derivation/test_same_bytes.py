@@ -58,6 +58,9 @@ def model_of(name: str) -> psdmc.DynamicsModel:
     if name not in FOREIGN:
         return derive(robot_path(name))
     file, floating = FOREIGN[name]
+    source = hashlib.sha256(in_wheel(file).read_bytes()).hexdigest()
+    if held(f"{name} file", source) != source:
+        pytest.skip("another release of example-robot-data has another file of this robot")
     return derive(in_wheel(file), floating=floating)
 
 
