@@ -92,7 +92,8 @@ def refuse_foreign_folder(path: str | os.PathLike[str], remedy: str) -> None:
     if found:
         more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
         raise InputError(
-            f"{os.fspath(path)}: not a folder of psdmc's: it holds {', '.join(found[:SHOWN])}{more}", remedy
+            f"{os.fspath(path)}: psdmc did not write the files in this folder: {', '.join(found[:SHOWN])}{more}",
+            remedy,
         )
 
 

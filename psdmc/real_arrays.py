@@ -64,7 +64,7 @@ def _refuse_masked(what: str, values: Any) -> None:
         count = int(np.ma.getmaskarray(values).sum())
         raise InputError(
             f"{what} is a masked array with {count} masked {'entry' if count == 1 else 'entries'}",
-            "fill them with numbers, as .filled(0.0) does, or leave these states out",
+            "leave these states out, or fill them with numbers, as .filled(0.0) does",
         )
 
 

@@ -169,7 +169,9 @@ def plan_campaign(
     said = (
         []
         if not found.ended_by_clock
-        else ["--seconds ended the search: another time it finds another motion"]
+        else [
+            "the search stopped at the limit of --seconds: another run may find another motion, more seconds a better one"
+        ]
     )
     return Plan(
         tuple(planner.runs),

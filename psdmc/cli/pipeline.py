@@ -340,7 +340,7 @@ def emit_c(
         print(f"note: in C it is {asked}; --name gives it another name")
     for reason in lacking(found.mechanism, names(adapters)):
         work = ", ".join(kernels.wanted(wanted, found.mechanism))
-        print(f"note: {reason}; CasADi can call, without derivatives: {work}")
+        print(f"note: {reason} (the C code is not affected); CasADi can call, without derivatives: {work}")
     for note in run_time_only(found, wanted):
         print(f"note: {note}")
     for what in beyond_friction(found):

@@ -43,7 +43,7 @@ def bodies_map(model: DynamicsModel) -> BodiesMap:
     """The map of a model; InputError where its assumptions exclude a parameter of a body, or a drive inertia is unknown."""
     n = model.n
     each = [np.tile(row, n) for row in np.eye(PARAMETERS_PER_LINK)[:BODY_PARAMETERS]]
-    refuse_outside(model.mechanism, each, f"{model.mechanism.name}: theta_from_bodies takes")
+    refuse_outside(model.mechanism, each, f"{model.mechanism.name}: theta_from_bodies takes bodies whose")
     sizes = 1.0 + np.arange(n) / 8.0
     masses, coms = MASS * sizes, np.outer(sizes, COM)
     inertias = sizes[:, None, None] ** 2 * INERTIA

@@ -13,6 +13,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix
 from psdmc.model.standard_parameters import lack_of_standard_parameters
 from psdmc.recipes.recipe import Needs
+from psdmc.robot.limits import shown
 from psdmc.robot.missing_inertia import idle_joints, massless_words, unknown_option
 
 REMEDY = {
@@ -28,11 +29,11 @@ def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
     for name, reason in lacking.items():
         need = RECIPES[name].needs
         others = ",".join(other for other in names if other not in lacking)
-        leave = f"; or leave it out: --functions {others}" if others else ""
+        leave = f"; without {name}: --functions {others}" if others else ""
         chain, remedy = model.mechanism, REMEDY[need] if need else ""
         if need is Needs.POSITIVE_MASS and chain.massless and idle_joints(chain):
-            remedy = f"add <inertial>, or derive with {unknown_option(chain)}"
-        raise InputError(f"{chain.name}: no {name}: {reason}", f"{remedy}{leave}")
+            remedy = f"add <inertial>, or derive again with {unknown_option(chain)}"
+        raise InputError(f"model {shown(chain.name)}: no {name}: {reason}", f"{remedy}{leave}")
 
 
 def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -66,7 +67,7 @@ def _without_positive_mass(model: DynamicsModel) -> str | None:
     chain = model.mechanism
     idle = idle_joints(chain) if chain.massless else ()
     if idle:
-        return f"joint {chain.joints[idle[0]].name!r} moves no inertia, as {massless_words(chain)}"
+        return f"joint {chain.joints[idle[0]].name!r} moves no inertia, because {massless_words(chain)}"
     mass = check_mass_matrix(model)
     return None if mass is None or mass.passed else mass.reason
 

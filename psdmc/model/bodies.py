@@ -42,7 +42,7 @@ def parameters(
         row[:BODY_PARAMETERS] = _body(link, float(mass), centre, matrix)
     rows[:, BODY_PARAMETERS] = drives
     x = rows.reshape(-1)
-    refuse_outside(chain, [x], "these bodies have")
+    refuse_outside(chain, [x], "these bodies:")
     return x
 
 
@@ -56,12 +56,15 @@ def refuse_outside(chain: Mechanism, vectors: Sequence[Array], who: str) -> None
         excluded |= set(np.flatnonzero(missed > SPAN_TOLERANCE * largest).tolist())
     if excluded:
         names = parameter_names([joint.link_name for joint in chain.joints])
-        remedy = "derive the model again without those assumptions; drive inertias (Im) by --drive-inertia"
+        remedy = (
+            "derive the model again without those assumptions; drive inertias (Im) by --drive-inertia all"
+        )
         if chain.massless:
             remedy += "; links without <inertial> by --unknown missing"
+        verb, them = ("is", "it") if len(excluded) == 1 else ("are", "them")
+        listed = limits.joined([names[k] for k in sorted(excluded)])
         raise InputError(
-            f"{who} what the model assumes zero: {limits.joined([names[k] for k in sorted(excluded)])}",
-            remedy,
+            f"{who} {listed} {verb} not zero, but the model was derived with {them} assumed zero", remedy
         )
 
 

@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-RENAMED = "standard_parameters() is called equivalent_parameters(); theta_for(masses, coms, inertias) is the way back"
+RENAMED = (
+    "standard_parameters() has been renamed equivalent_parameters(); the old name still works for now. "
+    "From masses, coms and inertias to theta_b: theta_for(...)"
+)
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, eq=False)

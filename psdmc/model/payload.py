@@ -151,8 +151,9 @@ def _check_admitted(chain: Mechanism, load: Array, body: int) -> None:
         link = chain.joints[body].link_name
         if link in chain.massless:
             raise InputError(
-                f"link {limits.shown(link)} cannot carry this load: without <inertial> the model treats it as massless",
-                f"add <inertial>; or derive again with --unknown {shlex.quote(link)}, and calibrate",
+                f"cannot add this load to link {limits.shown(link)}: the model treats it as massless, "
+                "as it has no <inertial>",
+                f"add <inertial> and derive again; or derive again with --unknown {shlex.quote(link)}, then calibrate",
             )
         raise InputError(
             f"link '{link}' cannot carry this load: the model assumes some of its parameters zero",

@@ -41,8 +41,8 @@ def as_source(
     _refuse_options(file.name, options, tag == "mujoco", is_xacro)
     if (tag == "mujoco" or is_xacro) and not file.is_file():
         raise InputError(
-            f"{file.name}: an MJCF or xacro file, which is read again with all that it includes, from a pipe",
-            "save it to a file; a pipe may carry a URDF: psdmc derive <(xacro FILE)",
+            "cannot read an MJCF or xacro file from a pipe: it is read again with all that it includes",
+            "give the file's path; a pipe may carry plain URDF: psdmc derive <(xacro FILE)",
         )
     if suffix == ".toml":
         return text, "dh", options

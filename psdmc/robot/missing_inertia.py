@@ -6,14 +6,14 @@ A body is a link with all that is fixed to it, so that frames without inertia do
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import shown
-from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, Array, Mechanism, Placement
+from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, WARNING, Array, Mechanism, Placement
 from psdmc.robot.tree import Route, listed
 from psdmc.robot.urdf import UrdfRobot
 
@@ -23,9 +23,6 @@ MISSING = "missing"
 
 MOST_NAMED = 3
 """Links that a warning names."""
-
-WARNING = "warning: "
-"""How a note begins that is a warning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,12 +55,15 @@ def judged_bodies(
     InputError where `unknown` names a link that does not move.
     """
     bare = [all(robot.inertials[link] is None for link in body) for body in bodies]
-    is_unknown = _unknown(bodies, bare, unknown, source)
+    is_unknown = _unknown(bodies, bare, unknown, robot.inertials, source)
     notes: tuple[str, ...] = ()
     if any(bare) and not any(is_unknown) and not any(x.any() for x in merged):
         is_unknown, notes = (
             bare,
-            ("no moving link has <inertial>: all their inertial parameters are unknown",),
+            (
+                f"no moving link has <inertial>, so all inertial parameters are unknown, as with --unknown {ALL}: "
+                "find them with psdmc calibrate, or add <inertial>",
+            ),
         )
     rows = list(zip(route.movable, merged, bare, is_unknown, strict=True))
     return JudgedBodies(
@@ -77,15 +77,26 @@ def judged_bodies(
 
 
 def _unknown(
-    bodies: Sequence[Mapping[str, Placement]], bare: Sequence[bool], words: Sequence[str], source: str
+    bodies: Sequence[Mapping[str, Placement]],
+    bare: Sequence[bool],
+    words: Sequence[str],
+    links: Container[str],
+    source: str,
 ) -> list[bool]:
-    """Which bodies the words name, by any of their links."""
+    """Which bodies the words name, by any of their links. `links` are the file's."""
     moving = [link for body in bodies for link in body]
     strange = [word for word in words if word not in (ALL, MISSING, *moving)]
     if strange:
+        link = shown(strange[0])
+        bare_word = link.strip("'\"")
+        fault = (
+            f"link {link} does not move, so its inertia has no effect"
+            if strange[0] in links
+            else f"there is no link {link}"
+        )
         raise InputError(
-            f"{source}: link {shown(strange[0])}, to be unknown, does not move or does not exist",
-            f"moving links: {listed(moving)}; or {ALL}, or {MISSING}",
+            f"{source}: --unknown {bare_word}: {fault}",
+            f"moving links: {listed(moving)}; --unknown {ALL} is all of them, --unknown {MISSING} those without <inertial>",
         )
     return [
         any(word in (ALL, *body) or (word == MISSING and is_bare) for word in words)
@@ -102,11 +113,15 @@ def with_massless_warning(chain: Mechanism) -> Mechanism:
     lost = (
         f" Joint{plural} {listed(idle, MOST_NAMED)} {verb} no inertia: forward dynamics cannot be generated."
     )
-    whose = "its" if len(chain.massless) == 1 else "their"
-    note = (
-        f"{WARNING}{massless_words(chain)}: treated as massless.{lost if idle else ''}"
-        f" Add <inertial>, or keep {whose} parameters as unknowns with {unknown_option(chain)}."
-    )
+    option, count = unknown_option(chain), len(chain.massless)
+    if count == 1:
+        said = f"{massless_words(chain)}: treated as massless."
+        remedy = f"keep its parameters as unknowns with {option}"
+    else:
+        said = f"{count} links have no <inertial> and are treated as massless: {listed(chain.massless, MOST_NAMED)}."
+        every = " (all such links)" if count > MOST_NAMED else ""
+        remedy = f"type {option}{every} to keep their parameters as unknowns"
+    note = f"{WARNING}{said}{lost if idle else ''} Add <inertial>, or {remedy}."
     return replace(chain, notes=(note, *chain.notes))
 
 

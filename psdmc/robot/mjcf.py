@@ -190,7 +190,7 @@ def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None
     roots = _moving_roots(model)
     if len(roots) > 1:
         raise InputError(
-            f"{source}: bodies {_listed_roots(mujoco, model, names)} move apart from each other, and psdmc reads one robot",
+            f"{source}: bodies {_listed_roots(mujoco, model, names)} move independently, and psdmc reads one robot",
             f"choose one of them, such as --root {shlex.quote(names.body(roots[0]))}",
         )
     return free[0]

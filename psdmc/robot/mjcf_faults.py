@@ -36,6 +36,17 @@ def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> No
         faults.append("deformable bodies (flex)")
     if faults:
         raise InputError(f"{source}: not modelled: {joined(faults)}", REMEDY)
+    inertias = armatures(mujoco, model)
+    heavy = [
+        f"free joint {shown(names.joint(j))} has armature {inertias[j]:g}"
+        for j in range(model.njnt)
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE and inertias[j] > 0.0
+    ]
+    if heavy:
+        raise InputError(
+            f"{source}: {joined(heavy)}, which psdmc does not model for free joints",
+            'set armature="0" there, or write <freejoint>, which takes none from the defaults',
+        )
 
 
 def refuse_references(mujoco: Any, model: Any, names: Names, source: str) -> None:
@@ -104,11 +115,6 @@ def _wide_drives(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
     for k in of_balls(mujoco, model):
         if inertias[k] > 0.0:
             yield f"armature of ball joint {shown(names.joint(k))}, a drive's inertia about three axes"
-    for k in range(model.njnt):
-        if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_FREE and inertias[k] > 0.0:
-            yield (
-                f"armature {inertias[k]:g} of free joint {shown(names.joint(k))} (<freejoint> takes none from defaults)"
-            )
 
 
 def of_balls(mujoco: Any, model: Any) -> list[int]:

@@ -12,7 +12,7 @@ from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.mechanism import Limits, Placement
+from psdmc.robot.mechanism import WARNING, Limits, Placement
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.urdf_tree import tree_faults
 from psdmc.robot.urdf_words import (
@@ -190,14 +190,15 @@ def _notes(
 
 
 def _reversed_limits(root: Element) -> Iterator[str]:
-    """A note for each joint whose lower position limit is above its upper one."""
+    """A warning for each joint whose lower position limit is above its upper one."""
     for joint in root.findall("joint"):
         element = only(joint, "limit")
         lower, upper = (number(element, name, 0.0, limits.ANY) for name in ("lower", "upper"))
         kind = joint.get("type", "")
         if lower > upper and kind in MOVABLE and URDF_TYPES[kind].about_z and kind != "continuous":
             name = limits.shown(joint.get("name", ""))
-            yield f"joint {name}: <limit> lower {lower:g} is above upper {upper:g}: taken as no position limit"
+            said = f"<limit> lower {lower:g} is above upper {upper:g}"
+            yield f"{WARNING}joint {name}: {said}: taken as no position limit"
 
 
 def _scale_faults(inertials: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]) -> list[str]:

@@ -32,8 +32,8 @@ def parsed_arguments(texts: Sequence[str]) -> dict[str, str]:
         name, assigned, value = text.partition(ASSIGNED)
         if not assigned or not name:
             raise InputError(
-                f"{shown(text)} is no NAME:=VALUE",
-                "one robot's file, then arguments of xacro such as name:=ur5e",
+                f"xacro argument {shown(text)} is not of the form NAME:=VALUE",
+                "give one robot's file, then its xacro arguments, such as name:=ur5e",
             )
         if name in found:
             raise InputError(f"xacro argument {shown(name)} is given twice", "give it once")

@@ -56,7 +56,7 @@ def test_from_a_model_without_parameters_to_one_with_them(arm, tmp_path: Path):
 def test_actuators_keep_out_of_folders_of_others(arm, tmp_path: Path):
     """Before the fit: there is no log to read."""
     arm.model.save(tmp_path / "arm.npz")
-    with pytest.raises(InputError, match=r"not a folder of psdmc's: it holds arm.npz"):
+    with pytest.raises(InputError, match=r"psdmc did not write the files in this folder: arm.npz"):
         calibrate_command(tmp_path / "arm.npz", [tmp_path / "no.csv"], tmp_path / "o.npz", actuators=tmp_path)
 
 

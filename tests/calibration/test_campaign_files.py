@@ -144,7 +144,7 @@ def test_a_campaign_is_not_written_among_files_of_others(tmp_path: Path):
     for refused in (lambda: small_campaign(folder), lambda: excite_command(tmp_path / "no.npz", folder)):
         with pytest.raises(InputError) as raised:
             refused()
-        assert raised.value.message == f"{folder}: not a folder of psdmc's: it holds chapter.tex"
+        assert raised.value.message == f"{folder}: psdmc did not write the files in this folder: chapter.tex"
         assert "--force" in (raised.value.hint or "")
 
     assert [path.name for path in folder.iterdir()] == ["chapter.tex"]

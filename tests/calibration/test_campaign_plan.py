@@ -148,7 +148,7 @@ def test_a_search_that_the_clock_ends_says_so(arm):
 
     plan = plan_campaign(arm.model, arm.regressor, late)
 
-    assert any("--seconds ended the search" in remark for remark in plan.remarks)
+    assert any("the search stopped at the limit of --seconds: " in remark for remark in plan.remarks)
     assert plan_campaign(arm.model, arm.regressor, replace(QUICK, one_log=True)).remarks == ()
 
 

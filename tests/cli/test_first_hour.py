@@ -49,7 +49,8 @@ def test_a_folder_of_others_is_refused_before_the_work(tmp_path: Path) -> None:
         done = typed("emit-c", "arm.npz", "-o", where, "--functions", "gravity", cwd=tmp_path)
         assert done.returncode == 2, done.stdout
         assert re.match(
-            r"error: \S+: (not a folder of psdmc's: it holds|cannot be written: Not a dir)", done.stderr
+            r"error: \S+: (psdmc did not write the files in this folder:|cannot be written: Not a dir)",
+            done.stderr,
         )
         assert len(done.stderr.splitlines()) == 2, "there was progress"
 

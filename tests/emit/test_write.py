@@ -76,7 +76,7 @@ def test_a_folder_of_others_is_not_written_to(tmp_path: Path) -> None:
         (tmp_path / name).write_text("mine")
     with pytest.raises(InputError) as caught:
         write_package(tmp_path, FILES)
-    expected = f"{tmp_path}: not a folder of psdmc's: it holds a.c, data, notes.txt and 2 more"
+    expected = f"{tmp_path}: psdmc did not write the files in this folder: a.c, data, notes.txt and 2 more"
     assert caught.value.message == expected
     assert "-o" in str(caught.value.hint)
     assert "--force" in str(caught.value.hint)
@@ -85,9 +85,9 @@ def test_a_folder_of_others_is_not_written_to(tmp_path: Path) -> None:
 
 def test_one_file_of_others_is_enough(tmp_path: Path) -> None:
     (tmp_path / "src").mkdir()
-    with pytest.raises(InputError, match=r"not a folder of psdmc's: it holds src\b"):
+    with pytest.raises(InputError, match=r"psdmc did not write the files in this folder: src\b"):
         write_package(tmp_path, FILES)
-    with pytest.raises(InputError, match=r"/: not a folder of psdmc's: it holds .* and \d+ more"):
+    with pytest.raises(InputError, match=r"/: psdmc did not write the files in this folder: .* and \d+ more"):
         write_package("/", FILES)
 
 
@@ -103,7 +103,7 @@ def test_a_link_to_a_folder_is_that_folder(tmp_path: Path) -> None:
     (tmp_path / "theirs").mkdir()
     (tmp_path / "theirs" / "notes.txt").write_text("mine")
     (tmp_path / "arm").symlink_to(tmp_path / "theirs")
-    with pytest.raises(InputError, match=r"it holds notes\.txt"):
+    with pytest.raises(InputError, match=r"in this folder: notes\.txt"):
         write_package(tmp_path / "arm", FILES)
     (tmp_path / "theirs" / "notes.txt").unlink()
     assert write_package(tmp_path / "arm", FILES) == list(FILES)
@@ -191,7 +191,7 @@ def test_a_file_edited_since_stays_too(tmp_path: Path) -> None:
 
 def test_another_programs_manifest_is_foreign(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text('{"name": "web app"}')
-    with pytest.raises(InputError, match=r"not a folder of psdmc's: it holds manifest\.json"):
+    with pytest.raises(InputError, match=r"psdmc did not write the files in this folder: manifest\.json"):
         write_package(tmp_path, FILES)
 
 

@@ -29,11 +29,12 @@ def test_a_massless_tip_is_said_by_derive_and_by_emit_c(tmp_path: Path) -> None:
     refused = typed("emit-c", "arm.npz", cwd=tmp_path)
     assert refused.returncode == 2
     assert (
-        "error: arm: no forward_dynamics: joint 'j2' moves no inertia, as link 'hand' has no <inertial>"
+        "error: model 'arm': no forward_dynamics: joint 'j2' moves no inertia, because link 'hand' has no <inertial>"
         in refused.stderr
     )
     assert (
-        "hint: add <inertial>, or derive with --unknown hand; or leave it out: --functions" in refused.stderr
+        "hint: add <inertial>, or derive again with --unknown hand; without forward_dynamics: --functions "
+        in refused.stderr
     )
 
 

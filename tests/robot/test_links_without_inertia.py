@@ -105,7 +105,10 @@ def test_a_file_without_any_inertia_has_all_base_parameters_unknown(floating: bo
     assert model.mechanism.massless == ()
     assert model.unknown_base_parameters == tuple(range(model.l))
     assert {parameter.value for parameter in model.base_parameters} == {None}
-    assert "no moving link has <inertial>: all their inertial parameters are unknown" in model.mechanism.notes
+    assert (
+        "no moving link has <inertial>, so all inertial parameters are unknown, as with --unknown all: "
+        "find them with psdmc calibrate, or add <inertial>" in model.mechanism.notes
+    )
 
 
 def test_e_and_p_of_a_file_without_any_inertia_are_those_of_the_full_file() -> None:

@@ -37,9 +37,9 @@ def test_joints_that_move_no_inertia_are_named() -> None:
     (note,) = load_urdf(*arm(INERTIAL, "", "")).chain.notes
 
     assert note == (
-        "warning: 2 links ('link2', 'link3') have no <inertial>: treated as massless. Joints 'j2', 'j3' move no inertia: "
-        "forward dynamics cannot be generated. Add <inertial>, or keep their parameters as unknowns with --unknown "
-        "link2,link3."
+        "warning: 2 links have no <inertial> and are treated as massless: 'link2', 'link3'. Joints 'j2', 'j3' move no "
+        "inertia: forward dynamics cannot be generated. Add <inertial>, or type --unknown link2,link3 to keep their "
+        "parameters as unknowns."
     )
 
 
@@ -53,8 +53,8 @@ def test_of_many_links_three_are_named() -> None:
     (note,) = load_urdf(*arm(*[""] * 5, INERTIAL)).chain.notes
 
     assert note == (
-        "warning: 5 links ('link1', 'link2', 'link3' and 2 more) have no <inertial>: treated as massless. Add <inertial>, "
-        "or keep their parameters as unknowns with --unknown missing."
+        "warning: 5 links have no <inertial> and are treated as massless: 'link1', 'link2', 'link3' and 2 more. "
+        "Add <inertial>, or type --unknown missing (all such links) to keep their parameters as unknowns."
     )
 
 
@@ -90,14 +90,17 @@ def test_links_of_a_locked_joint_belong_to_the_body_that_carries_them() -> None:
 
 
 def test_a_link_that_does_not_move_cannot_be_unknown() -> None:
-    for name in ("link0", "knee\x1b"):
+    for name, said in {
+        "link0": "--unknown link0: link 'link0' does not move, so its inertia has no effect",
+        "knee\x1b": "--unknown knee\\x1b: there is no link 'knee\\x1b'",
+    }.items():
         with pytest.raises(InputError) as refused:
             load_urdf(*arm(INERTIAL, ""), unknown=(name,))
-        assert (
-            refused.value.message
-            == f"arm.urdf: link {name!r}, to be unknown, does not move or does not exist"
+        assert refused.value.message == f"arm.urdf: {said}"
+        assert refused.value.hint == (
+            "moving links: 'link1', 'link2', 'tool0'; --unknown all is all of them, --unknown missing those without "
+            "<inertial>"
         )
-        assert refused.value.hint == "moving links: 'link1', 'link2', 'tool0'; or all, or missing"
 
 
 def test_of_a_dh_table_nothing_is_named() -> None:

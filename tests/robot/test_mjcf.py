@@ -404,7 +404,7 @@ def test_of_two_robots_of_which_one_flies_root_names_the_one(tmp_path: Path) -> 
     path = written(tmp_path, with_more("").replace("</worldbody>", BALL_BESIDE))
     with pytest.raises(InputError) as refused:
         load_robot(path)
-    said = "robot.xml: bodies 'a', 'ball' (free) move apart from each other, and psdmc reads one robot"
+    said = "robot.xml: bodies 'a', 'ball' (free) move independently, and psdmc reads one robot"
     assert (refused.value.message, refused.value.hint) == (said, "choose one of them, such as --root a")
 
     robot = derive(path, root="a", snap=0.0)

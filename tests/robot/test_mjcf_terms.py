@@ -81,7 +81,7 @@ def test_armatures_of_actuators_elsewhere_are_refused_by_name(tmp_path: Path) ->
 def test_armature_of_a_free_joints_actuator_is_refused(tmp_path: Path) -> None:
     needs("actuator_armature")
     text = FLYING.format(joint='<freejoint name="root"/>', motor='<motor joint="root" armature=".1"/>')
-    with pytest.raises(InputError, match=r"not modelled: armature 0\.1 of free joint 'root'"):
+    with pytest.raises(InputError, match=r"free joint 'root' has armature 0\.1, which psdmc does not model"):
         load_robot(written(tmp_path, text))
 
 
@@ -97,8 +97,11 @@ def test_armature_of_a_free_joint_is_refused_where_it_would_enter_mujocos_mass_m
     plain = written(tmp_path, WALKING.format('<freejoint name="root"/>'))
     with pytest.raises(InputError) as refused:
         load_robot(heavy)
-    said = "heavy.xml: not modelled: armature 0.5 of free joint 'root' (<freejoint> takes none from defaults)"
+    said = "heavy.xml: free joint 'root' has armature 0.5, which psdmc does not model for free joints"
     assert refused.value.message == said
+    assert refused.value.hint == (
+        'set armature="0" there, or write <freejoint>, which takes none from the defaults'
+    )
 
     robot = derive(plain, snap=0.0)
     q = np.array([0.3, -0.2, 0.9, 0.0, 0.0, 0.0, 1.0, 0.7])

@@ -265,13 +265,13 @@ def test_a_macro_that_nothing_declares_is_no_foreign_word() -> None:
     assert "unbound prefix" in refused(f"<robot>{BODY}{TURN % ''}<xacro:leg/></robot>").message
 
 
-def test_limits_the_wrong_way_round_are_none_and_noted() -> None:
+def test_limits_the_wrong_way_round_are_none_with_a_warning() -> None:
     reversed_one = '<limit lower="2" upper="1" effort="7" velocity="5"/>'
     robot = load(robot_of(reversed_one))
     right = load(robot_of('<limit effort="7" velocity="5"/>'))
 
     assert robot.mechanism.notes == (
-        "joint 'j': <limit> lower 2 is above upper 1: taken as no position limit",
+        "warning: joint 'j': <limit> lower 2 is above upper 1: taken as no position limit",
     )
     (limits,) = [joint.limits for joint in robot.mechanism.joints]
     assert (limits.lower, limits.upper) == (-math.inf, math.inf)

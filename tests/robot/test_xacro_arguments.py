@@ -171,7 +171,7 @@ def test_the_commands_take_them(arm: Path, tmp_path: Path, monkeypatch: Any) -> 
         "error: moved.xacro has joints j1, j2, the model has j1",
     )
     for words, said in {
-        ("derive", "moved.xacro", "other.urdf"): "'other.urdf' is no NAME:=VALUE",
+        ("derive", "moved.xacro", "other.urdf"): "xacro argument 'other.urdf' is not of the form NAME:=VALUE",
         ("derive", "moved.xacro", "a:=1", "--xacro-arg", "a:=2"): "xacro argument 'a' is given twice",
         ("derive", "moved.xacro", "--package", "x"): "--package: 'x' is no NAME=DIR",
         ("show", "m.npz", "a:=1"): "m.npz: a model, which has no further arguments",
@@ -207,5 +207,7 @@ def test_from_a_pipe_the_remedy_is_said(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     threading.Thread(target=(tmp_path / "pipe").write_text, args=(ARM,)).start()
     error = refused(lambda: load_robot(tmp_path / "pipe", xacro_args={"name": "x"}))
-    assert "from a pipe" in error.message
+    assert error.message == (
+        "cannot read an MJCF or xacro file from a pipe: it is read again with all that it includes"
+    )
     assert "psdmc derive <(xacro FILE)" in str(error.hint)

@@ -276,7 +276,9 @@ def test_a_folder_of_others_is_not_built_in(tmp_path: Path) -> None:
     folder = _emit(tmp_path / "arm")
     (folder / "build").mkdir()
     (folder / "build" / "plan.dwg").write_text("mine")
-    with pytest.raises(InputError, match=r"build: not a folder of psdmc's: it holds plan.dwg") as caught:
+    with pytest.raises(
+        InputError, match=r"build: psdmc did not write the files in this folder: plan.dwg"
+    ) as caught:
         build_package(folder)
     assert "move" in str(caught.value.hint)
     assert [path.name for path in (folder / "build").iterdir()] == ["plan.dwg"]

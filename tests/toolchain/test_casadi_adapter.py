@@ -235,8 +235,8 @@ def test_the_command_says_what_a_floating_base_lacks(tmp_path: Path) -> None:
     save(free_model(), tmp_path / "free.npz")
     done = typed("emit-c", "free.npz", "--functions", "gravity,neutral", "--with", "casadi", cwd=tmp_path)
     assert (
-        "note: CasADi derivatives are not available for a floating base; CasADi can call, without derivatives: "
-        "gravity, neutral\n" in done.stdout
+        "note: CasADi derivatives are not available for a floating base (the C code is not affected); "
+        "CasADi can call, without derivatives: gravity, neutral\n" in done.stdout
     )
     assert not (tmp_path / "free" / "src" / "gravity_derivatives.c").exists(), "nobody asked for it"
 

@@ -183,7 +183,7 @@ def _jitter(log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, option
 def _saturation(
     log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options: CheckOptions
 ) -> list[str]:
-    names = listed([found.words for found in survey.saturated])
+    names = listed([f"joint {found.words}" for found in survey.saturated])
     return [f"{log.quantity} saturated? {names} of its moving rows"] if survey.saturated else []
 
 

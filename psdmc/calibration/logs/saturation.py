@@ -32,16 +32,18 @@ class Saturated:
     level    the value, in the effort's unit
     share    of the rows in which the joint moves
     certain  False where friction of a constant size would look the same
+    unit     of the level; empty where it is not known
     """
 
     joint: str
     level: float
     share: float
     certain: bool
+    unit: str = ""
 
     @property
     def words(self) -> str:
-        return f"joint {self.joint} at {self.level:.4g} in {self.share:.0%}"
+        return f"{self.joint} at {f'{self.level:.4g} {self.unit}'.rstrip()} in {self.share:.0%}"
 
 
 def saturated(

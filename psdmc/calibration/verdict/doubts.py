@@ -40,8 +40,9 @@ def _perhaps_saturated(found: Findings) -> Iterator[str]:
     piled = found.evidence.saturated
     if piled and not any(each.certain for each in piled):
         yield (
-            f"the effort may saturate: {listed([each.words for each in piled])} of the rows in which it moves; "
-            "friction alone would look the same"
+            "the effort may be cut off at a limit, or this may be friction alone: joint "
+            f"{', '.join(each.words for each in piled)} of its moving rows: if the drive or sensor has that limit, "
+            "record again with slower motions"
         )
 
 

@@ -173,7 +173,14 @@ def evidence_of(
     shifted = tuple(part[6] for part in parts)
     share = CheckOptions().saturated_share
     logs = [motion.log.ordered(model.joint_names) for motion in motions]
-    piled = tuple(found for log in logs for found in surveyed(log, share).saturated)
+    units = dict(zip(model.joint_names, (j.type.effort_unit for j in model.mechanism.joints), strict=True))
+    piled = tuple(
+        found
+        if coupling is not None
+        else replace(found, unit="A" if log.quantity == "current" else units[found.joint])
+        for log in logs
+        for found in surveyed(log, share).saturated
+    )
     whole = Evidence(model, regressor, q, qd, qdd, sign, torque, noise, coupling, shifted, piled)
     return whole.thinned(MOST_ROWS)
 

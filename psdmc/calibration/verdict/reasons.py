@@ -26,8 +26,8 @@ def _saturated(found: Findings) -> Iterator[str]:
     piled = found.evidence.saturated
     if any(each.certain for each in piled):
         yield (
-            f"the effort saturates: {listed([each.words for each in piled])} of the rows in which it moves: "
-            "record slower motions or smaller loads, or raise the limit that cuts it off"
+            f"the effort is cut off at a limit: joint {', '.join(each.words for each in piled)} of the rows in which it "
+            "moves: record slower motions or smaller loads, or raise the limit of the drive or the sensor"
         )
 
 
@@ -41,8 +41,8 @@ def late(delay: Delay) -> str:
     """A delay, and how to take it out."""
     columns = "[effort]" if delay.value > 0 else "[position] and [velocity]"
     return (
-        f"{delay.log}: the torque comes {delay.words}: "
-        f"add that to `delay` of {columns} in a log description (--describe)"
+        f"{delay.log}: the torque is logged {delay.words} than the motion it belongs to: set `delay = {delay.size}` of "
+        f"{columns} in a log description (psdmc calibrate --describe), or add it to the delay there"
     )
 
 

@@ -52,12 +52,18 @@ class Delay:
     shown: bool
 
     @property
+    def size(self) -> str:
+        """The s without their sign, to two digits of the std."""
+        return f"{abs(self.value):.3g}" if math.isinf(self.std) else f"{abs(self.value):.{self._digits}f}"
+
+    @property
     def words(self) -> str:
-        side = "after" if self.value > 0 else "before"
-        if not math.isfinite(self.std):
-            return f"{abs(self.value):.3g} s or more {side} its motion"
-        digits = max(0, 1 - math.floor(math.log10(max(self.std, 1e-6))))
-        return f"{abs(self.value):.{digits}f} +- {self.std:.{digits}f} s {side} its motion"
+        spread = " s or more" if math.isinf(self.std) else f" +- {self.std:.{self._digits}f} s"
+        return f"{self.size}{spread} {'later' if self.value > 0 else 'earlier'}"
+
+    @property
+    def _digits(self) -> int:
+        return max(0, 1 - math.floor(math.log10(max(self.std, 1e-6))))
 
 
 @dataclass(frozen=True, slots=True)

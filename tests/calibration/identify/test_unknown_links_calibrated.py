@@ -174,9 +174,11 @@ def test_a_load_on_a_massless_link_is_refused_with_the_option() -> None:
         model_of("").with_payload(1.0, (0.0, 0.0, 0.1))
     assert (
         refused.value.message
-        == "link 'fore' cannot carry this load: without <inertial> the model treats it as massless"
+        == "cannot add this load to link 'fore': the model treats it as massless, as it has no <inertial>"
     )
-    assert refused.value.hint == "add <inertial>; or derive again with --unknown fore, and calibrate"
+    assert refused.value.hint == (
+        "add <inertial> and derive again; or derive again with --unknown fore, then calibrate"
+    )
 
 
 def test_a_calibrated_model_of_an_unknown_link_takes_a_load(true: DynamicsModel) -> None:
