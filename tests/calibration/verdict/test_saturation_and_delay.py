@@ -10,7 +10,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from conftest import smooth_log
+from calibration.conftest import smooth_log
 from scipy.interpolate import CubicSpline
 from test_verdict import verdict_on
 
