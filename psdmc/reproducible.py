@@ -17,22 +17,34 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 
 
+BLOCK = 1 << 18
+"""Bytes of a stack's products that are computed at once: a share of a core's own cache."""
+
+
 def times(a: Array, b: Array) -> Any:
     """a @ b for matrices, vectors and stacks of matrices (..., m, n) and (..., n, k), terms added one after the other."""
-    if b.ndim == 1:
-        total = a[..., 0] * b[0]
-        for k in range(1, b.shape[0]):
-            total += a[..., k] * b[k]
-        return total
-    if b.ndim == 2:
-        total = a[..., 0, None] * b[0]
-        for k in range(1, b.shape[0]):
-            total += a[..., k, None] * b[k]
-        return total
-    total = a[..., 0, None] * b[..., None, 0, :]
-    for k in range(1, b.shape[-2]):
-        total += a[..., k, None] * b[..., None, k, :]
+    if b.ndim > 2:
+        return _stacked(a, b)
+    wide = b.ndim == 2
+    total = a[..., 0, None] * b[0] if wide else a[..., 0] * b[0]
+    for k in range(1, b.shape[0]):
+        total += a[..., k, None] * b[k] if wide else a[..., k] * b[k]
     return total
+
+
+def _stacked(a: Array, b: Array) -> Array:
+    lead, rows, columns = np.broadcast_shapes(a.shape[:-2], b.shape[:-2]), a.shape[-2], b.shape[-1]
+    left = np.broadcast_to(a, (*lead, *a.shape[-2:])).reshape(-1, rows, a.shape[-1])
+    right = np.broadcast_to(b, (*lead, *b.shape[-2:])).reshape(-1, b.shape[-2], columns)
+    total = np.empty((len(left), rows, columns), np.result_type(a, b))
+    size = max(1, BLOCK // max(1, rows * columns * total.itemsize))
+    for start in range(0, len(total), size):
+        x, y, found = (part[start : start + size] for part in (left, right, total))
+        np.multiply(x[:, :, 0, None], y[:, None, 0], out=found)
+        term = np.empty_like(found)
+        for k in range(1, y.shape[1]):
+            found += np.multiply(x[:, :, k, None], y[:, None, k], out=term)
+    return total.reshape(*lead, rows, columns)
 
 
 def combined(weights: Array, rows: Array) -> Array:
@@ -119,6 +131,8 @@ def angle_of(y: float, x: float) -> float:
 
 
 def _rounded(function: Any, value: Any) -> Any:
+    if isinstance(value, float):
+        return float(function(np.longdouble(value)))
     given = np.asarray(value)
     found = function(given.astype(np.longdouble))
     if given.dtype == np.longdouble:

@@ -13,7 +13,6 @@ from psdmc.dynamics.newton_euler import inverse_dynamics as newton_euler
 from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
 from psdmc.dynamics.regressor import regressor as standard_regressor
 from psdmc.dynamics.scalar import Scalar
-from psdmc.reproducible import times
 from psdmc.robot.mechanism import Mechanism
 
 Array = NDArray[np.float64]
@@ -46,7 +45,8 @@ def regressor(chain: Mechanism, representative: Array, arrays: list[Array]) -> A
     )
     count = len(arrays[0])
     full = np.stack([_columns([row.get(c, 0.0) for c in wanted], count) for row in rows], axis=1)
-    result: Array = times(full, representative[wanted])
+    # BLAS: nothing of this is written, and long chains have millions of products.
+    result: Array = full @ representative[wanted]
     return result
 
 
