@@ -36,14 +36,17 @@ def _stacked(a: Array, b: Array) -> Array:
     lead, rows, columns = np.broadcast_shapes(a.shape[:-2], b.shape[:-2]), a.shape[-2], b.shape[-1]
     left = np.broadcast_to(a, (*lead, *a.shape[-2:])).reshape(-1, rows, a.shape[-1])
     right = np.broadcast_to(b, (*lead, *b.shape[-2:])).reshape(-1, b.shape[-2], columns)
-    total = np.empty((len(left), rows, columns), np.result_type(a, b))
+    total = np.zeros((len(left), rows, columns), np.result_type(a, b))
     size = max(1, BLOCK // max(1, rows * columns * total.itemsize))
+    used = [np.flatnonzero(column) for column in left.any(axis=0).T]
     for start in range(0, len(total), size):
         x, y, found = (part[start : start + size] for part in (left, right, total))
-        np.multiply(x[:, :, 0, None], y[:, None, 0], out=found)
         term = np.empty_like(found)
-        for k in range(1, y.shape[1]):
-            found += np.multiply(x[:, :, k, None], y[:, None, k], out=term)
+        for k, places in enumerate(used):
+            if 2 * len(places) > rows:
+                found += np.multiply(x[:, :, k, None], y[:, None, k], out=term)
+            else:  # such as the identity's
+                found[:, places] += x[:, places, k, None] * y[:, None, k]
     return total.reshape(*lead, rows, columns)
 
 
