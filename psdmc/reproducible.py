@@ -38,15 +38,19 @@ def _stacked(a: Array, b: Array) -> Array:
     right = np.broadcast_to(b, (*lead, *b.shape[-2:])).reshape(-1, b.shape[-2], columns)
     total = np.zeros((len(left), rows, columns), np.result_type(a, b))
     size = max(1, BLOCK // max(1, rows * columns * total.itemsize))
-    used = [np.flatnonzero(column) for column in left.any(axis=0).T]
+    # What is zero throughout, as in an identity, adds nothing.
+    used_rows = [np.flatnonzero(column) for column in np.any(left != 0.0, axis=0).T]
+    used_columns = [np.flatnonzero(row) for row in np.any(right != 0.0, axis=0)]
     for start in range(0, len(total), size):
         x, y, found = (part[start : start + size] for part in (left, right, total))
         term = np.empty_like(found)
-        for k, places in enumerate(used):
-            if 2 * len(places) > rows:
+        for k, (down, across) in enumerate(zip(used_rows, used_columns, strict=True)):
+            if 2 * len(across) <= columns:
+                found[:, :, across] += x[:, :, k, None] * y[:, k][:, None, across]
+            elif 2 * len(down) <= rows:
+                found[:, down] += x[:, down, k, None] * y[:, None, k]
+            else:
                 found += np.multiply(x[:, :, k, None], y[:, None, k], out=term)
-            else:  # such as the identity's
-                found[:, places] += x[:, places, k, None] * y[:, None, k]
     return total.reshape(*lead, rows, columns)
 
 

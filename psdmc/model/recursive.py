@@ -52,4 +52,7 @@ def regressor(chain: Mechanism, representative: Array, arrays: list[Array]) -> A
 
 def _columns(values: Sequence[Scalar], count: int) -> Array:
     """(count, len(values)) from scalars or (count,) arrays."""
-    return np.stack([np.broadcast_to(np.asarray(v, dtype=np.float64), (count,)) for v in values], axis=1)
+    found = np.empty((count, len(values)))
+    for i, value in enumerate(values):
+        found[:, i] = value
+    return found

@@ -107,7 +107,10 @@ class RobotOnArrays:
 
 def columns(values: Sequence[Scalar], count: int) -> Array:
     """(count, len(values)) from numbers or (count,) arrays."""
-    return np.stack([np.broadcast_to(np.asarray(v, dtype=np.float64), (count,)) for v in values], axis=1)
+    found = np.empty((count, len(values)))
+    for i, value in enumerate(values):
+        found[:, i] = value
+    return found
 
 
 def matrix(rows: Sequence[Sequence[Scalar]], count: int) -> Array:
