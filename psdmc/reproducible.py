@@ -3,7 +3,7 @@
 BLAS, LAPACK and einsum choose the order of their sums, and whether products and sums are fused, by the processor. Vectorised
 elementary functions choose their approximations by it. What is written into a model or a package is computed by the
 functions of this module instead: each is made of NumPy's elementwise operations, which IEEE 754 defines to the last bit, in
-an order that shapes alone decide. Arrays keep their precision.
+an order that shapes and zeros alone decide. Arrays keep their precision.
 """
 
 from __future__ import annotations
