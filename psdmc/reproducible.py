@@ -9,6 +9,9 @@ an order that shapes and zeros alone decide. Arrays keep their precision.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -21,8 +24,23 @@ BLOCK = 1 << 18
 """Bytes of a stack's products that are computed at once: a share of a core's own cache."""
 
 
+_any_order: ContextVar[bool] = ContextVar("any order", default=False)
+
+
+@contextmanager
+def in_any_order() -> Iterator[None]:
+    """Products and sines inside the block are BLAS's and NumPy's: several times as fast, for values that nothing writes."""
+    before = _any_order.set(True)
+    try:
+        yield
+    finally:
+        _any_order.reset(before)
+
+
 def times(a: Array, b: Array) -> Any:
     """a @ b for matrices, vectors and stacks of matrices (..., m, n) and (..., n, k), terms added one after the other."""
+    if _any_order.get():
+        return a @ b
     if b.ndim > 2:
         return _stacked(a, b)
     wide = b.ndim == 2
@@ -138,6 +156,8 @@ def angle_of(y: float, x: float) -> float:
 
 
 def _rounded(function: Any, value: Any) -> Any:
+    if _any_order.get():
+        return function(value)
     if isinstance(value, float):
         return float(function(np.longdouble(value)))
     given = np.asarray(value)

@@ -15,6 +15,7 @@ from psdmc.reproducible import (
     arcsine,
     combined,
     cosine,
+    in_any_order,
     inverse,
     lengths,
     sine,
@@ -125,3 +126,19 @@ def test_elementary_functions_are_correctly_rounded(ours: object, theirs: object
     assert np.array_equal(ours(values), expected)
     assert isinstance(ours(0.5), float)
     assert ours(np.longdouble(0.5)).dtype == np.longdouble
+
+
+def test_any_order_ends_with_its_block():
+    a, b = np.random.default_rng(3).standard_normal((2, 40, 40))
+    fixed = times(a, b)
+
+    with in_any_order():
+        assert np.array_equal(times(a, b), a @ b)
+
+    assert np.array_equal(times(a, b), fixed)
+
+
+def test_what_is_written_is_never_in_any_order():
+    users = [path for folder in WRITTEN for path in (PACKAGE / folder).rglob("*.py")]
+
+    assert [path.name for path in users if "in_any_order" in path.read_text(encoding="utf-8")] == []

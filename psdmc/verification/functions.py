@@ -14,12 +14,11 @@ from psdmc.program.signature import TAU, Q, Sizes
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.packed import VALUES, unpacked
 from psdmc.recipes.recipe import Needs, Recipe
+from psdmc.reproducible import in_any_order
 from psdmc.robot.mechanism import Array
 from psdmc.robot.reference_followers import OnCoordinates
 
 STATES = 100
-RATES = 2000
-"""Rates of all states together at most: beyond 20 rates there are fewer states, because matrices grow with the square."""
 SEED = 14_631
 
 NOTHING = 1e-9
@@ -67,14 +66,15 @@ def _is_of_positions(recipe: Recipe) -> bool:
 
 
 def _states(model: DynamicsModel, robot: OnCoordinates) -> dict[str, Array]:
-    """(states, ...) of everything that functions read; STATES, or fewer for robots of many rates."""
-    count = min(STATES, RATES // model.nv)
+    """(STATES, ...) of everything that functions read."""
     rng, sizes = (
         np.random.default_rng(SEED),
         Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames)),
     )
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
-    given = {q.name: q.largest * rng.uniform(-1.0, 1.0, (count, *sizes.shape(q.axes))) for q in read.values()}
+    given = {
+        q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()
+    }
     given |= {q.name: on_joints(model.mechanism, given[q.name]) for q in read.values() if q.axes == Q.axes}
     return given | {TAU.name: robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
 
@@ -87,7 +87,8 @@ def _error(
     theta: Array,
     least: float,
 ) -> float:
-    found = recipe.reference(arrays, given)
+    with in_any_order():
+        found = recipe.reference(arrays, given)
     if recipe.packs is not None:
         packing, recipe = recipe.packs, RECIPES[recipe.packs.function]
         found = unpacked(packing, recipe, arrays, found[VALUES.name])
