@@ -171,7 +171,7 @@ def cost_rows(
     functions, notes = admitted(model)
     for lowering in lowerings:
         for name, kernel in lower(model, lowering, functions).items():
-            if kernel.lowering == lowering:
+            if kernel.lowering == lowering and not kernel.is_loop_of_calls:
                 one, lanes = cost(kernel.single), cost(kernel.batch)
                 counts = {key: getattr(one, key) for key in COSTS}
                 in_lanes = {"total": lanes.total, "sincos": lanes.sincos}

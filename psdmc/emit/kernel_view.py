@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from psdmc.emit.limbs import LimbsView
 from psdmc.emit.lines import Body
 from psdmc.emit.prototypes import Prototype
-from psdmc.program.cost import Cost
 from psdmc.program.products import LARGE
 from psdmc.program.signature import Signature
 
@@ -60,7 +59,7 @@ class KernelView:
     single_body: Body
     lanes_body: Body
     pivot_order: tuple[int, ...]
-    cost: Cost
+    cost: str
     lowering: str
     limbs: LimbsView | None = None
     places: tuple[tuple[int, int], ...] = ()

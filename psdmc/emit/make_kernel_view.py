@@ -33,7 +33,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
             sizes.size(q),
             sizes.shape(q.axes),
             has_lanes and not function.calls and _is_direct(q, sizes),
-            _zero(q, kernel.single, sizes),
+            () if kernel.is_loop_of_calls else _zero(q, kernel.single, sizes),
         )
         for q in function.outputs
     )
@@ -58,7 +58,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         pivot_order=tuple(
             slot.index for slot, _ in kernel.single.outputs if positive and slot.vector == positive.name
         ),
-        cost=cost(kernel.single),
+        cost=f"calls of {function.calls}" if kernel.is_loop_of_calls else str(cost(kernel.single)),
         lowering=kernel.lowering,
         limbs=_limbs(kernel, sizes, options),
         places=kernel.places,

@@ -117,7 +117,7 @@ def _function(function: FunctionView) -> dict[str, Any]:
             {
                 "name": kernel.name,
                 "lowering": kernel.lowering,
-                "cost": str(kernel.cost),
+                "cost": kernel.cost,
                 **({"cost_with_limbs_in_lanes": str(kernel.limbs.cost)} if kernel.limbs else {}),
                 "prototypes": [prototype.text for prototype in kernel.prototypes.values()],
             }

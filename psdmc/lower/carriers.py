@@ -146,16 +146,17 @@ def lightest(columns: Array, weights: Sequence[float]) -> tuple[int, ...]:
     order = sorted((j for j in size if size[j] != 0.0), key=lambda j: (weights[j], j))
     chosen: list[int] = []
     rank = columns.shape[0]
-    basis = np.zeros((rank, 0))
+    space = np.zeros((rank, rank), order="F")
     for share, j in product(INDEPENDENT, order):
         if len(chosen) == rank:
             break
         if j in chosen:
             continue
+        basis = space[:, : len(chosen)]
         rest = columns[:, j] - basis @ (basis.T @ columns[:, j])
         rest -= basis @ (basis.T @ rest)
         left = np.linalg.norm(rest)
         if left > share * size[j]:
-            basis = np.column_stack([basis, rest / left])
+            space[:, len(chosen)] = rest / left
             chosen.append(j)
     return tuple(sorted(chosen))

@@ -21,7 +21,6 @@ from psdmc.errors import InternalError
 from psdmc.lower.link_parameters import bodies_from_carriers
 from psdmc.lower.reframe import Reframed
 from psdmc.program.cost import Cost
-from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
 from psdmc.program.signature import Signature, Sizes
 from psdmc.program.trace import Number, Symbol, Tracer
@@ -71,7 +70,7 @@ class Arrangement:
 def trace_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Program:
     """The PROGRAM of one function that needs bodies. Unknown base parameters become an input."""
     tracer = Tracer()
-    return drop_unused(tracer.finish(_recorded(recipe, arrangement, robot, tracer)))
+    return tracer.finish(_recorded(recipe, arrangement, robot, tracer))
 
 
 def cost_of_dynamics(recipe: Recipe, arrangement: Arrangement, robot: RobotConstants) -> Cost:
@@ -101,9 +100,7 @@ def trace_geometry(recipe: Recipe, reframed: Reframed, robot: RobotConstants) ->
     """The PROGRAM of one function that needs no theta_b."""
     tracer = Tracer()
     inputs = _inputs(recipe, robot, tracer)
-    return drop_unused(
-        tracer.finish(traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, _without_bodies))
-    )
+    return tracer.finish(traced(recipe, robot, reframed, inputs, (), (), PLAIN, 1.0, _without_bodies))
 
 
 def _without_bodies() -> ByTheta:

@@ -39,6 +39,12 @@ COEFFICIENT_NOISES = (COEFFICIENT_NOISE, 1e-15)
 """Uncertainties of coefficients: the usual one, and next to none for robots of many scales, where what is left out of a
 large parameter's effect may be as large as a small one's."""
 
+TRACED = 40
+"""Rates up to which a function that calls another one has a straight line as well, whose zeros and operations are known. A
+step's Jacobians for 50 rates have a million operations, which C leaves to loops."""
+
+NOTHING = Program((), ())
+
 EXPANDED_LIMIT = 600
 """Largest p for which `auto` tries the expanded lowering; beyond it, the factored one has always been cheaper."""
 
@@ -146,6 +152,8 @@ class _Lowered:
         return packed(self.kernel(dense, theta), recipe.signature, columns, places)
 
     def _made(self, recipe: Recipe, theta: bool) -> Kernel:
+        if recipe.signature.calls and self.model.nv > TRACED:
+            return Kernel(recipe.signature, theta, NOTHING, NOTHING, "factored")
         if recipe.signature.calls:
             arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
             program = trace_dynamics(recipe, arranged, self._search(theta).robot)

@@ -16,7 +16,6 @@ from psdmc.lower.link_parameters import bodies_from_carriers
 from psdmc.program.lanes import Lanes
 from psdmc.program.limb_cost import StageCost, traced_stage_costs
 from psdmc.program.limb_program import LimbGroup, Spread
-from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.signature import Quantity
 from psdmc.program.trace import Symbol, Tracer, constants_of
@@ -220,7 +219,7 @@ class _Trace:
         left = len(partials) + 1
         while len(partials) < left:
             left = len(partials)
-            program = drop_unused(self.tracer.finish([*stored, *partials]))
+            program = self.tracer.finish([*stored, *partials])
             read = set(program.inputs())
             partials = [each for each in partials if _sum_of(each[0]) in read]
         groups = tuple(

@@ -75,11 +75,11 @@ def check_mass_matrix(model: DynamicsModel) -> MassCheck | None:
     poses = on_joints(model.mechanism, drawn)
     mass = recursive.mass_matrix(model.mechanism, model.equivalent_parameters(), poses)
     failing = ~_is_definite(mass, ROUNDING * _magnitudes(model, np.abs(poses).max(axis=0)))
-    values, vectors = np.linalg.eigh(mass)
-    worst = int(np.argmin(np.where(failing == failing.any(), values[:, 0], np.inf)))
-    moved = int(np.argmax(np.abs(vectors[worst, :, 0])))
+    smallest = np.linalg.eigvalsh(mass)[:, 0]
+    worst = int(np.argmin(np.where(failing == failing.any(), smallest, np.inf)))
+    moved = int(np.argmax(np.abs(np.linalg.eigh(mass[worst]).eigenvectors[:, 0])))
     joint = model.joint_names[model.mechanism.rate_joints[moved]]
-    return MassCheck(POSES, int(failing.sum()), float(values[worst, 0]), poses[worst], joint)
+    return MassCheck(POSES, int(failing.sum()), float(smallest[worst]), poses[worst], joint)
 
 
 def _is_definite(mass: Array, smallest: Array) -> NDArray[np.bool_]:

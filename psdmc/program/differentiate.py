@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
 from psdmc.program.replay import replayed
 from psdmc.program.slopes import Value, gradients, slopes
@@ -125,4 +124,4 @@ class _Replay:
         return self.tracer.symbols(name, size)
 
     def finish(self, derivatives: Sequence[tuple[Slot, Value]]) -> Program:
-        return drop_unused(self.tracer.finish([*self.outputs, *derivatives]))
+        return self.tracer.finish([*self.outputs, *derivatives])

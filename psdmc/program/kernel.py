@@ -15,7 +15,7 @@ class Kernel:
 
     function  which quantities it reads and writes
     theta     whether it also reads theta_b, the base parameters, at run time
-    single    arithmetic in an order for one state
+    single    arithmetic in an order for one state; empty for a loop of calls
     batch     arithmetic in an order for one state per SIMD lane; may be the same object
     lowering  how it was made: 'expanded' or 'factored'
     before    where the function's products are multiplied in loops: the arithmetic in front of them, for one state and for
@@ -43,6 +43,11 @@ class Kernel:
             self._check(self.before, inputs, set(self.function.traced))
         if self.limbs is not None:
             self._check(unpacked(self.limbs), inputs, outputs)
+
+    @property
+    def is_loop_of_calls(self) -> bool:
+        """Whether it has no straight line: its C calls another function, and is too long to be written out."""
+        return not self.single.outputs
 
     def _check(self, program: Program, inputs: set[str], outputs: set[str]) -> None:
         foreign = [str(slot) for slot in program.inputs() if slot.vector not in inputs]

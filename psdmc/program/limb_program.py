@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
 from psdmc.program.replay import Value, replayed
 from psdmc.program.trace import Tracer, constants_of, group_name
@@ -123,7 +122,7 @@ def unpacked(limbs: LimbProgram) -> Program:
             found.append(values)
         core |= _sums(group, stage.program, found)
         outputs += _spread(group, stage.program, found)
-    return drop_unused(tracer.finish(outputs))
+    return tracer.finish(outputs)
 
 
 def _given(group: LimbGroup, limb: int, tracer: Tracer) -> dict[Slot, Value]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isqrt
 
-from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
 from psdmc.program.replay import Value, replayed
 from psdmc.program.trace import Tracer
@@ -44,7 +43,7 @@ def written_out(program: Program, products: tuple[Product, ...]) -> Program:
             outputs.append((slot, value))
         elif slot.index == 0:
             outputs += _multiplied(product, values)
-    return drop_unused(tracer.finish(outputs))
+    return tracer.finish(outputs)
 
 
 def _multiplied(product: Product, values: dict[Slot, Value]) -> list[tuple[Slot, Value]]:

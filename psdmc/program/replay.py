@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 
 from psdmc.errors import InternalError
-from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.trace import Number, Symbol, Tracer
 from psdmc.reproducible import cosine, sine
@@ -32,7 +31,7 @@ def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequen
     slots = [slot for symbol in inputs if (slot := symbol.slot) is not None]
     if len(slots) < len(inputs):
         raise InternalError("only inputs can be replaced")
-    program = drop_unused(tracer.finish([(Slot("value", i), value) for i, value in enumerate(values)]))
+    program = tracer.finish([(Slot("value", i), value) for i, value in enumerate(values)])
     return replayed(program, tracer, dict(zip(slots, given, strict=True)))
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import compress
 from typing import Any
 
 from psdmc.program.cost import Cost
@@ -109,9 +110,26 @@ class Tracer:
         return () if op is _LOAD or op is _CONST else (a,)
 
     def finish(self, outputs: Outputs) -> Program:
-        """The PROGRAM that stores the given values; a negative one costs a negation."""
+        """The PROGRAM that stores the given values; a negative one costs a negation. Steps that no output needs are left
+        out."""
         stored = self.stored(outputs)
-        return Program(tuple(map(_instruction, self.steps)), tuple(stored))
+        steps = self.steps
+        needed = [False] * len(steps)
+        for _, index in stored:
+            needed[index] = True
+        for i in range(len(steps) - 1, -1, -1):
+            if needed[i]:
+                op, a, b = steps[i]
+                if b is not None:
+                    needed[a] = needed[b] = True
+                elif op is not _LOAD and op is not _CONST:
+                    needed[a] = True
+        places = [0] * len(steps)
+        body: list[Instr] = []
+        for i in compress(range(len(steps)), needed):
+            places[i] = len(body)
+            body.append(_instruction(steps[i], places))
+        return Program(tuple(body), tuple((slot, places[i]) for slot, i in stored))
 
     def cost(self, outputs: Outputs) -> Cost:
         """The cost of the PROGRAM that `finish` would give, values that no output needs left out. For searches, which
@@ -165,13 +183,13 @@ class Tracer:
         return stored
 
 
-def _instruction(step: Step) -> Instr:
+def _instruction(step: Step, places: Sequence[int]) -> Instr:
     op, a, b = step
     if b is not None:
-        return operation(op, (a, b))
+        return operation(op, (places[a], places[b]))
     if op is _LOAD:
         return Instr(op, slot=a)
-    return Instr(op, value=a) if op is _CONST else operation(op, (a,))
+    return Instr(op, value=a) if op is _CONST else operation(op, (places[a],))
 
 
 class Symbol:

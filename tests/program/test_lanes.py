@@ -42,15 +42,13 @@ def test_a_symbol_times_a_constant_loads_it_and_constants_along_a_product_become
 
     assert show(program).splitlines() == [
         "t0 = load q[0]",
-        "t1 = const 3.0",
+        "t1 = load group0_constants[0]",
         "t2 = mul t0 t1",
-        "t3 = load group0_constants[0]",
-        "t4 = mul t0 t3",
-        "t5 = neg t4",
-        "t6 = load group0_constants[1]",
-        "out y[0] = t4",
-        "out y[1] = t5",
-        "out y[2] = t6",
+        "t3 = neg t2",
+        "t4 = load group0_constants[1]",
+        "out y[0] = t2",
+        "out y[1] = t3",
+        "out y[2] = t4",
     ]
     assert tracer.lane_constants == {0: [(6.0, -12.0), (2.0, -4.0)]}
 
