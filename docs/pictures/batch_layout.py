@@ -26,8 +26,8 @@ def draw() -> str:
     canvas.text(14, 255, "R_inverse_dynamics_batch_soa", "code")
     _lanes(canvas, 266)
     canvas.text(14, 372, "memory order: along the rows; block after block", "small soft")
-    canvas.text(14, 398, "q1 of 3: the second joint of state 3. A row of lanes", "small")
-    canvas.text(14, 416, "is a SIMD vector: 8 doubles, or 16 floats.", "small")
+    canvas.text(14, 398, "q1 of 3: the second joint of state 3.", "small")
+    canvas.text(14, 416, "A block has 8 lanes of double, or 16 of float.", "small")
     return canvas.svg
 
 

@@ -40,5 +40,5 @@ def draw() -> str:
     canvas.line([(60, 320), (60, 326), (380, 326), (380, 320)])
     canvas.arrow([(220, 326), (220, 348)])
     canvas.text(220, 364, "the sum over the lanes acts on the trunk", "small", "middle")
-    canvas.text(14, 390, "A row is one SIMD vector: one instruction for four legs.", "small soft")
+    canvas.text(14, 390, "A row is one SIMD vector of four doubles (AVX2).", "small soft")
     return canvas.svg

@@ -41,5 +41,5 @@ def draw() -> str:
     canvas.arrow([(345, 226), (345, 168), (284, 168)], "lc dash")
     canvas.text(339, 198, "psdmc check", "code tc", "end")
     canvas.text(14, 388, "A solid arrow makes a new file.", "small soft")
-    canvas.text(14, 406, "The dashed arrow compares torques, changes no file.", "small soft")
+    canvas.text(14, 406, "The dashed arrow compares results, changes no file.", "small soft")
     return canvas.svg

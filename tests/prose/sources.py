@@ -78,7 +78,7 @@ def messages(root: Path = ROOT) -> Iterator[Piece]:
         return
     for file, line, text in printed():
         name = Path(file)
-        yield Piece(str(name.relative_to(root) if name.is_absolute() else name), line, "message", text)
+        yield Piece(str(name.relative_to(root) if name.is_relative_to(root) else name), line, "message", text)
 
 
 def docstrings(root: Path = ROOT) -> Iterator[Piece]:
