@@ -60,6 +60,8 @@ def test_a_planted_fault_is_found(rule: str, text: str):
         "A call takes 47 ns on an EPYC 9755 (Zen 5).",
         "```console\n$ psdmc says so many words of its own, and mends them\n```\n",
         "The folder where the model is has 1234567 files.",
+        "| where the feet are |\n|---|",
+        "psdmc writes C for Cortex-M4F, Cortex-M7 and 64-bit ARM.",
     ],
 )
 def test_what_is_no_fault(text: str):
