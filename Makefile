@@ -112,12 +112,12 @@ FAST := tests/test_architecture.py tests/program tests/robot tests/dynamics test
 LATER := tests/robot/test_mjcf.py tests/robot/test_limits.py tests/robot/test_against_pinocchio.py tests/robot/test_lock.py \
   tests/dynamics/test_tangent_steps.py tests/model/test_forged_models.py
 
-check: $(READY) ## format, lint, types and the fast tests: seconds
+check: $(READY) ## format, lint, types, prose and the fast tests: seconds
 	$(RUN)/ruff format --check .
 	$(RUN)/ruff check .
 	$(RUN)/mypy
 	$(RUN)/reuse lint --quiet
-	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' $(addprefix --ignore=,$(LATER)) $(FAST)
+	$(RUN)/python -m pytest -n $(JOBS) --dist worksteal -m 'not slow' $(addprefix --ignore=,$(LATER)) $(FAST) tests/prose
 
 BYTES := tests/derivation/test_same_bytes.py
 MACHINES := $(FAST) tests/functions/test_steps_of_free_robots.py

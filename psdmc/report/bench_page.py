@@ -62,6 +62,7 @@ def page(result: BenchResult, command: str = COMMAND) -> str:
         "scaling": scaling_rows(result),
         "scaling_plots": _scaling_plots(result),
         "threads": thread_rows(result),
+        "colours": bench_plots.COLOURS,
         "busy": [case.name for case in (*result.cases, *result.scaling) if not case.idle],
     }
     return _environment().get_template("report/bench.html.jinja").render(**view)
@@ -69,12 +70,12 @@ def page(result: BenchResult, command: str = COMMAND) -> str:
 
 def _section(result: BenchResult, index: int) -> RobotSection:
     case = result.cases[index]
-    p = "not expanded" if case.p is None else f"p = {case.p}"
+    p = "not expanded" if case.p is None else f"{case.p:,} monomials"
     missing = tuple((m.rival, m.reason) for m in (*case.unavailable, *case.wrong))
     return RobotSection(
         case.name,
         f"robot{index}",
-        f"{case.n} joints, {p}, l = {case.l}; {case.note}; {case.rounds} trials",
+        f"{case.n} joints, {p}, {case.l} base parameters; {case.note}; {case.rounds} trials",
         bench_plots.case_plots(case),
         function_tables(case),
         missing,

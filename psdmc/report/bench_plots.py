@@ -31,7 +31,7 @@ def bars(case: CaseResult, function: str) -> str:
         for place, m in zip(places, shown, strict=True):
             axes.text(m.ns + 0.015 * longest, place, f"{m.ns:.0f} ns", va="center")
         axes.set_title(f"{FUNCTION_TITLES[function]}, {case.name}", loc="left", fontsize=11)
-        axes.set_xlabel("ns per call")
+        axes.set_xlabel("time of one call, ns (median)")
 
     return svg(draw, (WIDTH, 0.8 + 0.3 * len(shown)), f"times of {FUNCTION_TITLES[function]}, {case.name}")
 
@@ -47,8 +47,8 @@ def scaling(result: BenchResult, function: str) -> str:
                 colour = COLOURS["psdmc" if rival.startswith("psdmc") else rival]
                 axes.plot(*zip(*points, strict=True), line, color=colour, label=rival)
         axes.set_yscale("log")
-        axes.set_xlabel("joints")
-        axes.set_ylabel("ns per call")
+        axes.set_xlabel("number of joints")
+        axes.set_ylabel("time of one call, ns")
         axes.set_title(f"{FUNCTION_TITLES[function]} of the LBR7, cut to n joints", loc="left", fontsize=11)
         axes.set_xticks(sorted({case.n for case in result.scaling}))
         legend_below(axes, 3)

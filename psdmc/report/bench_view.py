@@ -16,7 +16,7 @@ CASADI = "CasADi"
 
 FUNCTION_TITLES = {name: recipe.title[0].upper() + recipe.title[1:] for name, recipe in RECIPES.items()}
 
-LAYOUT_TITLES = {"state": "one state a call", "rows": "batch, rows", "lanes": "batch, lane by lane"}
+LAYOUT_TITLES = {"state": "one state per call", "rows": "batch, rows", "lanes": "batch, lane by lane"}
 
 
 @dataclass(frozen=True, slots=True)

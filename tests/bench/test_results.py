@@ -59,8 +59,8 @@ def test_a_busy_machine_is_said_in_table_and_page(result):
     busy = replace(result, cases=(replace(result.cases[0], idle=False),))
 
     assert "MACHINE BUSY" in as_text(busy)
-    assert "do not trust these times" in page(busy)
-    assert "do not trust these times" not in page(result)
+    assert "Do not trust these times" in page(busy)
+    assert "Do not trust these times" not in page(result)
 
 
 def test_the_page_needs_no_network_and_escapes_names(result):
