@@ -14,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help venv docs demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-pages audit fuzz mutate test-sanitize
+.PHONY: help venv docs dist demo test coverage check golden bench bench-save bench-compare calibrate-demo campaign clean test-slow test-processes test-trees test-demo test-accuracy test-targets test-machines test-lowest test-pages audit fuzz mutate test-sanitize
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -145,6 +145,13 @@ bench-compare: $(READY) ## fail where operations or instructions grew beyond tha
 docs: $(READY) ## build the documentation site into generated/site; a warning is an error
 	$(RUN)/python docs/site_pages.py
 	@echo "generated/site/index.html"
+
+dist: $(READY) ## write a wheel and an sdist to dist/, as a release needs them; pip fetches setuptools
+	rm -rf dist build psdmc.egg-info
+	@mkdir -p $(GENERATED)
+	$(RUN)/python -m build >$(GENERATED)/dist.log 2>&1 || { tail -n 20 $(GENERATED)/dist.log; exit 1; }
+	@rm -rf psdmc.egg-info
+	@ls dist/*
 
 calibrate-demo: $(READY) ## excite, simulate and calibrate the virtual Denso; page in generated/
 	$(RUN)/python -m psdmc.report.calibrate_demo
