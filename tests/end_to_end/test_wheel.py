@@ -75,25 +75,32 @@ def test_the_wheel_is_pure_and_whole(built: Path):
     assert not any("__pycache__" in name or name.startswith("tests") for name in names)
 
 
-def test_the_sdist_builds_the_same(built: Path):
+def test_the_sdist_is_whole(built: Path):
     (sdist,) = built.glob("*.tar.gz")
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
 
     assert {"pyproject.toml", "README.md", "LICENSE", "psdmc/version.py", "templates/header.h.jinja"} <= names
+    assert "CHANGELOG.md" in names
 
 
-def test_the_installed_wheel_does_what_readme_shows_first(built: Path, tmp_path: Path):
-    """In an environment of its own that shares nothing but the dependencies, far from the checkout."""
-    (wheel,) = built.glob("*.whl")
-    environment = tmp_path / "environment"
+def environment_with(wheel: Path, folder: Path) -> Path:
+    """An environment of its own in `folder` with that wheel; it shares nothing but the dependencies."""
+    environment = folder / "environment"
     venv.create(environment, symlinks=True)
     python = environment / "bin" / "python"
     pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "-q"]
     subprocess.run([*pip, "--no-deps", "--no-index", str(wheel)], check=True)
-    folder = next((environment / "lib").glob("python*/site-packages"))
+    packages = next((environment / "lib").glob("python*/site-packages"))
     beside = "".join(f"import site; site.addsitedir({path!r})\n" for path in site.getsitepackages())
-    (folder / "dependencies.pth").write_text(beside, encoding="utf-8")
+    (packages / "dependencies.pth").write_text(beside, encoding="utf-8")
+    return environment
+
+
+def test_the_installed_wheel_does_what_readme_shows_first(built: Path, tmp_path: Path):
+    """In an environment of its own, far from the checkout."""
+    (wheel,) = built.glob("*.whl")
+    environment = environment_with(wheel, tmp_path)
     (tmp_path / "work").mkdir()
     (tmp_path / "work/examples").symlink_to(ROOT / "examples")
 
@@ -111,14 +118,55 @@ def test_the_installed_wheel_does_what_readme_shows_first(built: Path, tmp_path:
             check=False,
         )
         assert done.returncode == 0, f"{command}\n{done.stderr}"
-    where = subprocess.run(
-        [python, "-c", "import psdmc; print(psdmc.__file__)"],
-        cwd=tmp_path,
+
+
+def in_a_bare_shell(command: str, environment: Path, folder: Path) -> str:
+    """Standard output of a command in `folder`, with no variables but HOME and PATH."""
+    done = subprocess.run(
+        ["sh", "-c", command],
+        cwd=folder,
+        env={"HOME": str(folder), "PATH": f"{environment / 'bin'}:/usr/local/bin:/usr/bin:/bin"},
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
-    assert where.stdout.startswith(str(environment))
+    assert done.returncode == 0, f"{command}\n{done.stderr}"
+    return done.stdout
+
+
+def works_in_a_bare_shell(wheel: Path, folder: Path) -> None:
+    environment = environment_with(wheel, folder)
+    robot = ROOT / "examples/robots/two_link.toml"
+
+    assert in_a_bare_shell("psdmc --version", environment, folder) == f"psdmc {VERSION}\n"
+    where = in_a_bare_shell("python -c 'import psdmc; print(psdmc.__file__)'", environment, folder)
+    assert where.startswith(str(environment))
+    in_a_bare_shell(f"psdmc derive '{robot}' -o arm.npz && psdmc emit-c arm.npz -o arm", environment, folder)
+    assert (folder / "arm/include/two_link/two_link.h").is_file()
+
+
+def test_the_wheel_works_in_a_bare_shell(built: Path, tmp_path: Path):
+    (wheel,) = built.glob("*.whl")
+
+    works_in_a_bare_shell(wheel, tmp_path)
+
+
+@pytest.mark.slow
+def test_the_sdist_s_wheel_is_the_same_and_works_in_a_bare_shell(built: Path, tmp_path: Path):
+    """What pip makes of the sdist, as it would for `pip install psdmc-VERSION.tar.gz`."""
+    (sdist,), (shipped,) = built.glob("*.tar.gz"), built.glob("*.whl")
+    command = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-index", "--no-build-isolation"]
+    subprocess.run([*command, "--wheel-dir", str(tmp_path / "made"), str(sdist)], check=True)
+    (made,) = (tmp_path / "made").glob("*.whl")
+
+    assert contents(made) == contents(shipped)
+    works_in_a_bare_shell(made, tmp_path)
+
+
+def contents(wheel: Path) -> dict[str, bytes]:
+    """The files of a wheel."""
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def first_commands() -> list[str]:
