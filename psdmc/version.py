@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-VERSION = "0.1.0"
+VERSION = "0.2.0"
 """The one place where it stands: pyproject.toml reads it here. Asking the installed package's metadata for it would take
 longer than reading a model."""
 
