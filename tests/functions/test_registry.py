@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.stubs import ANSWERS, STUB, answers_stub, own_methods, stub
 
 PACKAGE = Path(psdmc.functions.__file__).parents[1]
+sys.path.insert(0, str(PACKAGE.parent / "docs"))
+import function_table
 
 NAMES_SEVERAL = {
     "bench/rivals/casadi_c.py": "what this rival has, and under which names",
@@ -89,26 +92,11 @@ def test_the_stub_is_what_the_signatures_say() -> None:
     assert own_methods() & set(SIGNATURES) == set(SIGNATURES) & set(vars(DynamicsModel))
 
 
-def test_the_documents_table_has_every_function() -> None:
-    text = (PACKAGE.parent / "docs" / "functions.md").read_text(encoding="utf-8")
-    rows = [line for line in text.splitlines() if line.startswith("| `")]
-    for name, recipe in RECIPES.items():
-        (row,) = [row for row in rows if row.startswith(f"| `{name}` |")]
-        cells = [cell.strip() for cell in row.strip("|").split("|")]
-        signature = recipe.signature
-        assert cells[1] == ", ".join(_shape(q) for q in signature.inputs), name
-        assert cells[2] == ", ".join(_shape(q) for q in signature.outputs), name
-        assert cells[3] == ("yes" if signature.theta else ""), name
-        wide = "where q is longer" if recipe.default_where_wide else ""
-        assert cells[4] == ("yes" if recipe.default else wide), name
-        assert cells[5] == f"`{recipe.against}`", name
-    assert len(rows) == len(RECIPES)
+def test_the_documents_table_is_of_the_declarations() -> None:
+    text = function_table.PAGE.read_text(encoding="utf-8")
 
-
-def _shape(quantity) -> str:  # type: ignore[no-untyped-def]
-    words = {"nq": "n", "nv": "n"}
-    axes = " x ".join(words.get(axis, axis) for axis in quantity.axes) or "1"
-    return f"{quantity.name} ({axes})"
+    assert set(function_table.COMPUTES) == set(RECIPES)
+    assert function_table.with_table(text) == text, "run python docs/function_table.py"
 
 
 def test_sizes_have_one_meaning_each() -> None:
