@@ -1,4 +1,4 @@
-"""What three new users met in their first hour, typed again (docs/first_hour.md)."""
+"""What three new users met in their first hour, typed again."""
 
 from __future__ import annotations
 
