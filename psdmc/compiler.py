@@ -78,13 +78,13 @@ def derive(
                    ends of a tree
     tool           x y z (m), roll pitch yaw (rad) of one more frame, 'tool', in the tip's
     lock           joints that are held: their positions by name, rad or m
-    floating       the root link of a URDF is on a free joint: q = position, quaternion xyzw, then the joints; rates are
-                   linear and angular velocity along the root link's own axes, then the joints'
+    floating       True for a floating base: q is position, quaternion (x, y, z, w), then the joints. Rates are the base's
+                   linear and angular velocity along its axes, then the joints'
     root           the body under the world of an MJCF that the robot begins with, where several move
     xacro_args     values of a xacro file's arguments, by name
     packages       folders of ROS packages, by name, which a xacro file finds; also by ROS_PACKAGE_PATH, AMENT_PREFIX_PATH
-    unknown        links of a URDF or MJCF whose inertia is unknown, whatever the file says, or a single one; "all", or
-                   "missing": those without inertia in the file, which are massless otherwise
+    unknown        links of a URDF or MJCF whose inertia is unknown, whatever the file says, or a single one. "all" means
+                   all links, "missing" those without inertia in the file, which are massless otherwise
 
     Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.
     """
@@ -146,8 +146,8 @@ def emit_c(
     trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"; None: the
                target's
     name       the robot's name in C; None: the robot's own
-    force      whether to write into a folder of other files, and over files of the package that were edited; other files
-               are never deleted: one that is in the way is kept as NAME.orig
+    force      True: also write into a folder of other files, and over edited files of the package. Other files are never
+               deleted: a file of the same name is kept as NAME.orig
     progress   called with the name of each step as it begins
     payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
                do not admit every load

@@ -55,12 +55,12 @@ def export_urdf(
 ) -> Exported:
     """Write the model as a URDF whose links have its theta_b, and are the physical ones nearest to those of its file.
 
-    Where the model holds a URDF, names, limits and shapes are that file's; else links, joints and limits are written
+    If the model holds a URDF, names, limits and shapes are from that file. Otherwise links, joints and limits are
     from the model. Friction of a calibrated model is in <dynamics>.
 
-    mjcf   whether an MJCF is written beside it, with the suffix .xml; None: where the model has drive inertias
+    mjcf   True: also write an MJCF with the suffix .xml; None: only if the model has drive inertias
 
-    InputError where theta_b is unknown, where no physical links have it (NoSuchLinks), or where a file cannot be written.
+    Raises InputError if theta_b is unknown, if no physical links have it (NoSuchLinks), or if a file cannot be written.
     """
     target = Path(path)
     beside = target.with_suffix(MJCF_SUFFIX)

@@ -232,9 +232,9 @@ class DynamicsModel(Answers):
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the link frames' axes
             drive_inertias  (n,) kg m^2 (kg where a joint slides); None: the model's own
 
-        InputError where numbers are not finite, beyond the ranges of robot files or a mass is negative, an inertia is not
-        symmetric or without mass, or where the model's assumptions exclude the bodies. UserWarning where an inertia is that
-        of no rigid body.
+        Raises InputError for numbers that are not finite or outside the ranges of robot files, and for a negative mass.
+        InputError also if an inertia is not symmetric or has no mass, or if the model's assumptions exclude the bodies.
+        UserWarning if no rigid body has such an inertia.
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
@@ -333,10 +333,10 @@ class DynamicsModel(Answers):
             mass      kg
             com       (3,) m, centre of mass in `frame`
             inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
-            frame     where the load's numbers are given: the name of the tip or of another of the model's frames, or a
-                      Placement in the tip frame; None: the tip
+            frame     frame of `com` and `inertia`: the name of the tip or of another of the model's frames, or a Placement
+                      in the tip frame; None: the tip
 
-        InputError where the numbers are those of no rigid body, are beyond the ranges of robot files, or where the
+        Raises InputError if no rigid body has these numbers, if they are outside the ranges of robot files, or if the
         model's assumptions exclude the load.
         """
         load = payload.load_parameters(self.mechanism, mass, com, inertia, frame)

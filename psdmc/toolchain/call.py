@@ -26,12 +26,12 @@ class CompiledRobot(CompiledFunctions):
     """The functions of a compiled package on NumPy arrays: q, qd and the like are (..., n).
 
     Leading axes broadcast; results are float64 or float32 as the package was compiled, several of them a named tuple.
-    Calls for many states release the GIL and may run in several threads. `theta_b` (l,), where a function takes it,
-    replaces the parameters compiled in. `out`, an array or a tuple of them, is written to and returned: it has the
+    Calls for many states release the GIL and may run in several threads. `theta_b` (l,) replaces the parameters
+    compiled in, for functions that take it. `out`, an array or a tuple of them, is written to and returned: it has the
     result's shape and dtype, and may be an input.
 
-    A call whose arrays are contiguous, of the robot's dtype and of one leading shape takes about 0.3 us beside the
-    arithmetic, any other one, or a machine without Python's C headers, about 10 us.
+    A call adds about 0.3 us to the arithmetic if its arrays are contiguous, of the robot's dtype and of one leading
+    shape. Otherwise, or without Python's C headers, a call adds about 10 us.
     """
 
     def __init__(
