@@ -1,4 +1,4 @@
-"""Writes the table of functions into docs/functions.md from the functions' own declarations: python docs/function_table.py."""
+"""Writes the table of docs/functions.md from the functions' declarations: python docs/function_table.py."""
 
 from __future__ import annotations
 

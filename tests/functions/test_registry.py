@@ -17,9 +17,10 @@ from psdmc.recipes.recipe import Needs
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.stubs import ANSWERS, STUB, answers_stub, own_methods, stub
 
-PACKAGE = Path(psdmc.functions.__file__).parents[1]
-sys.path.insert(0, str(PACKAGE.parent / "docs"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
 import function_table
+
+PACKAGE = Path(psdmc.functions.__file__).parents[1]
 
 NAMES_SEVERAL = {
     "bench/rivals/casadi_c.py": "what this rival has, and under which names",

@@ -1,4 +1,4 @@
-"""Checks the project's prose: python tests/prose/prose.py [--all] [TREE] prints the faults of this tree, or of another checkout.
+"""Prints faults of the project's prose, or of another checkout's: python tests/prose/prose.py [--all] [TREE].
 
 The rules are in house_style.py and linter.py, the texts in sources.py, faults that may stay in exceptions.txt. Files that
 nobody has rewritten yet are in owed.txt with their number of faults; --all prints these faults as well."""

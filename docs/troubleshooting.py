@@ -1,0 +1,386 @@
+"""Messages of psdmc with cause and remedy: python docs/troubleshooting.py writes docs/how-to/troubleshooting.md.
+
+tests/docs/test_troubleshooting.py types each command and compares what psdmc prints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+PAGE = Path(__file__).parent / "how-to/troubleshooting.md"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A message that a user meets.
+
+    part     text that the message contains
+    cause    why psdmc prints it
+    remedy   what to type or to change
+    typed    a command that prints it, on the files that the test makes
+    status   the command's exit status
+    """
+
+    part: str
+    cause: str
+    remedy: str
+    typed: str
+    status: int = 2
+
+
+ROBOT_FILES = (
+    Entry("no such file", "The path is wrong.", "Check the path.", "derive nothing.urdf"),
+    Entry(
+        "the file is empty", "The robot file has no content.", "Export the robot again.", "derive empty.urdf"
+    ),
+    Entry(
+        "not well-formed XML",
+        "A tag is not closed, or the file is cut.",
+        "Read the line that the message names.",
+        "derive broken.urdf",
+    ),
+    Entry(
+        "the root element is",
+        "The file is XML, but no URDF or MJCF.",
+        "Give a URDF, MJCF, xacro or DH file.",
+        "derive other.urdf",
+    ),
+    Entry(
+        "an SDF, which psdmc does not read",
+        "SDF files are not supported.",
+        "Convert the file to URDF or MJCF.",
+        "derive world.sdf",
+    ),
+    Entry(
+        "not a TOML file",
+        "The DH table has a syntax error.",
+        "Correct the line that the message names.",
+        "derive broken.toml",
+    ),
+    Entry(
+        "a model, which is derived already",
+        "`derive` takes robot files.",
+        "Use `show`, `check` or `emit-c` for models.",
+        "derive arm.npz",
+    ),
+    Entry(
+        "expected no less than zero",
+        "A mass or moment of inertia is negative.",
+        "Correct the number.",
+        "derive negative.urdf",
+    ),
+    Entry(
+        "expected a finite number",
+        "A number has a comma, a unit or a typing error.",
+        "Write numbers with a decimal point, in SI units.",
+        "derive comma.urdf",
+    ),
+    Entry(
+        "not physical",
+        "No rigid body has such an inertia: check the axes and units.",
+        "Correct the inertia, or ignore the note if only torques matter.",
+        "derive unphysical.urdf -o unphysical.npz",
+        0,
+    ),
+    Entry(
+        "is not supported",
+        "psdmc does not model this type of joint.",
+        "Use a type that the hint lists.",
+        "derive screw.urdf",
+    ),
+    Entry(
+        "does not exist",
+        "A joint names a link that is not in the file.",
+        "Correct the name of the link.",
+        "derive child.urdf",
+    ),
+    Entry(
+        "which is no movable joint",
+        "`<mimic>` names a fixed joint or no joint.",
+        "Correct `<mimic joint=...>`.",
+        "derive mimic.urdf",
+    ),
+    Entry(
+        "expected 0 to 0.1",
+        "`--snap` is an angle in rad.",
+        "Leave it out, or give a small angle.",
+        "derive arm.urdf --snap 2",
+    ),
+    Entry(
+        "has no <inertial>: treated as massless",
+        "A moving link has no inertia.",
+        "Add `<inertial>`, or use `--unknown LINK`.",
+        "derive bare.urdf -o bare.npz",
+        0,
+    ),
+    Entry(
+        "is no link",
+        "A frame in `--frames` is not in the file.",
+        "Choose one of the links that the hint lists.",
+        "derive arm.urdf --frames hand",
+    ),
+    Entry(
+        "link 'hand' does not exist",
+        "`--tip` or `--base` names no link.",
+        "Choose one of the links that the hint lists.",
+        "derive arm.urdf --tip hand",
+    ),
+    Entry(
+        "--lock 'elbow' is no JOINT=VALUE",
+        "The locked joint has no value.",
+        "Write `--lock elbow=0.5`, in rad or m.",
+        "derive arm.urdf --lock elbow",
+    ),
+    Entry(
+        "to be locked",
+        "`--lock` names a joint that is not in the file.",
+        "Choose one of the joints that the hint lists.",
+        "derive arm.urdf --lock wrist=0",
+    ),
+    Entry(
+        "is not three finite numbers",
+        "Gravity needs three numbers.",
+        "Write `--gravity 0,0,-9.81`.",
+        "derive arm.urdf --gravity 9.81",
+    ),
+    Entry(
+        "cut a chain out of it",
+        "`--floating` needs the whole robot.",
+        "Leave out `--base` and `--tip`.",
+        "derive arm.urdf --floating --tip fore",
+    ),
+    Entry(
+        "--floating frees the root link of a URDF",
+        "A DH table describes a fixed base.",
+        "Give a URDF or an MJCF.",
+        "derive examples/robots/kr6.toml --floating",
+    ),
+    Entry(
+        "--base and --tip name links of a URDF",
+        "A DH table has one chain.",
+        "Leave out `--base` and `--tip`.",
+        "derive examples/robots/kr6.toml --tip link3",
+    ),
+    Entry(
+        "is not of the form NAME:=VALUE",
+        "A word after the file is no xacro argument.",
+        "Write `name:=value` after the file.",
+        "derive arm.urdf name=x",
+    ),
+)
+
+MODELS = (
+    Entry(
+        "not a psdmc model file",
+        "The command needs a model, not a robot file.",
+        "Run `psdmc derive` first.",
+        "check arm.urdf",
+    ),
+    Entry(
+        "no such file",
+        "The model was not derived, or lies elsewhere.",
+        "Run `psdmc derive`, or correct the path.",
+        "show arm9.npz",
+    ),
+    Entry(
+        "are several questions",
+        "`show` answers one question per call.",
+        "Give one of `--terms`, `--cost` and `--latex`.",
+        "show arm.npz --cost --terms",
+    ),
+    Entry(
+        "is of models",
+        "`--cost` and `--terms` need a model.",
+        "Run `psdmc derive` first.",
+        "show arm.urdf --cost",
+    ),
+)
+
+PACKAGES = (
+    Entry(
+        "is not known",
+        "`--functions` names no function of psdmc.",
+        "Take the name that the hint suggests, or see [Functions](../functions.md).",
+        "emit-c arm.npz --functions inverse_dynamic",
+    ),
+    Entry(
+        "no function is named",
+        "`--functions` is empty.",
+        "Write `default`, `all` or names.",
+        "emit-c arm.npz --functions ,",
+    ),
+    Entry(
+        "moves no inertia",
+        "Forward dynamics needs an inertia at each joint.",
+        "Add `<inertial>`, or leave out `forward_dynamics`.",
+        "emit-c bare.npz -o bare",
+    ),
+    Entry(
+        "psdmc did not write the files in this folder",
+        "The output folder contains other files.",
+        "Choose another folder, or add `--force`.",
+        "emit-c arm.npz -o mine",
+    ),
+    Entry(
+        "real is 'float16'",
+        "The precision is unknown.",
+        "Choose `float64` or `float32`.",
+        "emit-c arm.npz --real float16",
+    ),
+    Entry(
+        "target is 'riscv'",
+        "The target is unknown.",
+        "Choose a target that the hint lists; `scalar` suits any compiler.",
+        "emit-c arm.npz --target riscv",
+    ),
+    Entry(
+        "there is no adapter",
+        "`--with` knows CasADi only.",
+        "Write `--with casadi`.",
+        "emit-c arm.npz --with acados",
+    ),
+    Entry(
+        "CasADi's numbers are double",
+        "CasADi cannot call float32 code.",
+        "Leave out `--real float32`.",
+        "emit-c arm.npz --with casadi --real float32",
+    ),
+    Entry(
+        "no emitted package",
+        "`build` needs a folder that `emit-c` wrote.",
+        "Run `psdmc emit-c` first.",
+        "build mine",
+    ),
+)
+
+LOGS = (
+    Entry(
+        "no such file",
+        "The log's path is wrong.",
+        "Check the path.",
+        "calibrate arm.npz log9.csv -o found.npz",
+    ),
+    Entry(
+        "time_s",
+        "The log has no column of times in seconds.",
+        "Rename the column, or draft a description: `calibrate --describe`.",
+        "calibrate arm.npz words.csv -o found.npz",
+    ),
+    Entry(
+        "write JOINT=NUMBER",
+        "A torque constant has no joint's name.",
+        "Write `--torque-constants shoulder=0.1`, in N m/A.",
+        "calibrate arm.npz words.csv -o found.npz --torque-constants 3",
+    ),
+    Entry(
+        "without limits to move within",
+        "`excite` needs limits of speed and acceleration.",
+        "Give `--acceleration` (rad/s^2) and `--speed` (rad/s).",
+        "excite arm.npz -o campaign",
+    ),
+    Entry(
+        "would overwrite",
+        "Output and input are the same file.",
+        "Choose another name for `-o`.",
+        "calibrate arm.npz words.csv -o arm.npz",
+    ),
+)
+
+ARRAYS = (
+    Entry(
+        "expected (..., 2)",
+        "The last axis must be the number of joints.",
+        "Put joints along the last axis.",
+        "robot.gravity([0, 0, 0])",
+    ),
+    Entry(
+        "shapes do not broadcast",
+        "q, qd and qdd have different numbers of states.",
+        "Give arrays of one shape.",
+        "robot.inverse_dynamics(np.zeros((3, 2)), np.zeros((4, 2)), np.zeros(2))",
+    ),
+    Entry(
+        "expected real numbers",
+        "The array is complex, or holds texts.",
+        "Give floats.",
+        "robot.gravity(['a', 'b'])",
+    ),
+    Entry(
+        "theta_b has shape",
+        "theta_b needs one value per base parameter.",
+        "Use `model.theta_for`, or the model's own theta_b.",
+        "robot.gravity([0, 0], theta_b=[1.0])",
+    ),
+    Entry(
+        "out for g has shape",
+        "The output array does not fit.",
+        "Use the shape of the hint.",
+        "robot.gravity(np.zeros((2, 2)), out=np.zeros(2))",
+    ),
+    Entry(
+        "is a masked array",
+        "Some states are masked.",
+        "Leave them out, or fill them.",
+        "robot.gravity(np.ma.masked_array([0.0, 1.0], [True, False]))",
+    ),
+    Entry(
+        "q has columns",
+        "Columns of a data frame are not the robot's joints.",
+        "Rename the columns, or pass `.to_numpy()`.",
+        "robot.gravity(pd.DataFrame({'a': [0.0], 'b': [0.0]}))",
+    ),
+    Entry(
+        "was given where a model is expected",
+        "`compile` takes a model.",
+        "Call `psdmc.derive` first.",
+        "psdmc.compile('examples/robots/two_link.toml')",
+    ),
+    Entry(
+        "payload mass is -1.0",
+        "A mass is negative.",
+        "Give the mass in kg.",
+        "model.with_payload(-1, [0, 0, 0])",
+    ),
+    Entry(
+        "masses has shape",
+        "`theta_for` needs a body for each joint.",
+        "Give one row per link of `model.link_names`.",
+        "model.theta_for([1.0], [[0, 0, 0]], [np.eye(3)])",
+    ),
+)
+"""Of Python: `typed` is an expression."""
+
+GROUPS = {
+    "Robot files": ROBOT_FILES,
+    "Models": MODELS,
+    "C packages": PACKAGES,
+    "Logs and calibration": LOGS,
+    "Arrays in Python": ARRAYS,
+}
+
+
+def page() -> str:
+    """The page's text."""
+    parts = [
+        "# Troubleshooting by message",
+        "On this page you find a message that psdmc printed, its cause and what to do. Search for a part of the message.",
+        "An error of psdmc is one line and a hint. The exit status is 2 for wrong input ([all exit statuses](../files.md)). "
+        "In Python the same errors are `psdmc.InputError`, `psdmc.DerivationError` and `psdmc.ToolchainError`.",
+    ]
+    for title, entries in GROUPS.items():
+        rows = ["| message contains | cause | what to do |", "|---|---|---|"]
+        rows += [f"| `{entry.part}` | {entry.cause} | {entry.remedy} |" for entry in entries]
+        parts += [f"## {title}", "\n".join(rows)]
+    return "\n\n".join([*parts, AFTER])
+
+
+AFTER = """## When nothing here fits
+
+- `psdmc doctor` prints which compilers and optional packages it found.
+- `psdmc COMMAND --help` lists all options with units and defaults.
+- `psdmc show FILE` prints what psdmc read: joints, limits, gravity and base parameters.
+- A message that begins with "internal error" is a fault of psdmc. Please report it with the file.
+"""
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
