@@ -46,7 +46,7 @@ ROBOT_FILES = (
         "derive other.urdf",
     ),
     Entry(
-        "an SDF, which psdmc does not read",
+        "an SDF, which",
         "SDF files are not supported.",
         "Convert the file to URDF or MJCF.",
         "derive world.sdf",
@@ -171,7 +171,7 @@ ROBOT_FILES = (
 
 MODELS = (
     Entry(
-        "not a psdmc model file",
+        "model file",
         "The command needs a model, not a robot file.",
         "Run `psdmc derive` first.",
         "check arm.urdf",
@@ -216,7 +216,7 @@ PACKAGES = (
         "emit-c bare.npz -o bare",
     ),
     Entry(
-        "psdmc did not write the files in this folder",
+        "did not write the files in this folder",
         "The output folder contains other files.",
         "Choose another folder, or add `--force`.",
         "emit-c arm.npz -o mine",
@@ -377,7 +377,7 @@ def page() -> str:
 AFTER = """## When nothing here fits
 
 - `psdmc doctor` prints which compilers and optional packages it found.
-- `psdmc COMMAND --help` lists all options with units and defaults.
+- The option `--help` of each command lists all options with units and defaults.
 - `psdmc show FILE` prints what psdmc read: joints, limits, gravity and base parameters.
 - A message that begins with "internal error" is a fault of psdmc. Please report it with the file.
 """
