@@ -19,7 +19,6 @@ from psdmc.emit.options import CReal, EmitOptions
 from psdmc.emit.patterns import Pattern, patterns
 from psdmc.emit.payload_view import PayloadView
 from psdmc.emit.products import Shape
-from psdmc.emit.prototypes import Prototype, friction_prototype
 from psdmc.emit.reals import check_range
 from psdmc.emit.reference_states import ReferenceStates
 from psdmc.emit.references import ReferenceView, reference_view
@@ -148,11 +147,7 @@ class PackageView:
     @property
     def friction(self) -> FrictionView | None:
         """The calibrated friction, where the package has its function."""
-        return FrictionView(self.info.friction, self.real) if self.info.friction else None
-
-    @property
-    def friction_prototype(self) -> Prototype:
-        return friction_prototype(self.robot, self.real)
+        return FrictionView(self.info.friction, self.robot, self.real) if self.info.friction else None
 
     @property
     def payload(self) -> PayloadView | None:

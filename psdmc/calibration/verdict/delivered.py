@@ -24,7 +24,7 @@ from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import judge_gravity
 from psdmc.calibration.identify.inertial import judge_inertial
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_names, friction_terms
+from psdmc.calibration.identify.linear_problem import friction_columns, names_of
 from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
 from psdmc.calibration.identify.motor import judge_motors
 from psdmc.calibration.identify.motor_model import Motors
@@ -204,10 +204,9 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
     law = found.prediction
     coupling = coupling_of(law.coupling)
     speed = qd if coupling is None else coupling.to_motors(qd)
-    terms = friction_terms(speed, law.sign_speed, law.exponents, law.offset)
-    names = friction_names(law.exponents, law.offset)
+    terms = friction_columns(law.terms, speed, law.sign_speed)
     extra = found.columns.values(motion_of(q, qd, law.sign_speed, rigid, coupling)) @ found.extra
-    for name, term in zip(names, terms, strict=True):
+    for name, term in zip(names_of(law.terms), terms, strict=True):
         torque = term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
         rigid = rigid + (torque if coupling is None else coupling.torque_of_joints(torque))
     return np.asarray(rigid + extra)
