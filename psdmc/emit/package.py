@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from psdmc.emit.adapters import chosen
 from psdmc.emit.bodies_view import BodiesView
+from psdmc.emit.body import calls_of
 from psdmc.emit.cpp import CppClass, cpp_classes
 from psdmc.emit.describe import description, uses_frames
 from psdmc.emit.friction import FrictionView
@@ -15,6 +16,7 @@ from psdmc.emit.function_view import FunctionView, function_views
 from psdmc.emit.info import PackageInfo
 from psdmc.emit.kernel_view import KernelView
 from psdmc.emit.names import identifier
+from psdmc.emit.operations import CallView, call_views
 from psdmc.emit.options import CReal, EmitOptions
 from psdmc.emit.patterns import Pattern, patterns
 from psdmc.emit.payload_view import PayloadView
@@ -209,10 +211,21 @@ class PackageView:
         return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self.kernels)
 
     @property
-    def has_roots(self) -> bool:
-        """Whether some kernel takes square roots."""
-        bodies = (body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body))
-        return any(body.has_roots for body in bodies)
+    def calls(self) -> tuple[CallView, ...]:
+        """Operations of some kernel that are macros."""
+        bodies = [body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body)]
+        return call_views(frozenset(op for body in bodies for op in body.calls))
+
+    def limb_calls(self, count: int) -> tuple[CallView, ...]:
+        """Those of some stage of so many limbs."""
+        views = [kernel.limbs for kernel in self.kernels if kernel.limbs]
+        stages = [stage for view in views for stage in view.stages if stage.count == count]
+        return call_views(frozenset(op for stage in stages for op in stage.body.calls))
+
+    @property
+    def call_headers(self) -> tuple[str, ...]:
+        """Headers that say what they mean."""
+        return tuple(dict.fromkeys("operations.h" if call.has_header else "roots.h" for call in self.calls))
 
     @property
     def multiplies_lanes(self) -> bool:
@@ -251,6 +264,7 @@ def package_view(
     if info.l == 0:
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
     check_range(info, kernels, options.c_real)
+    _check_calls(info, kernels, options)
     if info.friction and options.trig == "freestanding":
         raise InputError(
             f"{info.name}: friction needs tanh, which is libm's, and the package is freestanding",
@@ -267,3 +281,14 @@ def package_view(
     )
     view = reference_view(references, options.c_real, vectors, labels(package.kernels), takes_theta)
     return replace(package, references=view)
+
+
+def _check_calls(info: PackageInfo, kernels: Mapping[str, Kernel], options: EmitOptions) -> None:
+    """InputError where a freestanding package would call the C library."""
+    for kernel in kernels.values() if options.trig == "freestanding" else ():
+        for call in call_views(calls_of(kernel.single)):
+            if call.is_library:
+                raise InputError(
+                    f"{info.name}: {kernel.name} needs {call.op}, which is libm's, and the package is freestanding",
+                    "emit it with --trig inline, or leave the function out",
+                )
