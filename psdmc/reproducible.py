@@ -165,6 +165,16 @@ def hyperbolic_tangent(value: Any) -> Any:
     return _rounded(np.tanh, value)
 
 
+def logarithm(value: Any) -> Any:
+    """Natural logarithm of a float or an array, as `sine`."""
+    return _rounded(np.log, value)
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """base^exponent of floats or arrays, as `sine`."""
+    return _rounded(np.power, base, exponent)
+
+
 def _rounded(function: Any, *values: Any) -> Any:
     if _any_order.get():
         return function(*values)

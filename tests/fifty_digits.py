@@ -28,6 +28,8 @@ MP: dict[Op, Callable[..., mpmath.mpf]] = {
     Op.SELECT: lambda a, b, x, y: x if a < b else y,
     Op.EXP: mpmath.exp,
     Op.TANH: mpmath.tanh,
+    Op.LOG: mpmath.log,
+    Op.POW: mpmath.power,
     Op.ATAN2: mpmath.atan2,
 }
 """Every operation, by mpmath."""

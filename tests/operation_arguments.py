@@ -29,10 +29,12 @@ COUNT = 200
 def arguments(op: Op, columns: int, real: str = "float64", seed: int = 3) -> np.ndarray:
     """(count, columns) of the precision; the first columns are the operation's arguments. Of floats none is subnormal."""
     random = np.random.default_rng(seed)
-    size = 2.0 if op in (Op.EXP, Op.TANH, Op.SIN, Op.COS) else 10.0
+    size = 2.0 if op in (Op.EXP, Op.TANH, Op.SIN, Op.COS, Op.POW) else 10.0
     found = random.choice([-1.0, 1.0], (COUNT, columns)) * 10.0 ** random.uniform(
         -size, size, (COUNT, columns)
     )
+    if op in (Op.LOG, Op.POW):
+        found[:, 0] = np.abs(found[:, 0])
     found[: COUNT // 8, 1] = found[: COUNT // 8, 0]  # ties
     extreme = random.choice(EXTREME, (COUNT, columns))
     extreme[: len(EXTREME), 0] = EXTREME

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from psdmc.emit.operations import CallView
 from psdmc.emit.prototypes import Prototype, friction_prototype
 from psdmc.emit.reals import rounded_out
-from psdmc.emit.scalar_function import ScalarFunction
+from psdmc.emit.scalar_function import ScalarFunction, calls_in
 from psdmc.emit.tables import number
 from psdmc.friction.joints import Friction
 from psdmc.friction.law import Array
@@ -36,7 +37,18 @@ class FrictionView:
 
     @property
     def one_joint(self) -> ScalarFunction:
-        return ScalarFunction("joint_friction", self.friction.program(), ("q", "v"), self.real)
+        suffix = "" if self.real == "double" else "f"
+        return ScalarFunction("joint_friction", self.friction.program(), ("q", "v"), suffix)
+
+    @property
+    def calls(self) -> tuple[CallView, ...]:
+        return calls_in([self.one_joint])
+
+    @property
+    def passed(self) -> str:
+        """Joint i's state behind its values."""
+        state = {"q": "q[i]", "v": "qd[i]"}
+        return "".join(f", {state[name]}" for name in self.one_joint.taken)
 
     @property
     def beyond(self) -> tuple[str, ...]:

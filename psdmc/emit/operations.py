@@ -82,6 +82,8 @@ _ALL = (
     CallView(Op.SELECT, ("a", "b", "x", "y"), "a < b ? x : y", "BLEND({kind}, {bits}, a < b, x, y)"),
     CallView(Op.EXP, ("a",), "exp{suffix}(a)"),
     CallView(Op.TANH, ("a",), "tanh{suffix}(a)"),
+    CallView(Op.LOG, ("a",), "log{suffix}(a)"),
+    CallView(Op.POW, ("a", "b"), "pow{suffix}(a, b)"),
     CallView(Op.ATAN2, ("a", "b"), "atan2{suffix}(a, b)"),
 )
 

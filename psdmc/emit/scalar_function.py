@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from psdmc.emit.c_expr import Expr, Names, combine, literal
+from psdmc.emit.body import calls_of
+from psdmc.emit.c_expr import Expr, Names, combine, is_call, literal
+from psdmc.emit.operations import CALLS, CallView, call_views
+from psdmc.program.operations import Unit
 from psdmc.program.program import Instr, Program, Slot
 
-FUNCTIONS = {
-    "abs": "fabs",
-    "min": "fmin",
-    "max": "fmax",
-    "exp": "exp",
-    "tanh": "tanh",
-    "pow": "pow",
-    "sqrt": "sqrt",
-    "sin": "sin",
-    "cos": "cos",
-    "atan2": "atan2",
-}
-"""libm's, by operation."""
+TYPE = "number"
+"""C's name for the real type in these functions."""
 
 
 @dataclass(frozen=True, slots=True)
 class ScalarFunction:
-    """A function `name(const real *p, real x, ...)`; it has those of `arguments` that the PROGRAM reads."""
+    """A function `name(const number *p, number x, ...)`, which has those of `arguments` that the PROGRAM reads.
+
+    suffix  of C's functions and literals: f for float
+    """
 
     name: str
     program: Program
     arguments: tuple[str, ...]
-    real: str
+    suffix: str
 
     @property
     def taken(self) -> tuple[str, ...]:
@@ -39,7 +35,7 @@ class ScalarFunction:
 
     @property
     def signature(self) -> str:
-        return ", ".join((f"const {self.real} *p", *(f"{self.real} {name}" for name in self.taken)))
+        return ", ".join((f"const {TYPE} *p", *(f"{TYPE} {name}" for name in self.taken)))
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -51,26 +47,28 @@ class ScalarFunction:
         for i, instr in enumerate(self.program):
             value = self._expression(instr, values)
             if named[i] and instr.args and i != last:
-                found.append(f"const {self.real} t{i} = {value.text};")
+                found.append(f"const {TYPE} t{i} = {value.text};")
                 value = Expr(f"t{i}")
             values.append(value)
         return (*found, f"return {values[last].text};")
 
     def _expression(self, instr: Instr, values: list[Expr]) -> Expr:
-        suffix = "" if self.real == "double" else "f"
         if instr.slot is not None:
             return Expr(_read(instr.slot))
         if instr.value is not None:
-            return literal(instr.value, suffix)
+            return literal(instr.value, self.suffix)
         args = [values[a] for a in instr.args]
-        texts = [arg.text for arg in args]
-        if instr.op.value == "select":
-            a, b, x, y = texts
-            return Expr(f"({a} < {b} ? {x} : {y})")
-        function = FUNCTIONS.get(instr.op.value)
-        return (
-            combine(instr.op, args) if function is None else Expr(f"{function}{suffix}({', '.join(texts)})")
-        )
+        listed = ", ".join(arg.text for arg in args)
+        if instr.op.unit is Unit.SINCOS:
+            return Expr(f"{instr.op}{self.suffix}({listed})")
+        if is_call(instr.op):
+            return Expr(f"{CALLS[instr.op].function(TYPE)}({listed})")
+        return combine(instr.op, args)
+
+
+def calls_in(functions: Iterable[ScalarFunction]) -> tuple[CallView, ...]:
+    """Operations that the functions call."""
+    return call_views(frozenset(op for function in functions for op in calls_of(function.program)))
 
 
 def _read(slot: Slot) -> str:

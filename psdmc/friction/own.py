@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.friction.evaluate import evaluated
 from psdmc.friction.law import At, Law, Scalar, Value
 from psdmc.friction.laws import LAWS
 from psdmc.program.program import Program, Slot
@@ -192,9 +191,14 @@ def _torque(text: object, count: int) -> Callable[[Sequence[Scalar], At], Scalar
 
 def _of_program(program: Program) -> Callable[[Sequence[Scalar], At], Scalar]:
     def torque(p: Sequence[Scalar], at: At) -> Scalar:
-        def given(slot: Slot) -> Scalar:
-            return p[slot.index] if slot.vector == "p" else getattr(at, slot.vector)
-
-        return evaluated(program, given)[0]
+        values: list[Scalar] = []
+        for instr in program:
+            if instr.slot is not None:
+                vector, index = instr.slot
+                values.append(p[index] if vector == "p" else getattr(at, vector))
+            else:
+                value = instr.value
+                values.append(instr.op(*(values[a] for a in instr.args)) if value is None else value)
+        return values[program.outputs[0][1]]
 
     return torque

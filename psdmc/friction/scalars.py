@@ -1,4 +1,4 @@
-"""Functions of abstract scalars, for friction laws: of floats, of arrays of states, and of symbols that record a PROGRAM."""
+"""Functions of scalars, for friction laws: of floats, of arrays of states, and of symbols that record a PROGRAM."""
 
 from __future__ import annotations
 
@@ -6,77 +6,44 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
-from psdmc.program.trace import Symbol
+from psdmc.program.operations import Op
 
 Scalar = Any
 """A float, an array of states, or a symbol."""
 
 
-def absolute(x: Scalar) -> Scalar:
-    """|x|"""
-    return _one("absolute", x, abs, np.abs)
+def _function(op: Op, of_floats: Callable[..., Any]) -> Callable[..., Scalar]:
+    """An operation; of plain floats the standard library's, which is faster where a simulation calls it once a step."""
+
+    def function(*args: Scalar) -> Scalar:
+        return (of_floats if all(type(x) is float for x in args) else op)(*args)
+
+    return function
 
 
-def exp(x: Scalar) -> Scalar:
-    """e^x"""
-    return _one("exp", x, math.exp, np.exp)
+absolute = _function(Op.ABS, abs)
+exp = _function(Op.EXP, math.exp)
+tanh = _function(Op.TANH, math.tanh)
+sin = _function(Op.SIN, math.sin)
+cos = _function(Op.COS, math.cos)
+sqrt = _function(Op.SQRT, math.sqrt)
+larger = _function(Op.MAX, max)
+smaller = _function(Op.MIN, min)
+select = _function(Op.SELECT, lambda a, b, x, y: x if a < b else y)
+"""select(a, b, x, y): x where a < b, else y."""
 
-
-def tanh(x: Scalar) -> Scalar:
-    """The smooth sign of x."""
-    return _one("tanh", x, math.tanh, np.tanh)
-
-
-def sin(x: Scalar) -> Scalar:
-    """The sine of x rad."""
-    return x.sincos()[0] if isinstance(x, Symbol) else _one("sin", x, math.sin, np.sin)
-
-
-def cos(x: Scalar) -> Scalar:
-    """The cosine of x rad."""
-    return x.sincos()[1] if isinstance(x, Symbol) else _one("cos", x, math.cos, np.cos)
-
-
-def sqrt(x: Scalar) -> Scalar:
-    """The square root of x."""
-    return x.root() if isinstance(x, Symbol) else _one("sqrt", x, math.sqrt, np.sqrt)
-
-
-def larger(a: Scalar, b: Scalar) -> Scalar:
-    """The larger of two."""
-    return _several("larger", np.maximum, max, a, b)
-
-
-def smaller(a: Scalar, b: Scalar) -> Scalar:
-    """The smaller of two."""
-    return _several("smaller", np.minimum, min, a, b)
-
-
-def select(a: Scalar, b: Scalar, x: Scalar, y: Scalar) -> Scalar:
-    """x where a < b, else y; both are computed."""
-    return _several(
-        "select", lambda a, b, x, y: np.where(a < b, x, y), lambda a, b, x, y: x if a < b else y, a, b, x, y
-    )
+_PLAIN: dict[float, Callable[[Scalar], Scalar]] = {
+    0.5: sqrt,
+    1.0: lambda x: x,
+    1.5: lambda x: x * sqrt(x),
+    2.0: lambda x: x * x,
+}
 
 
 def power(x: Scalar, exponent: Scalar) -> Scalar:
     """x^exponent for x not negative."""
-    if isinstance(exponent, float) and exponent in (1.0, 2.0):
-        return x if exponent == 1.0 else x * x
-    return _several("power", np.power, pow, x, exponent)
+    plain = _PLAIN.get(exponent) if type(exponent) is float else None
+    return _power(x, exponent) if plain is None else plain(x)
 
 
-def _one(name: str, x: Scalar, of_float: Callable[..., Any], of_array: Callable[..., Any]) -> Scalar:
-    return _several(name, of_array, of_float, x)
-
-
-def _several(
-    name: str, of_arrays: Callable[..., Any], of_floats: Callable[..., Any], *args: Scalar
-) -> Scalar:
-    if any(isinstance(x, Symbol) for x in args):
-        raise NotImplementedError(name)
-    if any(isinstance(x, np.ndarray) for x in args):
-        return of_arrays(*args)
-    return of_floats(*args)
+_power = _function(Op.POW, math.pow)

@@ -23,7 +23,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from psdmc.reproducible import angle_of, cosine, exponential, hyperbolic_tangent, sine
+from psdmc.reproducible import angle_of, cosine, exponential, hyperbolic_tangent, logarithm, power, sine
 
 Scalar = Any
 """A float, an array of states, or a symbol that records what is done to it (trace.py)."""
@@ -95,6 +95,10 @@ def _quotient_partials(value: Scalar, a: Scalar, b: Scalar) -> tuple[Scalar, ...
 def _angle_partials(value: Scalar, y: Scalar, x: Scalar) -> tuple[Scalar, ...]:
     reciprocal = 1.0 / (x * x + y * y)
     return x * reciprocal, -(y * reciprocal)
+
+
+def _power_partials(value: Scalar, base: Scalar, exponent: Scalar) -> tuple[Scalar, ...]:
+    return exponent * Op.POW(base, exponent - 1.0), value * Op.LOG(base)
 
 
 class Op(StrEnum):
@@ -169,6 +173,8 @@ class Op(StrEnum):
             parity="odd",
         ),
     )
+    LOG = "log", Operation(1, Unit.CALL, logarithm, lambda _, a: (1.0 / a,), ulp=1.0)
+    POW = "pow", Operation(2, Unit.CALL, power, _power_partials, ulp=1.0)
     ATAN2 = "atan2", Operation(2, Unit.CALL, angle_of, _angle_partials, ulp=1.0, parity="odd")
 
     arity: int
