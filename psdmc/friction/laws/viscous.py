@@ -19,7 +19,7 @@ def line(p: Sequence[float], exponent: float, top: float) -> tuple[float, float,
 LAW = Law(
     name="viscous",
     about="Viscous friction: grows with the speed, or with a power of it.",
-    formula=lambda d: f"viscous |v|^{d:g}",
+    formula=lambda d: "viscous |v|" if d == 1.0 else f"viscous |v|^{d:g}",
     values=(
         Value(
             lambda d: "viscous" if d == 1.0 else f"viscous^{d:g}",
