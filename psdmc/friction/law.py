@@ -144,9 +144,9 @@ class Law:
         """The values; InputError where the law cannot have them."""
         own = dict(zip(self.parameters, p.tolist(), strict=True))
         for value, x in zip(self.values, p.tolist(), strict=True):
-            low = max(value.low, own[value.above]) if value.above else value.low
-            if not low <= x <= value.high:
-                expected = f"at least {low:g}" if x < low else f"at most {value.high:g}"
+            low = max(own[value.above], 0.0) if value.above else min(value.low, 0.0)
+            if not x >= low or (value.low > 0.0 and x == 0.0):
+                expected = f"at least {low:g}" if x < low else "a positive number"
                 raise InputError(
                     f"{self.name} friction: {value.name} is {x:g}, expected {expected}", "correct the values"
                 )
@@ -170,7 +170,7 @@ class Law:
                 p[k] = math.exp(x[k])
             elif value.above:
                 p[k] = x[k] + x[self.parameters.index(value.above)]
-        return self.require(p)
+        return p
 
     def slopes(self, p: Array) -> Array:
         """(m, m) d values / d unknowns."""

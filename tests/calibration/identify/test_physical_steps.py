@@ -11,7 +11,7 @@ import pytest
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_campaign
 from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
-from psdmc.calibration.identify.lugre import PARAMETERS
+from psdmc.calibration.identify.state_friction import PARAMETERS
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.verdict.record import Calibration
