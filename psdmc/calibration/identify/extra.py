@@ -22,8 +22,8 @@ def motion_of(
     if coupling is None:
         return Motion(q, qd, q, qd, sign_speed, load)
     of_motors = None if load is None else coupling.torque_of_motors(load)
-    moved = (coupling.to_motors(part) for part in (q, qd))
-    return Motion(q, qd, *moved, sign_speed, of_motors, coupling.inverse)
+    place, speed = coupling.to_motors(q), coupling.to_motors(qd)
+    return Motion(q, qd, place, speed, sign_speed, of_motors, coupling.inverse)
 
 
 def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Array) -> Array:

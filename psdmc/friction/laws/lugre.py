@@ -16,18 +16,18 @@ VALUES = (
 )
 
 
-def bent(p, v):
+def bent(p: Sequence[Scalar], v: Scalar) -> Scalar:
     """g(v): the deflection in steady sliding, (13)."""
     ratio = v / p[2]
     return (p[0] + (p[1] - p[0]) * exp(-(ratio * ratio))) / p[5]
 
 
-def rate(p, v, z):
+def rate(p: Sequence[Scalar], v: Scalar, z: Scalar) -> Scalar:
     """dz/dt, (12)."""
     return v - absolute(v) * z / bent(p, v)
 
 
-def step(p, v0, v1, z, dt):
+def step(p: Sequence[Scalar], v0: Scalar, v1: Scalar, z: Scalar, dt: Scalar) -> Scalar:
     """(12) over dt with the speed going evenly from v0 to v1, both of one sign.
 
     dz/dt = lambda (target - z) with lambda = |v| / g(v) and target = sign(v) g(v): solved exactly for a target that moves
@@ -45,7 +45,7 @@ def step(p, v0, v1, z, dt):
     return select(middle, 0.0, -moved, moved) + z * decay
 
 
-def pieces(p, v0, v1):
+def pieces(p: Sequence[Scalar], v0: Scalar, v1: Scalar) -> Scalar:
     """The speed changes by at most a quarter of the Stribeck velocity in each step, where that matters."""
     slowest = smaller(absolute(v0), absolute(v1))
     return select(4.0 * p[2], slowest, 0.0, smaller(4.0 * absolute(v1 - v0) / p[2], 63.0))
