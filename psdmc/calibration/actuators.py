@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from psdmc.backends.c.names import identifier
+from psdmc.backends.c.render import render
 from psdmc.calibration.identify.state_friction import PARAMETERS, StateLawView
 from psdmc.calibration.logs.log import Array
-from psdmc.emit.names import identifier
-from psdmc.emit.render import render
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
 

@@ -10,10 +10,10 @@ from typing import Any
 import cffi
 import numpy as np
 
+from psdmc.backends.c.operations import CallView
+from psdmc.backends.c.render import render
+from psdmc.backends.c.scalar_function import ScalarFunction, calls_in
 from psdmc.calibration.logs.log import Array
-from psdmc.emit.operations import CallView
-from psdmc.emit.render import render
-from psdmc.emit.scalar_function import ScalarFunction, calls_in
 from psdmc.friction.state import STATE_LAW, state_programs
 from psdmc.toolchain.cache import cache_key, cached
 from psdmc.toolchain.compiler_command import FLAGS, find_compiler, run

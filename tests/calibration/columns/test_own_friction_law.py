@@ -13,14 +13,14 @@ import pytest
 from bundled import bundled_model, bundled_robot
 from direct import Direct, shared_library
 
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import package_view
 from psdmc.calibration.columns.columns import read_columns
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.cli.boundary import run
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import package_view
 from psdmc.errors import InputError
 from psdmc.friction.own import laws_of, read_law
 from psdmc.lower.kernels import lower

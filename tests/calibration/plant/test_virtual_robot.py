@@ -149,5 +149,5 @@ def test_a_law_that_no_file_has_is_named(arm, tmp_path):
     shutil.copy(arm.folder / "two_link.toml", tmp_path)
     text = arm.plant.read_text(encoding="utf-8")
     (tmp_path / "plant.toml").write_text('friction = ["stick", "stribeck"]\n' + text, encoding="utf-8")
-    with pytest.raises(InputError, match="friction: found 'stick', expected a law .asymmetric, coulomb"):
+    with pytest.raises(InputError, match="friction: found 'stick', expected a law"):
         load_virtual_robot(tmp_path / "plant.toml")

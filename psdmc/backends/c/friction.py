@@ -1,0 +1,105 @@
+"""Friction of a calibrated model, as templates print it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from psdmc.backends.c.operations import CallView
+from psdmc.backends.c.prototypes import Prototype, friction_prototype
+from psdmc.backends.c.reals import rounded_out
+from psdmc.backends.c.scalar_function import ScalarFunction, calls_in
+from psdmc.backends.c.tables import number
+from psdmc.friction.joints import Friction
+from psdmc.friction.law import Array
+
+TOLERANCE = {"double": "1e-13", "float": "1e-5"}
+"""Of the self-test, beside the largest friction: a few roundings of tanh and of powers."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionView:
+    """`R_friction`, printed for one real type."""
+
+    friction: Friction
+    robot: str
+    real: str
+
+    @property
+    def prototype(self) -> Prototype:
+        return friction_prototype(self.robot, self.real, self.friction.by_position)
+
+    @property
+    def by_position(self) -> bool:
+        """Whether the function takes positions, too."""
+        return self.friction.by_position
+
+    @property
+    def one_joint(self) -> ScalarFunction:
+        suffix = "" if self.real == "double" else "f"
+        return ScalarFunction("joint_friction", self.friction.program(), ("q", "v"), suffix)
+
+    @property
+    def calls(self) -> tuple[CallView, ...]:
+        return calls_in([self.one_joint])
+
+    @property
+    def passed(self) -> str:
+        """Joint i's state behind its values."""
+        state = {"q": "q[i]", "v": "qd[i]"}
+        return "".join(f", {state[name]}" for name in self.one_joint.taken)
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """What else the calibration found, in words without names from files."""
+        return self.friction.beyond
+
+    @property
+    def headings(self) -> tuple[str, ...]:
+        """Names of the numbers per joint."""
+        return tuple(name for term in self.friction.terms for name in term.names)
+
+    @property
+    def formula(self) -> str:
+        """The law, for the header."""
+        terms = self.friction.terms
+        against = " + ".join(term.formula for term in terms if term.law.against)
+        return " + ".join(
+            (*((f"s ({against})",) if against else ()), *(t.formula for t in terms if not t.law.against))
+        )
+
+    @property
+    def sign_speed(self) -> str:
+        return number(self.friction.sign_speed, self.real)
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        return self._printed(self.friction.values)
+
+    @property
+    def speeds(self) -> tuple[str, ...]:
+        """Of the self-test: rest, a tenth of the speed over which the sign changes, both directions beyond it, and the
+        numbers of laws that have some."""
+        return self._printed(self._states)
+
+    @property
+    def expected(self) -> tuple[str, ...]:
+        """Friction at these, positions being equal to the speeds."""
+        return self._printed(self.friction.torque(self._states, self._states))
+
+    @property
+    def tolerance(self) -> str:
+        return TOLERANCE[self.real]
+
+    @property
+    def _states(self) -> Array:
+        n = len(self.friction.values)
+        ramp = np.linspace(0.5, 1.5, n) * np.where(np.arange(n) % 2, -1.0, 1.0)
+        numbers = (term.number for term in self.friction.terms if term.number is not None)
+        shares = (0.0, 0.1 * self.friction.sign_speed, 1.0, -0.7, *numbers)
+        rounded = [rounded_out(float(v), self.real) for v in np.outer(shares, ramp).reshape(-1)]
+        return np.array(rounded).reshape(len(shares), n)
+
+    def _printed(self, rows: Array) -> tuple[str, ...]:
+        return tuple(", ".join(number(float(value), self.real) for value in row) for row in rows)
