@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,9 @@ from psdmc.program.interpret import interpret
 from psdmc.program.program import Program, Slot
 from psdmc.program.trace import Tracer
 from psdmc.toolchain.compiler_command import find_compiler
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
+import friction_table
 
 PACKAGE = Path(__file__).parents[2] / "psdmc"
 SIGN_SPEED = 0.03
@@ -226,3 +230,11 @@ def test_no_file_but_the_laws_knows_a_law_by_name():
     templates = [path for path in (PACKAGE.parent / "templates").rglob("*.jinja") if path.name != PAPER]
     assert found == set(MAY_NAME_LAWS)
     assert [path.name for path in templates if NAMES.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_the_page_has_the_laws_table():
+    text = friction_table.PAGE.read_text(encoding="utf-8")
+    assert friction_table.with_table(text) == text, "run python docs/friction_table.py"
+    example = Path(__file__).parents[2] / "examples" / "friction_laws" / "ripple.py"
+    law = example.read_text(encoding="utf-8").partition("LAW = ")[2].replace("WAVES", "5.0")
+    assert law in text
