@@ -132,7 +132,7 @@ def _beside(model: DynamicsModel) -> Callable[[States, NDArray[np.intp]], Array]
     found = delivered(model)
     if found.columns.by_load:
         raise InputError(
-            f"{model.mechanism.name}: friction that grows with the load: a load is not told apart from it",
+            f"{model.mechanism.name}: it has load-dependent friction, which the log cannot separate from a load",
             "calibrate the robot without `load` in [friction]",
         )
     return beside(found, np.ones(len(found.columns), dtype=bool))
@@ -231,7 +231,7 @@ def _verdict(found: LoadFit, vector: Array, words: Mapping[str, str], model: Dyn
         reasons.append(f"the log does not show the load's mass: {words['mass']}")
     elif solved.values[0] < -SURE * std:
         reasons.append(
-            f"the mass comes out at {solved.values[0]:.3g} +- {std:.2g} kg: is the model that of the robot without "
+            f"the mass is {solved.values[0]:.3g} +- {std:.2g} kg: is the model that of the robot without "
             "its load, and has the log's torque the same sign?"
         )
     elif solved.values[0] < SURE * std:

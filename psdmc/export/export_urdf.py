@@ -71,7 +71,7 @@ def export_urdf(
     drives = links.parameters[:, DRIVE]
     wanted = bool(drives.any()) if mjcf is None else mjcf
     if wanted and beside == target:
-        raise InputError(f"{target}: the MJCF goes there, beside the URDF", "call the URDF NAME.urdf")
+        raise InputError(f"{target}: psdmc writes the MJCF to this file", "call the URDF NAME.urdf")
     what, text, notes = _urdf(model, links)
     progress("reading it back")
     readings = read_urdf_back(model, text, drives, what.gravity)

@@ -65,7 +65,7 @@ def followed(
         leader = here.mimic.joint
         if leader in passed:
             raise InputError(
-                f"{source}: joint {shown(joint.name)} mimics itself, by way of {shown(passed[-1])}",
+                f"{source}: joint {shown(joint.name)} mimics itself through {shown(passed[-1])}",
                 "let one of these joints mimic none",
             )
         if leader not in known or not known[leader].is_movable:
