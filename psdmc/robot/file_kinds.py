@@ -1,4 +1,4 @@
-"""What a robot file is, by its name and its first element, and what the later stages read of it: a URDF or a DH table."""
+"""Kinds of robot files, recognised by name and first element, and the URDF or DH table that later stages read."""
 
 from __future__ import annotations
 

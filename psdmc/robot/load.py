@@ -52,7 +52,7 @@ class LoadedRobot:
         return self.mechanism
 
     def unsnapped(self) -> LoadedRobot:
-        """The same robot with the file's own rotations, to compute the effect of snapping."""
+        """Return the robot with the file's rotations, to compute the effect of snapping."""
         keywords = self.options.as_json() | {"snap": 0.0}
         return load_robot_text(self.source_text, self.source_format, source_name=self.source_name, **keywords)
 

@@ -54,7 +54,7 @@ def mimic_coordinates(
 def followed(
     joint: UrdfJoint, known: Mapping[str, UrdfJoint], source: str, ends: Collection[str] = ()
 ) -> Followed:
-    """What a mimic joint follows: the first joint on the way that mimics none, or is among `ends`.
+    """Return the joint that a mimic joint follows: the first one that mimics none, or is among `ends`.
 
     InputError where the joints form a ring, or its leader is no movable joint.
     """

@@ -59,7 +59,7 @@ class CompiledFunctions(RobotFacts):
         self._others: list[CompiledFunctions] = []  # whose libraries stay open as long as this one's
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What pickle keeps: the request that the robot was compiled for, its model included, no machine code."""
+        """Pickle the request that the robot was compiled for, its model included, without machine code."""
         if self._origin is None:
             raise TypeError(f"{self.name}: only robots from psdmc.compile can be pickled")
         return self._origin.again, (self._origin.request,)
@@ -72,7 +72,7 @@ class CompiledFunctions(RobotFacts):
         return self
 
     def __dask_tokenize__(self) -> tuple[str, str]:
-        """By which Dask knows equal robots."""
+        """Return the key by which Dask recognises equal robots."""
         return ("psdmc.CompiledRobot", self._origin.key if self._origin else str(self.library))
 
     def call(

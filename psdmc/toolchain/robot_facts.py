@@ -1,4 +1,4 @@
-"""What a compiled robot is: names, sizes, limits, gravity and base parameters, from its interface."""
+"""Facts about a compiled robot: names, sizes, limits, gravity and base parameters, from its interface."""
 
 from __future__ import annotations
 
