@@ -18,14 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 from weakref import WeakValueDictionary
 
-from psdmc.emit.adapters import chosen, with_needed
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
-from psdmc.emit.package_files import package_files
-from psdmc.emit.reference_load import reference_load
-from psdmc.emit.reference_states import reference_states
-from psdmc.emit.write import Changes, require_own_folder, write_package
+from psdmc.backends.c.adapters import chosen, with_needed
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.reference_load import reference_load
+from psdmc.backends.c.reference_states import reference_states
+from psdmc.backends.c.write import Changes, require_own_folder, write_package
 from psdmc.errors import InputError
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
