@@ -13,7 +13,7 @@ from psdmc.calibration.campaign_file import Step
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions, Load
-from psdmc.calibration.logs.table_files import TABLES
+from psdmc.calibration.logs.formats import WRITTEN
 from psdmc.calibration.motions.allowed import Allowed
 from psdmc.calibration.motions.allowed_motion import SHARES, TRIES, Try, first_allowed, smaller_boxes
 from psdmc.calibration.motions.excite import Excitation, ExciteOptions, excite
@@ -77,8 +77,9 @@ class CampaignOptions:
     table: str = "csv"
 
     def __post_init__(self) -> None:
-        if f".{self.table}" not in TABLES:
-            raise InputError(f"table is {self.table!r}, expected csv, npz or parquet", "choose one of these")
+        if f".{self.table}" not in WRITTEN:
+            known = ", ".join(ending.removeprefix(".") for ending in WRITTEN)
+            raise InputError(f"table is {self.table!r}, expected one of {known}", "choose one of these")
         if self.floor is not None and not abs(self.floor) <= HIGHEST_FLOOR:
             raise InputError(
                 f"floor is at {self.floor:g} m, expected at most {HIGHEST_FLOOR:g} above or below the base",

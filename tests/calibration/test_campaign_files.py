@@ -288,7 +288,7 @@ def test_a_seed_that_is_none_is_refused(arm, tmp_path: Path):
     ],
 )
 def test_a_trajectory_of_no_motion_is_refused(tmp_path: Path, column: str, value: list[float], message: str):
-    from psdmc.calibration.logs.table_files import read_columns, write_columns
+    from psdmc.calibration.logs.log_files import read_columns, write_columns
 
     motion = Trajectory(("a",), np.arange(4.0), *(np.zeros((4, 1)),) * 3)
     write_trajectory(motion, tmp_path / "motion.csv")

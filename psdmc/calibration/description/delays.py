@@ -6,7 +6,7 @@ import numpy as np
 from scipy import interpolate
 
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.row_store import RowStore
+from psdmc.calibration.logs.stored_log import RowStore
 from psdmc.errors import InputError
 
 BLOCK_ROWS = 65_536

@@ -14,9 +14,9 @@ from psdmc.calibration.description.columns_found import What
 from psdmc.calibration.description.draft_columns import Guess, guessed
 from psdmc.calibration.description.draft_units import spelled_unit, time_unit, unit_of, velocity_unit
 from psdmc.calibration.description.units import UNITS
+from psdmc.calibration.logs.formats import format_of
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array
-from psdmc.calibration.logs.some_columns import Columns, open_columns
-from psdmc.calibration.logs.table_text import TextForm
+from psdmc.calibration.logs.log_format import Columns, Opening
 from psdmc.calibration.logs.wording import quoted
 from psdmc.errors import InputError
 
@@ -56,7 +56,7 @@ def drafted(
 
     InputError where a log cannot be read.
     """
-    with open_columns(paths[0], TextForm(), topic) as columns:
+    with format_of(paths[0]).columns(paths[0], Opening(topic=topic)) as columns:
         guess = guessed(columns.names, columns.width, joint_names)
         if not guess.joints:
             raise InputError(

@@ -14,7 +14,7 @@ from psdmc.calibration.description.table_logs import LogEntry
 from psdmc.calibration.description.table_quantities import refused
 from psdmc.calibration.identify.coupling import coupling_of
 from psdmc.calibration.logs.log import Array, Quantity
-from psdmc.calibration.logs.row_store import RowStore
+from psdmc.calibration.logs.stored_log import RowStore
 
 
 @dataclass(frozen=True, slots=True, eq=False)

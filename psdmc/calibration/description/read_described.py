@@ -16,11 +16,10 @@ from psdmc.calibration.description.table_csv_form import CSV_FORM
 from psdmc.calibration.description.table_logs import LOGS, LogEntry
 from psdmc.calibration.description.table_quantities import refused
 from psdmc.calibration.description.table_time import TIME, TimeEntry
-from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.log_date import date_of
-from psdmc.calibration.logs.row_store import HELD_BYTES, RowStore
-from psdmc.calibration.logs.some_columns import Columns, open_columns
-from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
+from psdmc.calibration.logs.formats import format_of
+from psdmc.calibration.logs.log import Array, date_of
+from psdmc.calibration.logs.log_format import Columns, Opening
+from psdmc.calibration.logs.stored_log import HELD_BYTES, AnyLog, RowStore, StoredLog
 from psdmc.calibration.logs.table_limits import LARGEST_STORED_ROWS
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
@@ -59,9 +58,9 @@ def _described(
     description: LogDescription, entry: LogEntry, joint_names: tuple[str, ...], held: int
 ) -> AnyLog:
     with ExitStack() as stack:
-        form = description.part(CSV_FORM)
+        opening = Opening(description.part(CSV_FORM), entry.topic, held)
         tables = {
-            name: stack.enter_context(open_columns(path, form, entry.topic, held))
+            name: stack.enter_context(format_of(path).columns(path, opening))
             for name, path in entry.tables.items()
         }
         layout = _layout(description, entry.name, joint_columns(description, joint_names, tables))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from psdmc.calibration.description.table import Reading, Table
-from psdmc.calibration.logs.table_text import SEPARATOR_WORDS, TextForm
+from psdmc.calibration.logs.log_format import TextForm
 from psdmc.calibration.logs.toml_tables import TomlTable, shown
 
+SEPARATOR_WORDS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 MOST_SKIPPED = 10_000
 
 
