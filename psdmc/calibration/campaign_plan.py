@@ -14,13 +14,12 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions, Load
 from psdmc.calibration.logs.formats import WRITTEN
-from psdmc.calibration.motions.allowed import Allowed
+from psdmc.calibration.motions.allowed import Allowed, GivenLimits, bounded
 from psdmc.calibration.motions.allowed_motion import SHARES, TRIES, Try, first_allowed, smaller_boxes
-from psdmc.calibration.motions.excite import Excitation, ExciteOptions, excite
-from psdmc.calibration.motions.excite_poses import motor_poses, unfelt
-from psdmc.calibration.motions.fit_columns import all_columns, inertial_columns
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
-from psdmc.calibration.motions.lead_in import from_rest_to_rest
+from psdmc.calibration.motions.criterion import all_columns, inertial_columns
+from psdmc.calibration.motions.excite import Excitation, excite, motor_poses, unfelt
+from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.limited_sines import from_rest_to_rest
 from psdmc.calibration.motions.looked_at import allowed_of, looked_at
 from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.sweeps import (

@@ -94,8 +94,8 @@ def test_what_does_not_fit_into_memory_is_the_same(
     tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr("psdmc.calibration.logs.formats.text.PIECE_BYTES", 50_000)
-    monkeypatch.setattr("psdmc.calibration.description.in_si.BLOCK_ROWS", 301)
-    monkeypatch.setattr("psdmc.calibration.description.delays.BLOCK_ROWS", 257)
+    monkeypatch.setattr("psdmc.calibration.description.read_described.BLOCK_ROWS", 301)
+    monkeypatch.setattr("psdmc.calibration.description.read_described.BLOCK_ROWS", 257)
     plain = read_log(record(tmp_path / "plain.csv", Run(seed=1, loaded=False, seconds=10.0)))
     write_columns(
         {"time_s": plain.time}
