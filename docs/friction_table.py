@@ -23,7 +23,9 @@ def _row(law: Law) -> str:
     term = Term(law, None if law.number is None else law.number.usual or SAMPLE)
     size = f"s ({term.formula})" if law.against else term.formula
     rows = zip(term.names, term.units(), law.values, strict=True)
-    found = ", ".join(f"`{name}` ({unit}{_bound(value)})" for name, unit, value in rows)
+    found = ", ".join(
+        f"`{name}` ({unit}{_bound(value) if law.state is None else ''})" for name, unit, value in rows
+    )
     cells = (f"`{law.name}`", law.about, size.replace("|", r"\|"), found)
     return f"| {' | '.join(cells)} |"
 
