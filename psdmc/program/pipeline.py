@@ -53,6 +53,10 @@ def last_for_one_state(costs: Costs) -> tuple[Pass, ...]:
 LONGEST = 10
 """Largest number of rounds; two or three are usual."""
 
+LONG, LITTLE = 40_000, 0.01
+"""Instructions from which on a round that saves less than this share of the operations is the last one: behind it, the next
+one saves less than a thousandth of a humanoid's Coriolis matrix."""
+
 
 def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> Program:
     """A PROGRAM with the same outputs in fewer operations, up to rounding, in the order that suits the target; with
@@ -70,7 +74,10 @@ def shortened(program: Program) -> Program:
         shorter = _applied(ROUND, program)
         if shorter is program or (left := _operations(shorter)) >= operations:
             break
+        is_last = len(program) >= LONG and left > (1.0 - LITTLE) * operations
         program, operations = shorter, left
+        if is_last:
+            break
     return program
 
 
