@@ -52,10 +52,10 @@ def external(robot: str, folder: Path, functions: list[str], model: DynamicsMode
     return built(robot, folder)
 
 
-def built(robot: str, folder: Path) -> External:
-    """The functions of a package's folder."""
+def built(robot: str, folder: Path, level: str = "-O1") -> External:
+    """The functions of a package's folder, compiled with this level of optimisation."""
     library = folder / f"lib{robot}_casadi.so"
-    command = [*find_compiler().command, "-std=c99", "-Wall", "-Wextra", "-Werror", "-O1", "-shared", "-fPIC"]
+    command = [*find_compiler().command, "-std=c99", "-Wall", "-Wextra", "-Werror", level, "-shared", "-fPIC"]
     words = [
         *command,
         f"-I{folder}/include",
@@ -257,7 +257,7 @@ def test_casadi_calls_the_functions_of_hyq(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "note: CasADi derivatives are not available for a floating base" in done.stdout
 
-    call = built("hyq", tmp_path / "hyq")
+    call = built("hyq", tmp_path / "hyq", "-O0")
     oracle = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
     data, rng = oracle.createData(), np.random.default_rng(7)
     q = pin.normalize(oracle, rng.uniform(-1.0, 1.0, oracle.nq))
