@@ -74,11 +74,12 @@ _MOVED = {
     "psdmc.derive": "psdmc.derivation",
     "psdmc.calibrate": "psdmc.calibration",
     "psdmc.derivation.functions": "psdmc.derivation.monomials",
+    "psdmc.emit": "psdmc.backends.c",
     "psdmc.model.check": "psdmc.verification.check",
     "psdmc.program.functions": "psdmc.program.signature",
     "psdmc.robot.chain": "psdmc.robot.mechanism",
 }
-"""Packages and modules of psdmc 0.1 that have another name now."""
+"""Packages and modules of psdmc 0.1 and 0.2 that have another name now."""
 
 
 class _Moved:

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from psdmc.backends.c.names import identifier
+from psdmc.backends.c.render import render
 from psdmc.calibration.identify.lugre import PARAMETERS, Lugre, LugreView
-from psdmc.emit.names import identifier
-from psdmc.emit.render import render
 from psdmc.errors import InputError
 
 

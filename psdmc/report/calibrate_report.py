@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from psdmc.atomic import refuse_foreign_file, write_together
+from psdmc.backends.c.render import environment
 from psdmc.calibration.identify.visibility import WEAK
 from psdmc.calibration.motions.excite import Excitation
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.calibration.verdict.said_once import unsaid_warnings
 from psdmc.calibration.verdict.verdict import Verdict
-from psdmc.emit.render import environment
 from psdmc.report.calibrate_plots import excitation_panels, step_panels
 from psdmc.report.calibrate_tables import (
     accuracy_table,
