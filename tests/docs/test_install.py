@@ -95,3 +95,19 @@ def test_what_is_told_to_install_is_enough_for_a_notebook(path: Path) -> None:
         for name in imported(source) - set(sys.stdlib_module_names) - {"psdmc"}:
             needs.add("pin" if name == "pinocchio" else distributions[name][0].lower())
         assert needs <= brought
+
+
+def test_no_system_is_claimed_that_tests_do_not_run_on() -> None:
+    """The metadata name Linux alone, and a page that names macOS says somewhere that it was not tried."""
+    systems = [word for word in PROJECT["classifiers"] if word.startswith("Operating System")]
+    assert systems == ["Operating System :: POSIX :: Linux"]
+    pages = [
+        ROOT / "README.md",
+        *(page for page in (ROOT / "docs").rglob("*.md") if page.parent.name != "decisions"),
+    ]
+    named = {page.name: page.read_text(encoding="utf-8") for page in pages}
+    named = {name: text for name, text in named.items() if "macOS" in text}
+    assert "install.md" in named
+    assert [
+        name for name, text in named.items() if not re.search(r"macOS[^.|]* not (tested|tried)", text)
+    ] == []
