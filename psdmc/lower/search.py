@@ -230,20 +230,21 @@ class Search:
         return min(self.rearrangements(recipe, found), key=scoring.score)
 
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
-        """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes. All
-        others are only counted, those like the found one's first, and no more than have OPERATIONS together."""
+        """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes; of a robot
+        of more than MANY_JOINTS joints the latter alone, which its long functions share. All others are only counted, those
+        like the found one's first, and no more than have OPERATIONS together."""
         choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}
-        left = OPERATIONS if found.n <= MANY_JOINTS else OPERATIONS_OF_LARGE
+        is_usual = found.n <= MANY_JOINTS
+        left = OPERATIONS if is_usual else OPERATIONS_OF_LARGE
+        targets = (self.single, self.batch) if is_usual else (self.batch,)
         for k in sorted(range(len(choices)), key=lambda k: _changes(choices[k].choices, found.choices)):
             costs[k] = self.cost(recipe, choices[k])
             left -= costs[k].total
             if left < costs[k].total:
                 break
         tried = sorted(costs)
-        for best in sorted(
-            {min(tried, key=lambda k: scoring.weight(costs[k])) for scoring in (self.single, self.batch)}
-        ):
+        for best in sorted({min(tried, key=lambda k: target.weight(costs[k])) for target in targets}):
             yield trace_dynamics(recipe, choices[best], self.robot)
 
     def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
