@@ -34,7 +34,7 @@ def told(command: str) -> set[str]:
     """Distributions that `pip install COMMAND` brings beside psdmc's own."""
     found: set[str] = set(named(PROJECT["dependencies"]))
     for word in command.replace("'", "").split():
-        extras = re.fullmatch(r"psdmc\[([\w,]+)\]", word)
+        extras = re.fullmatch(r"(?:psdmc|\.)\[([\w,]+)\]", word)
         found |= (
             {name for extra in extras[1].split(",") for name in named(EXTRAS[extra])}
             if extras
@@ -85,7 +85,8 @@ def test_extras_that_documents_name_exist() -> None:
 @pytest.mark.parametrize("path", slow_but_for(NOTEBOOKS[:1], NOTEBOOKS), ids=lambda path: path.stem)
 def test_what_is_told_to_install_is_enough_for_a_notebook(path: Path) -> None:
     command = re.search(
-        r"`pip install ('psdmc\[[^`]*jupyterlab)`", (ROOT / "examples" / "README.md").read_text("utf-8")
+        r"pip install ('(?:psdmc|\.)\[[^`\n]*jupyterlab)",
+        (ROOT / "examples" / "README.md").read_text("utf-8"),
     )
     assert command
     brought = told(command[1])

@@ -280,7 +280,7 @@ def test_the_command_says_what_it_read_back(arm: DynamicsModel, tmp_path: Path, 
 
 
 def test_outputs_that_would_overwrite_something(arm: DynamicsModel, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the MJCF goes there"):
+    with pytest.raises(InputError, match="psdmc writes the MJCF to this file"):
         psdmc.export_urdf(arm, tmp_path / "robot.xml", mjcf=True)
     with pytest.raises(InputError, match="No such file or directory"):
         psdmc.export_urdf(arm, tmp_path / "missing" / "robot.urdf")
