@@ -110,10 +110,7 @@ def test_one_vector_costs_less_than_theta_moved_alone(arm, runs: Runs):
     def cost(theta: np.ndarray, joints: dict) -> float:
         gravity, inertial, split = found.gravity.estimate, found.inertial.estimate, found.gravity.split
         phi = theta[split.pivots] + split.dependence @ theta[split.rest] - gravity.values
-        seven = [
-            joints[k].friction.as_array() - old.friction.as_array()
-            for k, old in found.friction.joints.items()
-        ]
+        seven = [joints[k].friction - old.friction for k, old in found.friction.joints.items()]
         sources = np.concatenate([np.zeros(2), phi, *seven])
         psi = theta[split.rest] - inertial.values - inertial.considered @ sources
         own = sum(
