@@ -20,7 +20,7 @@ def random_program(seed: int, length: int = 60) -> Program:
     body = [Instr(Op.LOAD, slot=Slot(vector, i)) for vector in ("q", "qd") for i in range(3)]
     body += [Instr(Op.CONST, value=value) for value in (0.0, 1.0, -1.0, 2.5, -0.3)]
     rare = {
-        op: 1 for op in Op if op.arity and op not in (Op.DIV, Op.SQRT, Op.EXP)
+        op: 1 for op in Op if op.arity and op not in (Op.DIV, Op.SQRT, Op.EXP, Op.LOG, Op.POW)
     }  # these overflow or are NaN
     weights = rare | {Op.ADD: 10, Op.SUB: 10, Op.MUL: 16, Op.NEG: 4, Op.SIN: 2, Op.COS: 2}
     for _ in range(length):
