@@ -16,15 +16,16 @@ PACKAGE = Path(__file__).parent.parent / "psdmc"
 MAY_IMPORT = {
     "robot": set(),
     "dynamics": {"robot"},
-    "model": {"robot", "dynamics"},
+    "model": {"robot", "dynamics", "friction"},
     "derivation": {"robot", "dynamics", "model"},
     "target": set(),
     "program": {"target"},
+    "friction": {"program"},
     "recipes": {"robot", "dynamics", "model", "program"},
     "functions": {"robot", "dynamics", "model", "program", "recipes"},
     "verification": {"robot", "dynamics", "model", "program", "recipes", "functions"},
     "lower": {"robot", "dynamics", "model", "program", "recipes", "functions", "target"},
-    "backends": {"robot", "program", "model", "recipes", "functions", "target"},
+    "backends": {"robot", "program", "friction", "model", "recipes", "functions", "target"},
     "toolchain": {"robot", "backends", "program", "functions", "target"},
 }
 MAY_IMPORT["model_functions"] = set(MAY_IMPORT) - {"derivation", "verification"}
@@ -32,7 +33,7 @@ LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {
     "bench": LEFT_OF_TOOLS | {"lower"},
     "calibration": LEFT_OF_TOOLS,
-    "export": {"robot", "dynamics", "model", "calibration"},
+    "export": {"robot", "dynamics", "model", "friction", "calibration"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
     "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
@@ -48,6 +49,7 @@ OUTSIDE = {
     "derivation": {"numpy", "scipy"},
     "verification": {"numpy"},
     "program": {"numpy"},
+    "friction": {"numpy"},
     "recipes": {"numpy"},
     "functions": {"numpy", "pinocchio"},
     "lower": {"numpy", "scipy"},

@@ -45,7 +45,6 @@ DECISIONS = {
     "derivation/from_callable.py": "an independent derivation that only tests run",
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",
-    "model/linear_friction.py": "a calibration's friction, which no model file of derive has",
     "functions/regressor_slotine_li.py": "Pinocchio's side of a comparison",
     "functions/frame_velocity_derivatives.py": "Pinocchio's side of a comparison",
     "lower/carriers.py": "thresholds with margins of decades",

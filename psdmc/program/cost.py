@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from psdmc.program.operations import Unit
 from psdmc.program.program import Op, Program
-
-_ADD, _SUB, _MUL, _DIV, _NEG, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SIN, Op.COS
-_SQRT = Op.SQRT
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +17,8 @@ class Cost:
     fused   multiplications that a fused multiply-add can absorb: used once, by an addition or subtraction, each of which
             absorbs one
     sincos  distinct angles whose sine or cosine is taken
+    choice  minima, maxima, magnitudes and selections
+    call    elementary functions of the C library
     """
 
     mul: int
@@ -26,6 +27,8 @@ class Cost:
     neg: int
     sincos: int
     fused: int
+    choice: int = 0
+    call: int = 0
 
     @property
     def total(self) -> int:
@@ -34,25 +37,37 @@ class Cost:
 
     def __str__(self) -> str:
         extra = f" + {self.div} div" if self.div else ""
-        return f"{self.mul} mul + {self.add} add{extra} + {self.sincos} sincos"
+        further = ((self.choice, "choice"), (self.call, "call"))
+        more = "".join(f" + {count} {word}" for count, word in further if count)
+        return f"{self.mul} mul + {self.add} add{extra} + {self.sincos} sincos{more}"
 
 
 def cost(program: Program) -> Cost:
     """Operations of the PROGRAM by kind; `fused` counts the sums of which a term is a product without another use."""
     body, uses = program.body, program.uses()
-    mul = add = div = neg = fused = 0
+    count = dict.fromkeys(Unit, 0)
+    fused = 0
     angles: set[int] = set()
     for op, args, _, _ in body:
-        if op is _MUL:
-            mul += 1
-        elif op is _ADD or op is _SUB:
-            add += 1
+        unit = op.unit
+        count[unit] += 1
+        if unit is Unit.ADD:
             a, b = args
-            fused += (uses[a] == 1 and body[a][0] is _MUL) or (uses[b] == 1 and body[b][0] is _MUL)
-        elif op is _DIV or op is _SQRT:
-            div += 1
-        elif op is _NEG:
-            neg += 1
-        elif op is _SIN or op is _COS:
+            fused += (uses[a] == 1 and body[a][0] is Op.MUL) or (uses[b] == 1 and body[b][0] is Op.MUL)
+        elif unit is Unit.SINCOS:
             angles.add(args[0])
-    return Cost(mul, add, div, neg, len(angles), fused)
+    return counted(count, len(angles), fused)
+
+
+def counted(count: Mapping[Unit, int], angles: int, fused: int) -> Cost:
+    """The cost of so many operations by unit."""
+    return Cost(
+        count[Unit.MUL],
+        count[Unit.ADD],
+        count[Unit.DIV],
+        count[Unit.NEG],
+        angles,
+        fused,
+        count[Unit.CHOICE],
+        count[Unit.CALL],
+    )

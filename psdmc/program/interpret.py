@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.program.program import Op, Program
-from psdmc.reproducible import cosine, sine
+from psdmc.program.program import Program
 
 Array = NDArray[np.float64]
-
-_FUNCTIONS: dict[Op, Callable[..., Array]] = {
-    Op.ADD: np.add,
-    Op.SUB: np.subtract,
-    Op.MUL: np.multiply,
-    Op.DIV: np.divide,
-    Op.NEG: np.negative,
-    Op.SIN: sine,
-    Op.COS: cosine,
-    Op.SQRT: np.sqrt,
-}
 
 
 def interpret(program: Program, inputs: Mapping[str, Array], sizes: Mapping[str, int]) -> dict[str, Array]:
@@ -38,7 +26,7 @@ def interpret(program: Program, inputs: Mapping[str, Array], sizes: Mapping[str,
         elif instr.value is not None:
             values.append(np.float64(instr.value))  # type: ignore[arg-type]
         else:
-            values.append(_FUNCTIONS[instr.op](*(values[a] for a in instr.args)))
+            values.append(instr.op(*(values[a] for a in instr.args)))
     out = {name: np.zeros((*shape, size)) for name, size in sizes.items()}
     for slot, index in program.outputs:
         out[slot.vector][..., slot.index] = values[index]

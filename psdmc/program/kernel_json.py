@@ -10,10 +10,9 @@ from psdmc.errors import InternalError
 from psdmc.program.check import check
 from psdmc.program.kernel import Kernel
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Spread, Stage
+from psdmc.program.operations import BY_WORD
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.signature import Signature
-
-_OPERATIONS = {op.value: op for op in Op}
 
 FORMAT = 4
 """Version of the text's form."""
@@ -111,7 +110,7 @@ def _program_from_plain(plain: Any) -> Program:
         return slots.setdefault((vector, index), Slot(vector, index))
 
     def instruction(word: str, *rest: Any) -> Instr:
-        op = _OPERATIONS[word]
+        op = BY_WORD[word]
         if op is Op.LOAD:
             return Instr(op, slot=slot_of(*rest))
         return Instr(op, value=float(rest[0])) if op is Op.CONST else Instr(op, rest)

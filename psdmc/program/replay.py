@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from psdmc.errors import InternalError
-from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.program import Program, Slot
 from psdmc.program.trace import Number, Symbol, Tracer
-from psdmc.reproducible import cosine, sine
 
 Value = Symbol | Number
 
@@ -20,8 +18,10 @@ def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> l
         if instr.slot is not None:
             found = given.get(instr.slot)
             values.append(tracer.symbol(instr.slot) if found is None else found)
+        elif instr.value is not None:
+            values.append(instr.value)
         else:
-            values.append(_value(instr, values))
+            values.append(instr.op(*(values[a] for a in instr.args)))
     return [values[index] for _, index in program.outputs]
 
 
@@ -33,25 +33,3 @@ def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequen
         raise InternalError("only inputs can be replaced")
     program = tracer.finish([(Slot("value", i), value) for i, value in enumerate(values)])
     return replayed(program, tracer, dict(zip(slots, given, strict=True)))
-
-
-def _value(instr: Instr, values: Sequence[Value]) -> Value:
-    if instr.value is not None:
-        return instr.value
-    a = values[instr.args[0]]
-    if instr.op in (Op.SIN, Op.COS):
-        return _sincos(a)[0 if instr.op is Op.SIN else 1]
-    if instr.op is Op.NEG:
-        return -a
-    if instr.op is Op.SQRT:
-        return a.root() if isinstance(a, Symbol) else math.sqrt(a)
-    b = values[instr.args[1]]
-    if instr.op is Op.ADD:
-        return a + b
-    if instr.op is Op.SUB:
-        return a - b
-    return a * b if instr.op is Op.MUL else a / b
-
-
-def _sincos(angle: Value) -> tuple[Value, Value]:
-    return angle.sincos() if isinstance(angle, Symbol) else (float(sine(angle)), float(cosine(angle)))

@@ -62,7 +62,7 @@ def test_constants_come_back_bit_for_bit(value: float):
     [
         lambda text: text[: len(text) // 2],
         lambda text: text.replace('"format":4', '"format":3'),
-        lambda text: text.replace('"mul"', '"pow"'),
+        lambda text: text.replace('"mul"', '"hypot"'),
         lambda text: text.replace('"gravity"', '"weight"'),
         lambda text: text.replace('["mul",2,1]', '["mul",2,9]'),
         lambda text: text.replace('["mul",2,1]', '["mul",2]'),

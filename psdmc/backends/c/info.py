@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.backends.c.bodies import BodiesMap, bodies_map
+from psdmc.friction.joints import Friction
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter
-from psdmc.model.linear_friction import LinearFriction, linear_friction
+from psdmc.model.linear_friction import linear_friction
 from psdmc.model.payload import load_map
 from psdmc.program.signature import Sizes
 from psdmc.robot.mechanism import BASE_FRAME, Mechanism
@@ -91,7 +92,7 @@ class PackageInfo:
     payload: tuple[NDArray[np.float64], ...] = ()
     followers: tuple[str, ...] = ()
     units: tuple[tuple[int, int], ...] = ()
-    friction: LinearFriction | None = None
+    friction: Friction | None = None
     bodies: BodiesMap | None = None
     q_names: tuple[str, ...] = ()
     v_names: tuple[str, ...] = ()

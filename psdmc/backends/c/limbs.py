@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from psdmc.backends.c.body import make_body
 from psdmc.backends.c.c_expr import literal
@@ -269,7 +269,4 @@ def _after(stage: Stage, group: LimbGroup) -> Iterator[str]:
 
 def _whole_cost(limbs: LimbProgram) -> Cost:
     costs = [cost(stage.program) for stage in limbs.stages]
-    mul, add, div, neg, sincos, fused = (
-        sum(getattr(each, name) for each in costs) for name in ("mul", "add", "div", "neg", "sincos", "fused")
-    )
-    return Cost(mul, add, div, neg, sincos, fused)
+    return Cost(*(sum(getattr(each, part.name) for each in costs) for part in fields(Cost)))

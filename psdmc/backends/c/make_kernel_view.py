@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from psdmc.backends.c.body import make_body
+from psdmc.backends.c.c_expr import is_call
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
 from psdmc.backends.c.limbs import LimbsView, limbs_view
 from psdmc.backends.c.lines import Body
@@ -16,7 +17,7 @@ from psdmc.errors import InternalError
 from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
 from psdmc.program.products import LARGE
-from psdmc.program.program import Program
+from psdmc.program.program import Op, Program
 from psdmc.program.signature import Quantity, Signature, Sizes
 
 
@@ -102,7 +103,7 @@ TAKEN = {
         "NAME",
         "SPLAT",
         "SINCOS",
-        "SQRT",
+        *(op.upper() for op in Op if is_call(op)),
         "LANES",
         "WIDTH",
         "real",

@@ -61,11 +61,12 @@ def library_files(package: PackageView) -> dict[str, str]:
     }
     if package.products:
         named["src/products.h"] = "products.h.jinja"
-    if package.has_roots:
-        named["src/roots.h"] = "roots.h.jinja"
+    named |= {f"src/{header}": f"{header}.jinja" for header in package.call_headers}
     files = {path: render(template, package=package) for path, template in named.items()}
     for vector in package.vectors.of_limbs:
-        files[f"src/{vector.name}.h"] = render("limbs.h.jinja", package=package, limbs=vector)
+        files[f"src/{vector.name}.h"] = render(
+            "limbs.h.jinja", package=package, limbs=vector, calls=package.limb_calls(vector.count)
+        )
     for function in package.functions:
         for unit in function.units:
             files[f"src/{unit.name}.c"] = render(_template(package, unit), package=package, function=unit)
