@@ -33,6 +33,11 @@ class FunctionView:
         return any(kernel.pivot_order for kernel in self.kernels)
 
     @property
+    def is_regions(self) -> bool:
+        """Whether it is made of loops and calls."""
+        return any(kernel.regions for kernel in self.kernels)
+
+    @property
     def products(self) -> tuple[Multiplication, ...]:
         """Those of all kernels."""
         return tuple(p for kernel in self.kernels for p in kernel.single_body.products)

@@ -219,7 +219,9 @@ class PackageView:
     def calls(self) -> tuple[CallView, ...]:
         """Operations of some kernel that are macros."""
         bodies = [body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body)]
-        return call_views(frozenset(op for body in bodies for op in body.calls))
+        found = {op for body in bodies for op in body.calls}
+        found |= {op for kernel in self.kernels if kernel.regions for op in kernel.regions.calls}
+        return call_views(frozenset(found))
 
     def limb_calls(self, count: int) -> tuple[CallView, ...]:
         """Those of some stage of so many limbs."""
