@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from psdmc.errors import InternalError
+from psdmc.program.interpret import evaluated
 from psdmc.program.passes.drop_unused import drop_unused
 from psdmc.program.program import Program, Slot
 from psdmc.program.trace import Symbol, Tracer
@@ -251,21 +252,16 @@ def _run(
 
 
 def _run_straight(program: Program, places: Mapping[str, _Place]) -> None:
-    values: list[Scalar] = []
-    for instr in program.body:
-        if instr.slot is not None:
-            place = places[instr.slot.vector]
-            value = place.values[place.first + instr.slot.index]
-            if value is None:
-                raise InternalError(f"{instr.slot} is read before it is written")
-            values.append(value)
-        elif instr.value is not None:
-            values.append(instr.value)
-        else:
-            values.append(instr.op(*(values[a] for a in instr.args)))
-    for slot, index in program.outputs:
+    def load(slot: Slot) -> Scalar:
         place = places[slot.vector]
-        place.values[place.first + slot.index] = values[index]
+        value = place.values[place.first + slot.index]
+        if value is None:
+            raise InternalError(f"{slot} is read before it is written")
+        return value
+
+    for slot, value in evaluated(program, load):
+        place = places[slot.vector]
+        place.values[place.first + slot.index] = value
 
 
 def _run_call(call: Call, places: Mapping[str, _Place], caller: Caller, pivots: list[Scalar]) -> None:

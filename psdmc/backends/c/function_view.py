@@ -30,7 +30,7 @@ class FunctionView:
 
     @property
     def has_pivots(self) -> bool:
-        return any(kernel.pivot_order for kernel in self.kernels)
+        return any(kernel.pivot_order or (kernel.regions and kernel.positive) for kernel in self.kernels)
 
     @property
     def is_regions(self) -> bool:

@@ -198,7 +198,7 @@ class PackageView:
     @property
     def fails_in_several(self) -> bool:
         """Whether some kernel that fails sets more than one vector of all joints to NaN."""
-        return any(kernel.positive and not kernel.fails_alone for kernel in self.kernels)
+        return any(k.positive and not (k.fails_alone and k.regions is None) for k in self.kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
