@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from psdmc.program.operations import Unit
 from psdmc.program.program import Op, Program
+
+_ADD, _SUB, _MUL, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.SIN, Op.COS
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,29 +48,25 @@ class Cost:
 def cost(program: Program) -> Cost:
     """Operations of the PROGRAM by kind; `fused` counts the sums of which a term is a product without another use."""
     body, uses = program.body, program.uses()
-    count = dict.fromkeys(Unit, 0)
-    fused = 0
+    mul = add = fused = 0
+    others: list[Op] = []
     angles: set[int] = set()
     for op, args, _, _ in body:
-        unit = op.unit
-        count[unit] += 1
-        if unit is Unit.ADD:
+        if op is _MUL:
+            mul += 1
+        elif op is _ADD or op is _SUB:
+            add += 1
             a, b = args
-            fused += (uses[a] == 1 and body[a][0] is Op.MUL) or (uses[b] == 1 and body[b][0] is Op.MUL)
-        elif unit is Unit.SINCOS:
+            fused += (uses[a] == 1 and body[a][0] is _MUL) or (uses[b] == 1 and body[b][0] is _MUL)
+        elif op is _SIN or op is _COS:
             angles.add(args[0])
-    return counted(count, len(angles), fused)
+        elif args:
+            others.append(op)
+    return counted(others, mul, add, len(angles), fused)
 
 
-def counted(count: Mapping[Unit, int], angles: int, fused: int) -> Cost:
-    """The cost of so many operations by unit."""
-    return Cost(
-        count[Unit.MUL],
-        count[Unit.ADD],
-        count[Unit.DIV],
-        count[Unit.NEG],
-        angles,
-        fused,
-        count[Unit.CHOICE],
-        count[Unit.CALL],
-    )
+def counted(others: Iterable[Op], mul: int, add: int, sincos: int, fused: int) -> Cost:
+    """The cost of so many products, sums and angles, and of other operations by their units."""
+    units = Counter(op.unit for op in others)
+    rest = (units[Unit.DIV], units[Unit.NEG], sincos, fused, units[Unit.CHOICE], units[Unit.CALL])
+    return Cost(mul, add, *rest)

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from psdmc.errors import InternalError
 from psdmc.program.cost import Cost, cost, counted
 from psdmc.program.limb_program import LimbGroup, LimbProgram
-from psdmc.program.operations import Unit
 from psdmc.program.program import Op, Slot
 from psdmc.program.trace import Step, arguments_of
 
 _LOAD, _CONST, _MUL = Op.LOAD, Op.CONST, Op.MUL
+_ADD, _SUB, _SIN, _COS = Op.ADD, Op.SUB, Op.SIN, Op.COS
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,13 +93,14 @@ def _needed(
 class _Stage:
     """Counts of a stage.
 
-    count   its operations by unit
+    others  its operations but products, sums and sines
     added   arguments of its sums and differences
     angles  whose sine or cosine is taken
     shared  core's values that it reads
     """
 
-    count: dict[Unit, int] = field(default_factory=lambda: dict.fromkeys(Unit, 0))
+    mul: int = 0
+    others: list[Op] = field(default_factory=list)
     sums: int = 0
     added: list[tuple[int, int]] = field(default_factory=list)
     angles: set[int] = field(default_factory=set)
@@ -154,11 +155,14 @@ class _Count:
             stage = self._stage(place)
             for argument in arguments:
                 self._read(argument, place)
-            stage.count[op.unit] += 1
-            if op.unit is Unit.ADD:
+            if op is _MUL:
+                stage.mul += 1
+            elif op is _ADD or op is _SUB:
                 stage.added.append((a, b))
-            elif op.unit is Unit.SINCOS:
+            elif op is _SIN or op is _COS:
                 stage.angles.add(a)
+            else:
+                stage.others.append(op)
 
     def _load(self, i: int, slot: Slot) -> None:
         summed = self.partial_of.get(i)
@@ -209,7 +213,7 @@ class _Count:
     def _cost(self, place: int) -> StageCost:
         stage, group = self.stages[place], place % self.kinds
         fused = sum(self._absorbs(a, place) or self._absorbs(b, place) for a, b in stage.added)
-        own = counted(stage.count, len(stage.angles), fused)
+        own = counted(stage.others, stage.mul, len(stage.added), len(stage.angles), fused)
         return StageCost(group - 1 if group else None, own, len(stage.shared), stage.sums)
 
     def _absorbs(self, value: int, place: int) -> bool:

@@ -180,27 +180,30 @@ class Op(StrEnum):
     arity: int
     unit: Unit
     operation: Operation
+    numbers: Callable[..., Any]
+    written: bool
 
     def __new__(cls, word: str, operation: Operation) -> Op:
         op = str.__new__(cls, word)
         op._value_ = word
         op.operation, op.arity, op.unit = operation, operation.arity, operation.unit
+        op.numbers, op.written = operation.numbers, operation.written
         return op
 
     def __call__(self, *arguments: Scalar) -> Scalar:
         """The operation's value; recorded where an argument is a symbol."""
-        if not self.operation.written:
+        if not self.written:
             for argument in arguments:
                 if hasattr(argument, "operated"):
                     found = argument.operated(self, arguments)
                     if found is not NotImplemented:
                         return found
-        return self.operation.numbers(*arguments)
+        return self.numbers(*arguments)
 
     def of_numbers(self, values: Sequence[float]) -> float | None:
         """The value of numbers; None where it is not finite, and no constant."""
         with np.errstate(all="ignore"):
-            value = float(self.operation.numbers(*map(np.float64, values)))
+            value = float(self.numbers(*map(np.float64, values)))
         return value if math.isfinite(value) else None
 
 

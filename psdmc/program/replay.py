@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from psdmc.errors import InternalError
+from psdmc.program.interpret import evaluated
 from psdmc.program.program import Program, Slot
 from psdmc.program.trace import Number, Symbol, Tracer
 
@@ -13,16 +14,12 @@ Value = Symbol | Number
 
 def replayed(program: Program, tracer: Tracer, given: Mapping[Slot, Value]) -> list[Value]:
     """The PROGRAM's outputs, in its order, with these values for its inputs. Inputs that are not given stay inputs."""
-    values: list[Value] = []
-    for instr in program.body:
-        if instr.slot is not None:
-            found = given.get(instr.slot)
-            values.append(tracer.symbol(instr.slot) if found is None else found)
-        elif instr.value is not None:
-            values.append(instr.value)
-        else:
-            values.append(instr.op(*(values[a] for a in instr.args)))
-    return [values[index] for _, index in program.outputs]
+
+    def load(slot: Slot) -> Value:
+        found = given.get(slot)
+        return tracer.symbol(slot) if found is None else found
+
+    return [value for _, value in evaluated(program, load)]
 
 
 def substituted(values: Sequence[Value], inputs: Sequence[Symbol], given: Sequence[Value]) -> list[Value]:

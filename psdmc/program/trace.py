@@ -16,7 +16,6 @@ from typing import Any
 
 from psdmc.program.cost import Cost, counted
 from psdmc.program.lanes import Lanes
-from psdmc.program.operations import Unit
 from psdmc.program.program import Instr, Op, Program, Slot, operation
 
 Number = float | int
@@ -147,30 +146,34 @@ class Tracer:
         steps, uses = self.steps, [0] * len(self.steps)
         for _, index in stored:
             uses[index] += 1
-        count = dict.fromkeys(Unit, 0)
-        fused = 0
+        mul = fused = 0
         sums: list[Step] = []
+        others: list[Op] = []
         angles: set[int] = set()
         for used, step in zip(reversed(uses), reversed(steps), strict=True):
             if not used:  # by what lies behind: it has been counted
                 continue
             op, a, b = step
-            unit = op.unit
-            count[unit] += 1
             if b is not None:
                 uses[a] += 1
                 uses[b] += 1
-                if unit is Unit.ADD:
+                if op is _MUL:
+                    mul += 1
+                elif op is _ADD or op is _SUB:
                     sums.append(step)
-            else:
+                else:
+                    others.append(op)
+            elif op is not _LOAD and op is not _CONST:
                 for argument in arguments_of(step):
                     uses[argument] += 1
-                if unit is Unit.SINCOS:
+                if op is _SIN or op is _COS:
                     angles.add(a)
+                else:
+                    others.append(op)
         for _, a, b in sums:
             if (uses[a] == 1 and steps[a][0] is _MUL) or (uses[b] == 1 and steps[b][0] is _MUL):
                 fused += 1
-        return counted(count, len(angles), fused)
+        return counted(others, mul, len(sums), len(angles), fused)
 
     def stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
         """The outputs with the indices of their values, recorded where they are constants or negative."""

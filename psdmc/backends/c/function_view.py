@@ -30,7 +30,12 @@ class FunctionView:
 
     @property
     def has_pivots(self) -> bool:
-        return any(kernel.pivot_order for kernel in self.kernels)
+        return any(kernel.pivot_order or (kernel.regions and kernel.positive) for kernel in self.kernels)
+
+    @property
+    def is_regions(self) -> bool:
+        """Whether it is made of loops and calls."""
+        return any(kernel.regions for kernel in self.kernels)
 
     @property
     def products(self) -> tuple[Multiplication, ...]:

@@ -46,17 +46,6 @@ class JointInfo:
 
 
 @dataclass(frozen=True, slots=True)
-class JointPlace:
-    """A joint type's word, numbers of coordinates and rates, and where these begin in q and in the rates."""
-
-    kind: str
-    nq: int
-    nv: int
-    at: int
-    way: int
-
-
-@dataclass(frozen=True, slots=True)
 class PackageInfo:
     """One robot's metadata for header, manifest and README.
 
@@ -122,16 +111,6 @@ class PackageInfo:
     def is_wide(self) -> bool:
         """Whether some joint has several coordinates, so that q, rates and tables of joints differ in length."""
         return any(joint.nq > 1 for joint in self.joints)
-
-    @property
-    def places(self) -> tuple[JointPlace, ...]:
-        """Where each joint's coordinates and rates are."""
-        found: list[JointPlace] = []
-        at = way = 0
-        for joint in self.joints:
-            found.append(JointPlace(joint.kind, joint.nq, joint.nv, at, way))
-            at, way = at + joint.nq, way + joint.nv
-        return tuple(found)
 
     @property
     def is_tree(self) -> bool:

@@ -12,6 +12,7 @@ from psdmc.backends.c.lines import Body
 from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.parts import body_in_parts, is_long
 from psdmc.backends.c.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
+from psdmc.backends.c.regions import regions_view
 from psdmc.backends.c.store_groups import GROUP
 from psdmc.errors import InternalError
 from psdmc.program.cost import cost
@@ -33,13 +34,16 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
             q.name,
             sizes.size(q),
             sizes.shape(q.axes),
-            has_lanes and not function.calls and _is_direct(q, sizes),
+            has_lanes and kernel.regions is None and _is_direct(q, sizes),
             () if kernel.is_loop_of_calls else _zero(q, kernel.single, sizes),
         )
         for q in function.outputs
     )
-    if function.calls:
+    suffix = "f" if options.c_real == "float" else ""
+    regions = None
+    if kernel.regions is not None:
         single_body = lanes_body = Body((), ())
+        regions = regions_view(kernel.regions, kernel.inputs, robot, kernel.theta, suffix)
     else:
         single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
     shared = single_body == lanes_body
@@ -63,6 +67,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         lowering=kernel.lowering,
         limbs=_limbs(kernel, sizes, options),
         places=kernel.places,
+        regions=regions,
     )
 
 

@@ -193,7 +193,7 @@ class PackageView:
     @property
     def fails_in_several(self) -> bool:
         """Whether some kernel that fails sets more than one vector of all joints to NaN."""
-        return any(kernel.positive and not kernel.fails_alone for kernel in self.kernels)
+        return any(k.positive and not (k.fails_alone and k.regions is None) for k in self.kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
@@ -214,7 +214,9 @@ class PackageView:
     def calls(self) -> tuple[CallView, ...]:
         """Operations of some kernel that are macros."""
         bodies = [body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body)]
-        return call_views(frozenset(op for body in bodies for op in body.calls))
+        found = {op for body in bodies for op in body.calls}
+        found |= {op for kernel in self.kernels if kernel.regions for op in kernel.regions.calls}
+        return call_views(frozenset(found))
 
     def limb_calls(self, count: int) -> tuple[CallView, ...]:
         """Those of some stage of so many limbs."""

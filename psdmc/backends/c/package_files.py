@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from psdmc.backends.c.adapters import ADAPTERS
-from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.c.manifest import manifest
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
@@ -69,9 +68,11 @@ def library_files(package: PackageView) -> dict[str, str]:
         )
     for function in package.functions:
         for unit in function.units:
-            files[f"src/{unit.name}.c"] = render(_template(package, unit), package=package, function=unit)
+            files[f"src/{unit.name}.c"] = render(
+                "regions.c.jinja" if unit.is_regions else "function.c.jinja", package=package, function=unit
+            )
         for kernel in function.kernels:
-            if kernel.called:
+            if kernel.regions:
                 continue
             bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
             for file, body in bodies.items():
@@ -89,12 +90,6 @@ def library_files(package: PackageView) -> dict[str, str]:
     if package.info.friction:
         files["src/friction.c"] = render("friction.c.jinja", package=package)
     return files
-
-
-def _template(package: PackageView, function: FunctionView) -> str:
-    if not function.signature.calls:
-        return "function.c.jinja"
-    return "stages_wide.c.jinja" if package.info.is_wide else "stages.c.jinja"
 
 
 def _build_files(package: PackageView) -> tuple[tuple[str, str], ...]:
