@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from weakref import WeakValueDictionary
 
 from psdmc.backends.c.adapters import chosen, with_needed
-from psdmc.backends.c.info import package_info
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.c.reference_load import reference_load
-from psdmc.backends.c.reference_states import reference_states
-from psdmc.backends.c.write import Changes, require_own_folder, write_package
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.reference_load import reference_load
+from psdmc.backends.reference_states import reference_states
+from psdmc.backends.write import Changes, require_own_folder, write_package
 from psdmc.errors import InputError
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted

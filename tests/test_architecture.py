@@ -102,7 +102,18 @@ ROOMS = {
         },  # paths that it is given: 0117
     },
     "lower": {"expanded": set()},
-    "backends": {"c": set()},
+    "backends": {
+        "c": {
+            "bodies",
+            "info",
+            "manifest",
+            "options",
+            "own_files",
+            "reference_load",
+            "reference_states",
+            "write",
+        }
+    },
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 

@@ -295,7 +295,7 @@ def emit_c(
     from psdmc import compiler
     from psdmc.backends.c.adapters import lacking
     from psdmc.backends.c.names import identifier
-    from psdmc.backends.c.write import require_own_folder
+    from psdmc.backends.write import require_own_folder
     from psdmc.cli.one_line import one_line
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
@@ -367,7 +367,7 @@ def build(
 
 def _after_building(package: Path) -> str:
     """The command that puts a built package to use: installed for its user; compiled for the board that it is made for."""
-    from psdmc.backends.c.own_files import target_of
+    from psdmc.backends.own_files import target_of
 
     target = PRESETS.get(target_of(package) or "")
     if target is not None and target.tools:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.bodies import BodiesMap
-from psdmc.backends.c.options import CReal
+from psdmc.backends.bodies import BodiesMap
 from psdmc.backends.c.prototypes import Prototype, bodies_prototype
 from psdmc.backends.c.tables import number
+from psdmc.backends.options import CReal
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.info import JointInfo, PackageInfo
-from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.info import JointInfo, PackageInfo
+from psdmc.backends.options import EmitOptions
 from psdmc.program.signature import Signature
 from psdmc.robot.mechanism import BASE_FRAME
 from psdmc.target.native import NATIVE

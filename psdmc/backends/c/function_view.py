@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.make_kernel_view import make_kernel_view, sizes_of
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.products import Multiplication
+from psdmc.backends.options import EmitOptions
 from psdmc.errors import InternalError
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Signature, Sizes, in_order

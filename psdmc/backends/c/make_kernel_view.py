@@ -8,10 +8,10 @@ from psdmc.backends.c.body import make_body
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
 from psdmc.backends.c.limbs import LimbsView, limbs_view
 from psdmc.backends.c.lines import Body
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.parts import body_in_parts, is_long
 from psdmc.backends.c.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
 from psdmc.backends.c.store_groups import GROUP
+from psdmc.backends.options import EmitOptions
 from psdmc.errors import InternalError
 from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel

@@ -12,21 +12,21 @@ from psdmc.backends.c.cpp import CppClass, cpp_classes
 from psdmc.backends.c.describe import description, uses_frames
 from psdmc.backends.c.friction import FrictionView
 from psdmc.backends.c.function_view import FunctionView, function_views
-from psdmc.backends.c.info import PackageInfo
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.names import identifier
-from psdmc.backends.c.options import CReal, EmitOptions
 from psdmc.backends.c.patterns import Pattern, patterns
 from psdmc.backends.c.payload_view import PayloadView
 from psdmc.backends.c.products import Shape
 from psdmc.backends.c.prototypes import Prototype, friction_prototype
 from psdmc.backends.c.reals import check_range
-from psdmc.backends.c.reference_states import ReferenceStates
 from psdmc.backends.c.references import ReferenceView, reference_view
 from psdmc.backends.c.self_test import given_vectors, labels
 from psdmc.backends.c.self_test_view import SelfTestView
 from psdmc.backends.c.tables import Table, tables
 from psdmc.backends.c.vectors_view import VectorsView
+from psdmc.backends.info import PackageInfo
+from psdmc.backends.options import CReal, EmitOptions
+from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.garbage import collecting_rarely

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from psdmc.backends.c.adapters import ADAPTERS
 from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.manifest import manifest
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
+from psdmc.backends.manifest import manifest
 
 
 def package_files(package: PackageView) -> dict[str, str]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.options import CReal
 from psdmc.backends.c.prototypes import Prototype, payload_prototypes
 from psdmc.backends.c.tables import number
+from psdmc.backends.options import CReal
 
 
 @dataclass(frozen=True, slots=True, eq=False)

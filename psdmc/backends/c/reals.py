@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from psdmc.backends.c.info import PackageInfo
+from psdmc.backends.info import PackageInfo
 from psdmc.errors import InputError
 from psdmc.program.kernel import Kernel
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.reference_load import LoadView, load_view
-from psdmc.backends.c.reference_states import ReferenceStates
 from psdmc.backends.c.self_test import GivenVector
 from psdmc.backends.c.tables import number
+from psdmc.backends.reference_load import LoadView, load_view
+from psdmc.backends.reference_states import ReferenceStates
 
 
 @dataclass(frozen=True, slots=True)

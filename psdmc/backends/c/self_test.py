@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.prototypes import Prototype
+from psdmc.backends.options import EmitOptions
 from psdmc.program.signature import TAU
 
 TOLERANCES = {"float64": "1e-10", "float32": "1e-3"}

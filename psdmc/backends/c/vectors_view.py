@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from psdmc.backends.c.lanes import VectorWidth, vector_widths
 from psdmc.backends.c.limbs import LimbVector, limb_units, limb_vectors
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.trig import (
     ScalarTrig,
     TrigPreamble,
@@ -15,6 +14,7 @@ from psdmc.backends.c.trig import (
     trig_preamble,
     vector_trig,
 )
+from psdmc.backends.options import EmitOptions
 from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES
 
 

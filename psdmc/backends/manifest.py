@@ -10,9 +10,9 @@ from typing import Any
 
 from psdmc.backends.c.describe import option_items
 from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.info import JointInfo, PackageInfo
 from psdmc.backends.c.names import identifier
-from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.info import JointInfo, PackageInfo
+from psdmc.backends.options import EmitOptions
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 

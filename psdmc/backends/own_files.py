@@ -14,7 +14,7 @@ import stat
 from collections.abc import Mapping
 from pathlib import Path
 
-from psdmc.backends.c.manifest import GENERATOR
+from psdmc.backends.manifest import GENERATOR
 from psdmc.errors import InputError
 from psdmc.reading import read_file
 
