@@ -105,14 +105,25 @@ ROOMS = {
     "backends": {
         "c": {
             "bodies",
+            "describe",
             "info",
             "manifest",
+            "names",
             "options",
             "own_files",
+            "protocol",
             "reference_load",
-            "reference_states",
-            "write",
         }
+        | {"reference_states", "render", "self_test", "trig_numbers", "write"},
+        "rust": {
+            "describe",
+            "manifest",
+            "options",
+            "protocol",
+            "reference_states",
+            "self_test",
+            "trig_numbers",
+        },
     },
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""

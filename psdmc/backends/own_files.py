@@ -29,7 +29,8 @@ OWN_NAME = re.compile(
     r"""(?: (?: include/[A-Za-z_]\w* | src | test | casadi ) / [A-Za-z_]\w* \. (?: c | h | hpp | inc )
           | cmake / [A-Za-z_]\w* \.cmake\.in
           | [A-Za-z_]\w* \.pc\.in
-          | CMakeLists\.txt | Makefile | README\.md | LICENSE | package\.xml )""",
+          | (?: src | tests ) / [a-z_]\w* \.rs
+          | Cargo\.toml | CMakeLists\.txt | Makefile | README\.md | LICENSE | package\.xml )""",
     re.VERBOSE | re.ASCII,
 )
 """Every name that a package can have beside its manifest's own."""

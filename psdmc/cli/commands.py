@@ -11,7 +11,7 @@ from psdmc.cli.calibrating import calibrate
 from psdmc.cli.campaigning import excite, simulate
 from psdmc.cli.exporting import export_urdf
 from psdmc.cli.loads import payload
-from psdmc.cli.pipeline import build, cache, check, derive, emit_c
+from psdmc.cli.pipeline import build, cache, check, derive, emit, emit_c
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new
 from psdmc.version import psdmc_version
@@ -47,6 +47,7 @@ COMMANDS = (
     (show, "print a model, or what a robot file holds"),
     (check, "check a model against other readers of its source"),
     (emit_c, "write a model's C package"),
+    (emit, "write a model's package in another language"),
     (build, "build a package and run its self-test"),
     (bench, "time a model's code against its rivals"),
     (excite, "plan a calibration campaign"),

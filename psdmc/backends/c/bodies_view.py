@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from psdmc.backends.bodies import BodiesMap
 from psdmc.backends.c.prototypes import Prototype, bodies_prototype
+from psdmc.backends.c.reals import CReal
 from psdmc.backends.c.tables import number
-from psdmc.backends.options import CReal
 
 Array = NDArray[np.float64]
 

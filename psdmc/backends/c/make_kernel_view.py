@@ -10,6 +10,7 @@ from psdmc.backends.c.limbs import LimbsView, limbs_view
 from psdmc.backends.c.lines import Body
 from psdmc.backends.c.parts import body_in_parts, is_long
 from psdmc.backends.c.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
+from psdmc.backends.c.reals import c_real
 from psdmc.backends.c.store_groups import GROUP
 from psdmc.backends.options import EmitOptions
 from psdmc.errors import InternalError
@@ -156,5 +157,5 @@ def _is_direct(output: Quantity, sizes: Sizes) -> bool:
 def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:
     """Prototypes by form, for the forms that the target has."""
     variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
-    made = (prototype(function, variant, robot, options.c_real) for variant in variants)
+    made = (prototype(function, variant, robot, c_real(options)) for variant in variants)
     return dict(zip(options.target.forms, made, strict=False))

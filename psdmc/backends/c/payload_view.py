@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.backends.c.prototypes import Prototype, payload_prototypes
+from psdmc.backends.c.reals import CReal
 from psdmc.backends.c.tables import number
-from psdmc.backends.options import CReal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
