@@ -22,7 +22,7 @@ def _kept() -> CodeBesideTemplates | None:
     return CodeBesideTemplates(folder) if isinstance(folder, Path) else None
 
 
-def environment_with(**filters: Callable[[str], str]) -> Environment:
+def environment_with(**filters: Callable[..., str]) -> Environment:
     """An environment with a language's filters, which make untrusted text safe in it."""
     made = Environment(
         loader=FunctionLoader(_source),

@@ -44,9 +44,9 @@ def place(slot: Slot, shapes: Mapping[str, Sequence[int]]) -> str:
     return variable(slot.vector) + found
 
 
-def number(value: float | None) -> str:
-    """A literal that reads back as the same number; None is unknown."""
-    if value is None or math.isnan(value):
+def number(value: float) -> str:
+    """A literal that reads back as the same number."""
+    if math.isnan(value):
         return "f64::NAN"
     if math.isinf(value):
         return "f64::INFINITY" if value > 0 else "f64::NEG_INFINITY"
@@ -57,16 +57,15 @@ def statements(
     program: Program, shapes: Mapping[str, Sequence[int]], stored: Sequence[Quantity]
 ) -> list[str]:
     """The lines that compute a PROGRAM: outputs begin as zeros, and each entry is stored when it is known."""
-    declared = [f"let mut {variable(q.name)} = {zeros(shapes[q.name])};" for q in stored]
+    declared = [f"let mut {variable(q.name)} = {array(shapes[q.name], '0.0')};" for q in stored]
     return [*declared, *_Writer(program, shapes).lines()]
 
 
-def zeros(shape: Sequence[int]) -> str:
-    """An array of zeros; of no axes, zero."""
-    found = "0.0"
+def array(shape: Sequence[int], of: str = "f64") -> str:
+    """`[[f64; 3]; 2]` of the shape (2, 3), or zeros of it; of no axes, a number."""
     for length in reversed(shape):
-        found = f"[{found}; {length}]"
-    return found
+        of = f"[{of}; {length}]"
+    return of
 
 
 class _Writer:
