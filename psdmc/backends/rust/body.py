@@ -83,10 +83,12 @@ class _Writer:
             taken: dict[int, set[Op]] = {}
             for i in group:
                 instr = self.program.body[i]
+                if not self.uses[i]:
+                    continue
                 if instr.op in (Op.SIN, Op.COS):
                     taken.setdefault(instr.args[0], set()).add(instr.op)
                     self.texts[i] = Text(f"{instr.op.value}_{instr.args[0]}")
-                elif self.uses[i]:
+                else:
                     yield from self._value(i)
             if taken:
                 yield self._angles(taken)

@@ -18,8 +18,7 @@ from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Quantity, Sizes
 
-MATH = ("fma", "sin_cos", "sqrt")
-LOCAL = re.compile(rf"t\d+|(sin|cos)_\d+|entry|{'|'.join(MATH)}")
+LOCAL = re.compile(r"t\d+|(sin|cos)_\d+|entry|fma|sqrt|sin_cos")
 """Names of a body's own; no quantity may have one."""
 
 ARRAYS = """Arrays: matrices are arrays of rows. Quaternions, and cosine and sine of an angle, are of length one."""
@@ -66,16 +65,11 @@ class KernelText(NamedTuple):
 
 
 class FunctionText(NamedTuple):
-    """One file: a function in words, its forms, and what they need of crate::math."""
+    """One file: a function and its forms."""
 
     function: Function
     shape: str
     kernels: tuple[KernelText, ...]
-
-    @property
-    def math(self) -> list[str]:
-        lines = "\n".join(line for kernel in self.kernels for line in kernel.lines)
-        return [name for name in MATH if f"{name}(" in lines]
 
 
 @dataclass(frozen=True, slots=True)
