@@ -129,10 +129,10 @@ class _Writer:
             return self._fma(op, args, self.fused[i])
         operands = [self.texts[a] for a in args]
         depth = 1 + max(operand.depth for operand in operands)
-        if op is Op.SQRT:
-            return Text(f"sqrt({operands[0].text})", _ATOM, depth)
         if op is Op.NEG:
             return Text(f"-{operands[0].beside(_SIGN, True)}", _SIGN, depth)
+        if op not in _SYMBOL:
+            return Text(f"{op.value}({', '.join(each.text for each in operands)})", _ATOM, depth)
         symbol, binding = _SYMBOL[op]
         left, right = operands
         return Text(f"{left.beside(binding, False)} {symbol} {right.beside(binding, True)}", binding, depth)
