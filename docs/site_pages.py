@@ -68,6 +68,7 @@ MENU = {
         "shipping",
         "reference/c",
         "notation",
+        "robot_files",
         "files",
         "log_description",
         "calibration",

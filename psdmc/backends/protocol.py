@@ -57,6 +57,7 @@ class BackEnd:
     """A language that packages are written in.
 
     language    its name for people
+    named       what is called by the robot's name
     files       path -> text of every file of the package, manifest.json last
     identifier  the robot's name in the language
     entry       of that name: the file that a user opens first, and how it is used
@@ -65,6 +66,7 @@ class BackEnd:
     """
 
     language: str
+    named: str
     files: Callable[[Emission], dict[str, str]]
     identifier: Callable[[str], str]
     entry: Callable[[str], tuple[str, str]]

@@ -1,4 +1,4 @@
-"""What `psdmc show` says of a calibrated model before anything else: its verdict, its data, and how well it follows them."""
+"""First part of `psdmc show` for a calibrated model: its verdict, its data, and how well it follows them."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _number(value: float | None, form: str) -> str:
 
 
 def standard_deviations(kept: Mapping[str, Any], count: int) -> Sequence[str]:
-    """Of the base parameters, in words; empty where the model was not calibrated."""
+    """Describe the standard deviations of the base parameters; empty if the model was not calibrated."""
     rows = kept.get("base_parameters", [])
     if len(rows) != count:
         return [""] * count

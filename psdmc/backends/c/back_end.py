@@ -18,4 +18,6 @@ def _entry(robot: str) -> tuple[str, str]:
     return f"include/{robot}/{robot}.h", f"the header, #include <{robot}/{robot}.h>"
 
 
-BACK_END = BackEnd("C", _files, identifier, _entry, lambda folder: f"psdmc build {folder}")
+BACK_END = BackEnd(
+    "C", "prefix of C names", _files, identifier, _entry, lambda folder: f"psdmc build {folder}"
+)

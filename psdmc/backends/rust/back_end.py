@@ -43,6 +43,7 @@ def _files(given: Emission) -> dict[str, str]:
 
 BACK_END = BackEnd(
     "Rust",
+    "name of the crate",
     _files,
     identifier,
     lambda robot: ("Cargo.toml", f'the crate, {robot} = {{ path = "..." }}'),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from psdmc.calibration.identify.four_steps import Runs
 from psdmc.calibration.identify.steps import StepQuality
-from psdmc.calibration.logs.check_options import CheckOptions
+from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.delivered import delivered_quality, reread
 from psdmc.calibration.verdict.record import Calibration, with_model

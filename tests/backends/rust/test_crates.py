@@ -173,7 +173,7 @@ def test_the_command(tmp_path: Path) -> None:
 
     assert done.returncode == 0, done.stderr
     assert "my crate/Cargo.toml: the crate, robot_fn = { path = " in done.stdout
-    assert "note: in Rust 'fn' is robot_fn" in done.stdout
+    assert "note: the Rust name of 'fn' is robot_fn" in done.stdout
     assert "next: cargo test --manifest-path 'my crate'/Cargo.toml" in done.stderr
     assert "nothing changed" in typed(*words, cwd=tmp_path).stdout
 

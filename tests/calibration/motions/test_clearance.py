@@ -13,12 +13,11 @@ from arms import LENGTH, pinocchio_of, urdf
 from psdmc.calibration.campaign_plan import CampaignOptions, plan_campaign
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.motions.clearance import APART, clearance_of, floor_points, spread
-from psdmc.calibration.motions.collision_shapes import mesh_file
-from psdmc.calibration.motions.criterion import scaled
-from psdmc.calibration.motions.excite import ExciteOptions, excite
-from psdmc.calibration.motions.fit_columns import all_columns
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.allowed import GivenLimits, bounded
+from psdmc.calibration.motions.clearance import APART, clearance_of, floor_points, mesh_file, spread
+from psdmc.calibration.motions.criterion import all_columns, scaled
+from psdmc.calibration.motions.excite import excite
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.limited_sines import LimitedSines
 from psdmc.calibration.motions.looked_at import allowed_of
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
@@ -96,17 +95,17 @@ def test_what_cannot_be_looked_at_is_said(tmp_path: Path):
     plan = plan_campaign(model, ChainRegressor(model), one)
 
     said = next(line for line in plan.looked if "self-collision" in line)
-    assert said.startswith("not looked at: self-collision, crane.urdf: collision shape of link 'upper': mesh")
+    assert said.startswith("not checked: self-collision, crane.urdf: collision shape of link 'upper': mesh")
     assert "--meshes DIR" in said
     with pytest.raises(InputError, match="is in none of the given folders"):
         plan_campaign(model, ChainRegressor(model), replace(one, shapes=(tmp_path,)))
     bare = model_of(tmp_path, urdf(shapes=False))
     plan = plan_campaign(bare, ChainRegressor(bare), one)
     assert (
-        "not looked at: self-collision, crane.urdf has no collision shapes (add <collision> to its links)"
+        "not checked: self-collision, crane.urdf has no collision shapes (add <collision> to its links)"
         in plan.looked
     )
-    assert any(line.startswith("not looked at: floor") for line in plan.looked)
+    assert any(line.startswith("not checked: floor") for line in plan.looked)
 
 
 def test_a_floor_needs_no_shapes(tmp_path: Path):

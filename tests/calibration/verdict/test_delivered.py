@@ -23,8 +23,7 @@ from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import InertialRun
 from psdmc.calibration.logs.filter import filtered, smoothed_rows, thinned
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_files import read_log, write_log
-from psdmc.calibration.logs.open_log import open_log
+from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.calibration.verdict.record import Calibration
@@ -186,7 +185,7 @@ def test_physical_is_the_default_of_the_command(
     assert min(coulomb()) >= 0
     assert "physical consistency moved the parameters" in capsys.readouterr().out
     assert min(coulomb("--physical")) >= 0
-    assert "note: --physical is the default now" in capsys.readouterr().out
+    assert "note: --physical is the default;" in capsys.readouterr().out
 
 
 @pytest.mark.slow
