@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from psdmc.backends.info import JointInfo, PackageInfo
+from psdmc.model.parameter_table import BaseParameters
 
 SCHEMA = 1
 GENERATOR = "psdmc"
@@ -44,9 +45,7 @@ def manifest(
         "options": dict(options),
         **own,
         "joints": [_joint(joint) for joint in info.joints],
-        "base_parameters": [
-            {"equation": p.equation, "unit": p.unit, "value": p.value} for p in info.parameters
-        ],
+        "base_parameters": BaseParameters(info.parameters).plain(),
         "functions": list(functions),
         "files": {path: digest(text) for path, text in files.items()},
     }
