@@ -104,7 +104,7 @@ ROOMS = {
         },  # paths that it is given: 0117
     },
     "lower": {"expanded": set()},
-    "backends": {"c": set()},
+    "backends": {room: {path.stem for path in (PACKAGE / "backends").glob("*.py")} for room in ("c", "rust")},
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
@@ -299,6 +299,32 @@ def test_no_file_but_the_targets_names_machines():
 
     assert set(named) == {f"templates/{name}" for name in MAY_NAME_MACHINES}
     assert any(machines(path) for path in target.glob("*.py")), "the words are not those that targets use"
+
+
+C_TEXT = re.compile(
+    r"#include|#define|const (real|double|float)\b|\b(double|float|real|char) \*|size_t|static inline|SPLAT"
+    r"|\bvoid [a-z]|/\*|\w\);$",
+    re.MULTILINE,
+)
+WRITE_C = {
+    "backends/c": "the back end of C",
+    "toolchain": "compiles",
+    "bench/rivals": "other programs' C and C++ around theirs and psdmc's",
+    "calibration/identify/lugre.py": "a compiled simulation of its own",
+}
+"""Where C text is, and why."""
+
+
+def test_no_file_but_the_back_end_of_c_writes_c():
+    named = {
+        path.relative_to(PACKAGE).as_posix()
+        for _, path in modules()
+        if any(C_TEXT.search(text) for text in said(path))
+    }
+
+    assert [name for name in sorted(named) if not name.startswith(tuple(WRITE_C))] == []
+    assert all(any(name.startswith(place) for name in named) for place in WRITE_C)
+    assert len([name for name in named if name.startswith("backends/c")]) > 5
 
 
 WEIGHING = ("lower", "program", "backends", "toolchain")

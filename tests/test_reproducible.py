@@ -52,7 +52,7 @@ DECISIONS = {
     "lower/reframe.py": "thresholds with margins of decades",
     "lower/common_normals.py": "thresholds with margins of decades",
     "lower/accuracy.py": "errors that are compared with limits",
-    "backends/c/reference_states.py": "condition numbers, which order states after rounding",
+    "backends/reference_states.py": "condition numbers, which order states after rounding",
 }
 """Files that use such functions for decisions with slack, or for another program's side of a comparison."""
 

@@ -11,7 +11,7 @@ from psdmc.backends.c.lanes import TransposeStage, transpose_stage
 from psdmc.backends.c.limb_rows import FOUR
 from psdmc.backends.c.limb_stores import StoreView, store_views
 from psdmc.backends.c.lines import Body
-from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.options import EmitOptions
 from psdmc.program.cost import Cost, cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage
 from psdmc.target.vectors import VectorUnit

@@ -9,11 +9,12 @@ from psdmc.backends.c.c_expr import is_call
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
 from psdmc.backends.c.limbs import LimbsView, limbs_view
 from psdmc.backends.c.lines import Body
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.parts import body_in_parts, is_long
 from psdmc.backends.c.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
+from psdmc.backends.c.reals import c_real
 from psdmc.backends.c.regions import regions_view
 from psdmc.backends.c.store_groups import GROUP
+from psdmc.backends.options import EmitOptions
 from psdmc.errors import InternalError
 from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
@@ -39,7 +40,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         )
         for q in function.outputs
     )
-    suffix = "f" if options.c_real == "float" else ""
+    suffix = "f" if c_real(options) == "float" else ""
     regions = None
     if kernel.regions is not None:
         single_body = lanes_body = Body((), ())
@@ -162,5 +163,5 @@ def _is_direct(output: Quantity, sizes: Sizes) -> bool:
 def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:
     """Prototypes by form, for the forms that the target has."""
     variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
-    made = (prototype(function, variant, robot, options.c_real) for variant in variants)
+    made = (prototype(function, variant, robot, c_real(options)) for variant in variants)
     return dict(zip(options.target.forms, made, strict=False))

@@ -10,24 +10,25 @@ from psdmc.backends.c.adapters import chosen
 from psdmc.backends.c.bodies_view import BodiesView
 from psdmc.backends.c.body import calls_of
 from psdmc.backends.c.cpp import CppClass, cpp_classes
-from psdmc.backends.c.describe import description, uses_frames
+from psdmc.backends.c.describe import description
 from psdmc.backends.c.friction import FrictionView
 from psdmc.backends.c.function_view import FunctionView, function_views
-from psdmc.backends.c.info import PackageInfo
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.names import identifier
 from psdmc.backends.c.operations import CallView, call_views
-from psdmc.backends.c.options import CReal, EmitOptions
 from psdmc.backends.c.patterns import Pattern, patterns
 from psdmc.backends.c.payload_view import PayloadView
 from psdmc.backends.c.products import Shape
-from psdmc.backends.c.reals import check_range
-from psdmc.backends.c.reference_states import ReferenceStates
+from psdmc.backends.c.reals import CReal, c_real, check_range
 from psdmc.backends.c.references import ReferenceView, reference_view
 from psdmc.backends.c.self_test import given_vectors, labels
 from psdmc.backends.c.self_test_view import SelfTestView
 from psdmc.backends.c.tables import Table, tables
 from psdmc.backends.c.vectors_view import VectorsView
+from psdmc.backends.describe import uses_frames
+from psdmc.backends.info import PackageInfo
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.garbage import collecting_rarely
@@ -83,7 +84,7 @@ class PackageView:
 
     @property
     def real(self) -> CReal:
-        return self.options.c_real
+        return c_real(self.options)
 
     @property
     def lanes(self) -> int:
@@ -249,7 +250,7 @@ class PackageView:
     @property
     def uses_frames(self) -> bool:
         """Whether some function is about the named frames."""
-        return uses_frames(self.functions) or bool(self.info.payload)
+        return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 
 @collecting_rarely()
@@ -265,7 +266,7 @@ def package_view(
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
     if info.l == 0:
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
-    check_range(info, kernels, options.c_real)
+    check_range(info, kernels, c_real(options))
     _check_calls(info, kernels, options)
     if info.friction and options.trig == "freestanding":
         raise InputError(
@@ -281,7 +282,7 @@ def package_view(
         given_vectors(package.kernels, package.dof),
         any(kernel.theta for kernel in package.kernels),
     )
-    view = reference_view(references, options.c_real, vectors, labels(package.kernels), takes_theta)
+    view = reference_view(references, c_real(options), vectors, labels(package.kernels), takes_theta)
     return replace(package, references=view)
 
 

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from psdmc.backends.c.adapters import ADAPTERS
-from psdmc.backends.c.manifest import manifest
+from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
+from psdmc.backends.describe import option_items
+from psdmc.backends.manifest import manifest
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
 
 
 def package_files(package: PackageView) -> dict[str, str]:
@@ -21,8 +28,38 @@ def package_files(package: PackageView) -> dict[str, str]:
             package.robot, package.real, package.kernels, package.info.nq > package.info.nv
         )
     files = {path: licensed(path, text) for path, text in files.items()}
-    files["manifest.json"] = manifest(package.robot, package.info, package.options, package.functions, files)
+    files["manifest.json"] = _manifest(package, files)
     return files
+
+
+def _manifest(package: PackageView, files: Mapping[str, str]) -> str:
+    own = {**_target(package.target), "real": package.real, "lanes": package.lanes}
+    functions = [_function(function) for function in package.functions]
+    return manifest(
+        package.robot, package.info, option_items(package.info, package.options), own, functions, files
+    )
+
+
+def _target(target: Target) -> dict[str, Any]:
+    """A target that was chosen: its name, and the flags that compilers take for it."""
+    return {} if target == NATIVE else {"target": {"name": target.name, "flags": list(target.flags)}}
+
+
+def _function(function: FunctionView) -> dict[str, Any]:
+    return {
+        "name": function.name,
+        "meaning": function.meaning,
+        "kernels": [
+            {
+                "name": kernel.name,
+                "lowering": kernel.lowering,
+                "cost": kernel.cost,
+                **({"cost_with_limbs_in_lanes": str(kernel.limbs.cost)} if kernel.limbs else {}),
+                "prototypes": [prototype.text for prototype in kernel.prototypes.values()],
+            }
+            for kernel in function.kernels
+        ],
+    }
 
 
 C_SUFFIXES = (".c", ".h", ".hpp", ".inc")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.bodies import BodiesMap, bodies_map
+from psdmc.backends.bodies import BodiesMap, bodies_map
 from psdmc.friction.joints import Friction
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.equations import BaseParameter

@@ -5,20 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from psdmc.backends.c.describe import option_items
-from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.info import JointInfo, PackageInfo
-from psdmc.backends.c.names import identifier
-from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.info import JointInfo, PackageInfo
 from psdmc.model.parameter_table import BaseParameters
-from psdmc.target.native import NATIVE
-from psdmc.target.target import Target
 
 SCHEMA = 1
 GENERATOR = "psdmc"
+
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
+"""Of robots in every language."""
 
 RENAMED: Mapping[str, str] = {}
 """Functions that packages of an earlier release have by another name, and their name now. From 0.1 to this one, none."""
@@ -27,11 +25,13 @@ RENAMED: Mapping[str, str] = {}
 def manifest(
     robot: str,
     info: PackageInfo,
-    options: EmitOptions,
-    functions: tuple[FunctionView, ...],
+    options: Mapping[str, str],
+    own: Mapping[str, Any],
+    functions: Sequence[Mapping[str, Any]],
     files: Mapping[str, str],
 ) -> str:
-    """JSON text; `files` are all others of the package, which it lists with their SHA-256."""
+    """JSON text; `own` is what only this back end says, `files` are all others of the package, which it lists with their
+    SHA-256."""
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "generator": GENERATOR,
@@ -42,13 +42,11 @@ def manifest(
         "base": info.base,
         "tip": info.tip,
         "gravity_m_s2": list(info.gravity),
-        "options": option_items(info, options),
-        **_target(options.target),
-        "real": options.c_real,
-        "lanes": options.lanes,
+        "options": dict(options),
+        **own,
         "joints": [_joint(joint) for joint in info.joints],
         "base_parameters": BaseParameters(info.parameters).plain(),
-        "functions": [_function(function) for function in functions],
+        "functions": list(functions),
         "files": {path: digest(text) for path, text in files.items()},
     }
     return json.dumps(content, indent=2, ensure_ascii=True, allow_nan=False) + "\n"
@@ -58,7 +56,7 @@ def renamed(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[s
     """Symbols of one manifest's package and their names in another's: of all, `R_*`, where the robot has another name, and
     of functions that have one. The first manifest may be forged."""
     old, new = before.get("robot"), after["robot"]
-    if not isinstance(old, str) or identifier(old) != old:
+    if not isinstance(old, str) or not NAME.fullmatch(old):
         return []
     pairs = [(f"{old}_*", f"{new}_*")] if old != new else []
     kernels, there = _kernel_names(before), _kernel_names(after)
@@ -75,11 +73,6 @@ def _kernel_names(content: Mapping[str, Any]) -> list[object]:
 
 def _objects(values: object) -> list[dict[str, object]]:
     return [each for each in values if isinstance(each, dict)] if isinstance(values, list) else []
-
-
-def _target(target: Target) -> dict[str, Any]:
-    """A target that was chosen: its name, and the flags that compilers take for it."""
-    return {} if target == NATIVE else {"target": {"name": target.name, "flags": list(target.flags)}}
 
 
 def digest(text: str) -> str:
@@ -105,21 +98,4 @@ def _joint(joint: JointInfo) -> dict[str, Any]:
         "limits": known,
         **({"parent": joint.parent} if joint.parent else {}),
         **wide,
-    }
-
-
-def _function(function: FunctionView) -> dict[str, Any]:
-    return {
-        "name": function.name,
-        "meaning": function.meaning,
-        "kernels": [
-            {
-                "name": kernel.name,
-                "lowering": kernel.lowering,
-                "cost": kernel.cost,
-                **({"cost_with_limbs_in_lanes": str(kernel.limbs.cost)} if kernel.limbs else {}),
-                "prototypes": [prototype.text for prototype in kernel.prototypes.values()],
-            }
-            for kernel in function.kernels
-        ],
     }

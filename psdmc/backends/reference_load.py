@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.tables import number
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.payload import body_parameters, load_parameters
 from psdmc.reproducible import times
-from psdmc.robot.inertia import six_of
 
 Array = NDArray[np.float64]
 
@@ -28,16 +26,6 @@ class ReferenceLoad:
     added: Array
 
 
-@dataclass(frozen=True, slots=True)
-class LoadView:
-    """The same as C text: mass, com, inertia (Ixx Ixy Iyy Ixz Iyz Izz), and the rows of `added`."""
-
-    mass: str
-    com: str
-    inertia: str
-    added: tuple[str, ...]
-
-
 def reference_load(model: DynamicsModel) -> ReferenceLoad:
     """The load on a model, by the way of DynamicsModel.with_payload."""
     chain = model.mechanism
@@ -47,15 +35,3 @@ def reference_load(model: DynamicsModel) -> ReferenceLoad:
         for frame, body in places
     ]
     return ReferenceLoad(np.array(rows))
-
-
-def load_view(load: ReferenceLoad, real: str) -> LoadView:
-    """The load as C constants."""
-
-    def listed(values: Array) -> str:
-        return ", ".join(number(float(value), real) for value in values)
-
-    inertia = listed(np.asarray(six_of(INERTIA)))
-    return LoadView(
-        number(MASS, real), listed(np.array(COM)), inertia, tuple(listed(row) for row in load.added)
-    )

@@ -20,8 +20,8 @@ from psdmc.atomic import (
     write_together,
     write_whole,
 )
-from psdmc.backends.c.manifest import GENERATOR, digest, renamed
-from psdmc.backends.c.own_files import (
+from psdmc.backends.manifest import GENERATOR, digest, renamed
+from psdmc.backends.own_files import (
     JOURNAL,
     MANIFEST,
     NOT_REGULAR,

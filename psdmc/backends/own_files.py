@@ -14,7 +14,7 @@ import stat
 from collections.abc import Mapping
 from pathlib import Path
 
-from psdmc.backends.c.manifest import GENERATOR
+from psdmc.backends.manifest import GENERATOR
 from psdmc.errors import InputError
 from psdmc.reading import read_file
 
@@ -29,7 +29,8 @@ OWN_NAME = re.compile(
     r"""(?: (?: include/[A-Za-z_]\w* | src | test | casadi ) / [A-Za-z_]\w* \. (?: c | h | hpp | inc )
           | cmake / [A-Za-z_]\w* \.cmake\.in
           | [A-Za-z_]\w* \.pc\.in
-          | CMakeLists\.txt | Makefile | README\.md | LICENSE | package\.xml )""",
+          | (?: src | tests ) / [a-z_]\w* \.rs
+          | Cargo\.toml | CMakeLists\.txt | Makefile | README\.md | LICENSE | package\.xml )""",
     re.VERBOSE | re.ASCII,
 )
 """Every name that a package can have beside its manifest's own."""

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.reference_load import ReferenceLoad
+from psdmc.backends.reference_load import ReferenceLoad
 from psdmc.functions import DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters
