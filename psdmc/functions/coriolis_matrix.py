@@ -52,8 +52,10 @@ RECIPE = Recipe(
         50,
         "C(q, qd) with dM/dt - 2 C skew-symmetric",
         (Q, QD),
-        (Quantity("C", ("nv", "nv")),),
+        (Quantity("C", ("nv", "nv"), means="Coriolis matrix, SI units"),),
         theta=True,
+        summary="Compute the Coriolis matrix C(q, qd): C qd are the Coriolis and centrifugal torques, and "
+        "dM/dt - 2 C is skew-symmetric.",
     ),
     "Coriolis matrix",
     trace,

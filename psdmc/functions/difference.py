@@ -16,8 +16,15 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-FROM, TO = Quantity("q0", ("nq",), np.pi), Quantity("q1", ("nq",), np.pi)
-WAY = Quantity("v", ("nv",))
+FROM, TO = (
+    Quantity("q0", ("nq",), np.pi, means="joint positions at the start, as q"),
+    Quantity("q1", ("nq",), np.pi, means="joint positions at the end, as q"),
+)
+WAY = Quantity(
+    "v",
+    ("nv",),
+    means="displacement: q1 - q0 for plain joints; for quaternions the shorter rotation vector, along the axes of q0",
+)
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -47,6 +54,7 @@ RECIPE = Recipe(
         (FROM, TO),
         (WAY,),
         theta=False,
+        summary="Compute the displacement v that leads from q0 to q1: integrate(q0, v) = q1.",
     ),
     "way between two positions",
     trace,

@@ -38,6 +38,8 @@ RECIPE = Recipe(
         (Q, QD, TAU),
         (QDD,),
         theta=True,
+        summary="Compute the joint accelerations that torques cause: qdd = M(q)^-1 (tau - h(q, qd)), with "
+        "nonlinear effects h.",
         positive=PIVOTS,
     ),
     "forward dynamics",

@@ -28,7 +28,16 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 
 RECIPE = Recipe(
-    Signature("inverse_dynamics", 10, "tau = M(q) qdd + h(q, qd)", (Q, QD, QDD), (TAU,), theta=True),
+    Signature(
+        "inverse_dynamics",
+        10,
+        "tau = M(q) qdd + h(q, qd)",
+        (Q, QD, QDD),
+        (TAU,),
+        theta=True,
+        summary="Compute the joint torques of a motion: tau = M(q) qdd + h(q, qd), with the mass matrix M "
+        "and the nonlinear effects h.",
+    ),
     "inverse dynamics",
     trace,
     reference,

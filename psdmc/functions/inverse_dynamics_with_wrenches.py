@@ -17,7 +17,12 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-WRENCHES = Quantity("wrenches", ("frames", "6"), largest=20.0)
+WRENCHES = Quantity(
+    "wrenches",
+    ("frames", "6"),
+    largest=20.0,
+    means="force (N), then moment (N m) about the frame's origin, along that named frame's axes",
+)
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -62,6 +67,7 @@ RECIPE = Recipe(
         (Q, QD, QDD, WRENCHES),
         (TAU,),
         theta=True,
+        summary="Compute the joint torques of a motion while the world exerts wrenches on the named frames.",
     ),
     "inverse dynamics with wrenches",
     trace,

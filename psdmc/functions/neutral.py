@@ -39,6 +39,7 @@ RECIPE = Recipe(
         (),
         (Q,),
         theta=False,
+        summary="Return the configuration in which no joint has moved.",
     ),
     "neutral position",
     trace,

@@ -108,6 +108,7 @@ RECIPE = Recipe(
         (Q, QD, TAU, DT),
         (Q_NEXT, QD_NEXT),
         theta=True,
+        summary="Compute the state after one step of the classical fourth-order Runge-Kutta method, with constant torques.",
         positive=STAGE_PIVOTS,
     ),
     "step of fourth-order Runge-Kutta",
