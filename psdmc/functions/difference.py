@@ -17,13 +17,14 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 FROM, TO = (
-    Quantity("q0", ("nq",), np.pi, means="joint positions at the start, as q"),
-    Quantity("q1", ("nq",), np.pi, means="joint positions at the end, as q"),
+    Quantity("q0", ("nq",), np.pi, means="joint positions at the start: rad, m or unit quaternions"),
+    Quantity("q1", ("nq",), np.pi, means="joint positions at the end: rad, m or unit quaternions"),
 )
 WAY = Quantity(
     "v",
     ("nv",),
-    means="displacement: q1 - q0 for plain joints; for quaternions the shorter rotation vector, along the axes of q0",
+    means="displacement: q1 - q0 for joints with one coordinate; for quaternions the shorter rotation "
+    "vector, along the axes of q0",
 )
 
 

@@ -38,8 +38,8 @@ RECIPE = Recipe(
         (Q, QD, TAU),
         (QDD,),
         theta=True,
-        summary="Compute the joint accelerations that torques cause: qdd = M(q)^-1 (tau - h(q, qd)), with "
-        "nonlinear effects h.",
+        summary="Compute the joint accelerations that torques cause: qdd = M(q)^-1 (tau - h(q, qd)), h "
+        "being the Coriolis, centrifugal and gravity torques.",
         positive=PIVOTS,
     ),
     "forward dynamics",

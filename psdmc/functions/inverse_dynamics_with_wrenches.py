@@ -21,7 +21,7 @@ WRENCHES = Quantity(
     "wrenches",
     ("frames", "6"),
     largest=20.0,
-    means="force (N), then moment (N m) about the frame's origin, along that named frame's axes",
+    means="on each named frame, from the world: force (N), then moment (N m) about the frame's origin, along its axes",
 )
 
 
@@ -67,7 +67,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, WRENCHES),
         (TAU,),
         theta=True,
-        summary="Compute the joint torques of a motion while the world exerts wrenches on the named frames.",
+        summary="Compute joint torques under external wrenches on the named frames: tau = M(q) qdd + h(q, "
+        "qd) - sum of J^T wrench.",
     ),
     "inverse dynamics with wrenches",
     trace,

@@ -33,13 +33,9 @@ RECIPE = Recipe(
         30,
         "M(q), both triangles",
         (Q,),
-        (
-            Quantity(
-                "M", ("nv", "nv"), means="mass matrix with drive inertias, both triangles; kg m^2, kg m or kg"
-            ),
-        ),
+        (Quantity("M", ("nv", "nv"), means="symmetric matrix, both triangles filled; kg m^2, kg m or kg"),),
         theta=True,
-        summary="Compute the joint-space mass matrix M(q).",
+        summary="Compute the joint-space mass matrix M(q), drive inertias included.",
     ),
     "mass matrix",
     trace,

@@ -42,7 +42,7 @@ RECIPE = Recipe(
         192,
         "M(q)^-1, both triangles",
         (Q,),
-        (Quantity("Minv", ("nv", "nv"), means="inverse of the mass matrix, both triangles; SI units"),),
+        (Quantity("Minv", ("nv", "nv"), means="symmetric matrix, both triangles filled; SI units"),),
         theta=True,
         summary="Compute the inverse of the joint-space mass matrix M(q).",
         positive=PIVOTS,

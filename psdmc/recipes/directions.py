@@ -23,7 +23,9 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-COTANGENT = Quantity("cotangent", ("nv",), means="one weight per joint torque or acceleration")
+COTANGENT = Quantity(
+    "cotangent", ("nv",), means="one weight per entry of the weighted torques or accelerations"
+)
 
 DQ, DQD, DQDD, DTAU = (
     Quantity(f"d{name}", ("nv",), means=f"change of {name} per unit step along the direction")

@@ -56,7 +56,7 @@ def arguments(function: Signature) -> tuple[str, ...]:
 
 def documentation(function: Signature) -> str:
     """A method's docstring: what it computes, its arguments and results, what NaN means, and the words for sizes."""
-    several, shown = len(function.outputs) > 1, (*function.inputs, *function.outputs)
+    several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
     given = [(q.name, f"{_shape(q)} {q.means}") for q in function.inputs]
     theta = "(l,) base parameters in place of the model's, SI units; optional if the model's are known"
@@ -64,35 +64,31 @@ def documentation(function: Signature) -> str:
     written = "tuple of arrays that take the results" if several else "array that takes the result"
     given += [("out", f"{written}; optional")]
     made = [(q.name, f"{_shape(q, lead)} {q.means}") for q in function.outputs]
-    words = {"l"} if function.theta else set()
-    words |= {axis for q in shown for axis in q.axes}
-    notes = [_failure(function)] if function.positive else []
-    notes += ["The leading axes (...) count states."] if lead else []
-    notes += [f"{word} is {meaning}." for word, meaning in _SIZES.items() if word in words]
-    notes += (
-        ["nq = nv = number of joints if every joint has one coordinate."] if {"nq", "nv"} <= words else []
-    )
+    axes = {axis for q in (*function.inputs, *function.outputs) for axis in q.axes}
+    axes |= {"l"} if function.theta else set()
+    notes = [*_failures(function), *([_STATES] if lead else [])]
+    notes += [meaning for size, meaning in _SIZES.items() if size in axes]
     returned = f"Returns {'a named tuple' if several else 'an array'}:"
-    return "\n\n".join(
-        [function.summary, _rows(given), returned, _rows(made), textwrap.fill(" ".join(notes), 100)]
-    )
+    footer = textwrap.fill(" ".join(notes), 100)
+    return "\n\n".join([function.summary, _rows(given), returned, _rows(made), footer])
 
 
+_STATES = "The leading axes (...) count states."
 _SIZES = {
-    "nq": "the length of q",
-    "nv": "the number of joint rates",
-    "l": "the number of base parameters",
-    "frames": "the number of named frames",
+    "nq": "nq is the length of q: the number of joints if every joint has one coordinate.",
+    "nv": "nv is the number of joint rates.",
+    "l": "l is the number of base parameters.",
+    "frames": "frames is the number of named frames.",
 }
 
 
-def _failure(function: Signature) -> str:
-    stage = (
-        " or in a stage of its step" if function.positive and len(function.positive.quantity.axes) > 1 else ""
-    )
-    return (
-        f"If the mass matrix is not positive definite in a state{stage}, the results of that state are NaN."
-    )
+def _failures(function: Signature) -> list[str]:
+    """What NaN means."""
+    if function.positive is None:
+        return []
+    stage = " or in a stage of its step" if len(function.positive.quantity.axes) > 1 else ""
+    state = f"If the mass matrix is not positive definite in a state{stage},"
+    return [f"{state} the results of that state are NaN."]
 
 
 def _rows(named: list[tuple[str, str]]) -> str:
