@@ -158,9 +158,9 @@ class DynamicsModel(Answers):
 
     @property
     def is_reduced(self) -> bool:
-        """True if each base parameter has a standard parameter that no other base parameter contains.
+        """True if each base parameter contains, with factor one, a standard parameter that no other contains.
 
-        This holds for every model that psdmc derives.
+        This is true for every model that psdmc derives.
         """
         return bool(self._leads.any(axis=1).all())
 
@@ -210,7 +210,7 @@ class DynamicsModel(Answers):
 
     @property
     def file_theta_b(self) -> Array | None:
-        """Return theta_b, (l,), computed from the links whose inertia is known; None if no inertia is known."""
+        """Return theta_b, (l,), with links of unknown inertia counted as massless; None if no inertia is known."""
         if self.theta_b is not None:
             return self.theta_b
         known = self.mechanism.known_parameters
@@ -264,7 +264,7 @@ class DynamicsModel(Answers):
     ) -> Array:
         """Compute the joint torques tau, (..., nv), of a motion: N m, or N for sliding joints.
 
-            q          (..., nq) joint positions, rad or m
+            q          (..., nq) joint positions, rad or m; the leading axes (...) count states
             qd, qdd    (..., nv) joint rates and accelerations
             theta_b    (l,) base parameters in place of the model's; optional
             out        array that takes the result; optional
@@ -275,9 +275,9 @@ class DynamicsModel(Answers):
         return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
     def torques_for(self, theta_b: ArrayLike, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """Compute the torques, (..., nv), of `inverse_dynamics` with the base parameters theta_b, (l,), as first argument.
+        """Compute the joint torques tau, (..., nv), of a motion, for a robot with the base parameters theta_b, (l,).
 
-        q          (..., nq) joint positions, rad or m
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
         qd, qdd    (..., nv) joint rates and accelerations
         """
         theta = real_array("theta_b", theta_b)
@@ -295,7 +295,7 @@ class DynamicsModel(Answers):
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
         """Compute the regressor Y, (..., nv, l): the torques of inverse dynamics are tau = Y theta_b.
 
-        q          (..., nq) joint positions, rad or m
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
         qd, qdd    (..., nv) joint rates and accelerations
         out        array that takes the result; optional
         """
@@ -306,7 +306,7 @@ class DynamicsModel(Answers):
     ) -> Array:
         """Compute the joint-space mass matrix M(q), (..., nv, nv), with both triangles filled; kg m^2, kg m or kg.
 
-        q          (..., nq) joint positions, rad or m
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
         theta_b    (l,) base parameters in place of the model's; optional
         out        array that takes the result; optional
         """
@@ -317,7 +317,7 @@ class DynamicsModel(Answers):
     ) -> Array:
         """Compute the Coriolis, centrifugal and gravity torques h(q, qd), (..., nv): N m, or N for sliding joints.
 
-        q          (..., nq) joint positions, rad or m
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
         qd         (..., nv) joint rates
         theta_b    (l,) base parameters in place of the model's; optional
         out        array that takes the result; optional
@@ -327,7 +327,7 @@ class DynamicsModel(Answers):
     def gravity(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None) -> Array:
         """Compute the gravity torques g(q), (..., nv), which hold the robot still: N m, or N for sliding joints.
 
-        q          (..., nq) joint positions, rad or m
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
         theta_b    (l,) base parameters in place of the model's; optional
         out        array that takes the result; optional
         """
@@ -335,7 +335,7 @@ class DynamicsModel(Answers):
 
     @property
     def base_parameters(self) -> BaseParameters:
-        """Return a tuple with the equation, unit and value of each entry of theta_b; an unknown value is None.
+        """Return the base parameters: a tuple with the equation, unit and value of each. An unknown value is None.
 
         The tuple's method `to_frame()` returns a pandas data frame, and `to_latex()` returns LaTeX.
         """
@@ -372,7 +372,7 @@ class DynamicsModel(Answers):
         return store.content_hash(self)
 
     def save(self, path: str | Path) -> None:
-        """Write the model to a file, as `psdmc.save(model, path)` does."""
+        """Write the model to a file that `psdmc.load` reads, as `psdmc.save(model, path)` does."""
         store.save(self, path)
 
     def with_payload(
