@@ -210,7 +210,7 @@ class DynamicsModel(Answers):
 
     @property
     def file_theta_b(self) -> Array | None:
-        """Return theta_b, (l,), with links of unknown inertia counted as massless; None if no inertia is known."""
+        """Return theta_b, (l,), with unknown parameters of links counted as zero; None if no inertia is known."""
         if self.theta_b is not None:
             return self.theta_b
         known = self.mechanism.known_parameters
