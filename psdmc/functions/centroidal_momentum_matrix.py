@@ -61,7 +61,8 @@ RECIPE = Recipe(
     Signature(
         "centroidal_momentum_matrix",
         175,
-        "A(q) with A qd the linear momentum (kg m/s), then the angular momentum about the centre of mass (kg m^2/s) of all "
+        "matrix A(q): A qd is the linear momentum (kg m/s), then the angular momentum about the centre of "
+        "mass (kg m^2/s) of all "
         "links, along the base frame's axes",
         (Q,),
         (

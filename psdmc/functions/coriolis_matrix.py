@@ -50,7 +50,7 @@ RECIPE = Recipe(
     Signature(
         "coriolis_matrix",
         50,
-        "C(q, qd) with dM/dt - 2 C skew-symmetric",
+        "Coriolis matrix C(q, qd), for which dM/dt - 2 C is skew-symmetric",
         (Q, QD),
         (Quantity("C", ("nv", "nv"), means="Coriolis matrix, SI units"),),
         theta=True,

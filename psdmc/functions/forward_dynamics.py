@@ -34,7 +34,7 @@ RECIPE = Recipe(
     Signature(
         "forward_dynamics",
         20,
-        "qdd = M(q)^-1 (tau - h(q, qd))",
+        "joint accelerations that torques cause, qdd = M(q)^-1 (tau - h(q, qd))",
         (Q, QD, TAU),
         (QDD,),
         theta=True,

@@ -35,7 +35,7 @@ RECIPE = Recipe(
     Signature(
         "gravity",
         60,
-        "g(q)",
+        "gravity torques g(q), which hold the robot still",
         (Q,),
         (Quantity("g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints"),),
         theta=True,

@@ -48,7 +48,7 @@ RECIPE = Recipe(
     Signature(
         "gravity_derivatives",
         194,
-        "g(q) and d g / d q; row i: derivatives of g[i]",
+        "gravity torques g(q), and d g / d q; row i: derivatives of g[i]",
         (Q,),
         (
             Quantity("g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints"),

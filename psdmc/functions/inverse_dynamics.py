@@ -31,7 +31,7 @@ RECIPE = Recipe(
     Signature(
         "inverse_dynamics",
         10,
-        "tau = M(q) qdd + h(q, qd)",
+        "joint torques of a motion, tau = M(q) qdd + h(q, qd)",
         (Q, QD, QDD),
         (TAU,),
         theta=True,

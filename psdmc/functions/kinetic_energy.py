@@ -47,7 +47,7 @@ RECIPE = Recipe(
     Signature(
         "kinetic_energy",
         130,
-        "T = qd^T M(q) qd / 2 in J, drive inertias included",
+        "kinetic energy T = qd^T M(q) qd / 2 (J), drive inertias included",
         (Q, QD),
         (Quantity("T", means="kinetic energy, J"),),
         theta=True,

@@ -31,7 +31,7 @@ RECIPE = Recipe(
     Signature(
         "mass_matrix",
         30,
-        "M(q), both triangles",
+        "mass matrix M(q), both triangles",
         (Q,),
         (Quantity("M", ("nv", "nv"), means="symmetric matrix, both triangles filled; kg m^2, kg m or kg"),),
         theta=True,

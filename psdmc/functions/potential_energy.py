@@ -43,7 +43,7 @@ RECIPE = Recipe(
     Signature(
         "potential_energy",
         140,
-        "U with dU/dq = g(q) in J; U(0) = 0, as theta_b does not show the energy there",
+        "potential energy U(q) (J), zero at q = 0; dU/dq = g(q)",
         (Q,),
         (Quantity("U", means="potential energy, J; zero at q = 0"),),
         theta=True,

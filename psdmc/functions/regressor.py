@@ -31,7 +31,7 @@ RECIPE = Recipe(
     Signature(
         "regressor",
         70,
-        "Y with tau = Y theta_b",
+        "regressor Y(q, qd, qdd): tau = Y theta_b",
         (Q, QD, QDD),
         (Quantity("Y", ("nv", "l"), means="regressor: row i belongs to tau[i], column j to theta_b[j]"),),
         theta=False,

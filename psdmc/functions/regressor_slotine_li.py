@@ -36,7 +36,7 @@ RECIPE = Recipe(
     Signature(
         "regressor_slotine_li",
         80,
-        "Y with M(q) qdd_r + C(q, qd) qd_r + g(q) = Y theta_b",
+        "regressor Y of adaptive control (Slotine and Li): Y theta_b = M(q) qdd_r + C(q, qd) qd_r + g(q)",
         (
             Q,
             QD,
