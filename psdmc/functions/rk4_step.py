@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 STAGE_PIVOTS = Positive(
     Quantity("pivot", ("4", "nv")),
-    which="the joint whose pivot is not positive, plus n for each stage of the step before",
-    reason=PIVOTS.reason,
+    which=f"{PIVOTS.which}, + n times the stage of the step",
     spoilt="states",
 )
 

@@ -75,14 +75,12 @@ class Quantity:
 class Positive:
     """Intermediate results that must be positive, entry by entry, for the function to have a result.
 
-    which   says in words which entry is not positive
-    reason  says what that means
+    which   says in words which entry is not positive, and what that means
     spoilt  says which outputs become NaN then
     """
 
     quantity: Quantity
     which: str
-    reason: str
     spoilt: str
 
 

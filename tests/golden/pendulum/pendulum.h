@@ -22,8 +22,8 @@
  *   _batch      one state per row
  *   _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too
  *   _theta      with the base parameters theta_b given at run time (_theta_batch: one theta_b for all rows)
- * forward_dynamics returns 0, or 1 + the joint whose pivot is not positive, or (batch) 1 + the first
- * row that has one; the accelerations of such a state are NaN.
+ * forward_dynamics returns 0, or 1 + the number of the joint, from 0, at which the mass matrix is not positive definite.
+ * A batch returns 0, or 1 + the first row that fails. The accelerations of such a state are NaN.
  */
 #ifndef pendulum_H
 #define pendulum_H
