@@ -54,7 +54,7 @@ def identify_payload(
     frame             frame of the results: None: the tip, or the name of another frame of the model
     logs              logs that were recorded with the load, or a log description
     options           filter and friction law of the fit; None: those of the log description, or of the model's calibration
-    torque_constants  N m/A by joint name, for logs of currents; None: the model's
+    torque_constants  N m/A at the joint, gear included, by joint name, for logs of currents; None: the model's
 
     Raises InputError if a log cannot be used, nothing moves, or the model's theta_b is unknown.
     """
