@@ -29,7 +29,7 @@ def calibrate(
     `.doubts` explain it. `.model` is the calibrated model, for every verdict.
 
     model              a model, or the path of a model file
-    torque_constants   N m/A at the joint, gear included, by joint name: for logs of currents, and for joints that do not feel the load
+    torque_constants   N m/A at the joint (gear included), for logs of currents and for joints that do not feel the load
     validation         logs that are used for the test only; all other logs are then used for the fit only
 
     loaded             more logs of currents, recorded with a known load on the robot, to find torque constants
