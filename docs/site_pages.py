@@ -47,6 +47,7 @@ MENU = {
         "how-to/batch",
         "how-to/derivatives",
         "how-to/casadi",
+        "how-to/floating-base",
         "how-to/whole-body",
         "how-to/many-robots",
         "how-to/plan-campaign",
