@@ -47,7 +47,10 @@ def calibrate(
     ] = None,
     torque_constants: Annotated[
         list[str] | None,
-        typer.Option(metavar="JOINT=KT,...", help="torque constants in N m/A, for logs of currents"),
+        typer.Option(
+            metavar="JOINT=KT,...",
+            help="joint torque per ampere in N m/A, gear included, for logs of currents",
+        ),
     ] = None,
     loaded: Annotated[
         list[Path] | None,

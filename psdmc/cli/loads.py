@@ -36,7 +36,7 @@ def payload(
         list[str] | None,
         typer.Option(
             metavar="JOINT=KT,...",
-            help="torque constants in N m/A, for logs of currents; default: the model's",
+            help="joint torque per ampere in N m/A, gear included; default: the model's",
         ),
     ] = None,
     keep: Annotated[
