@@ -172,7 +172,7 @@ OWN = {
     "toolchain/cache_entry.py": "the user's own cache, by its size",
     "toolchain/direct_calls.py": "psdmc's own sources",
     "toolchain/kept_kernels.py": "the user's own cache, sealed",
-    "toolchain/kept_libraries.py": "the user's own cache, sealed",
+    "toolchain/compile.py": "the user's own cache, sealed",
     "toolchain/stubs.py": "psdmc's own sources",
 }
 """What is read whole and is no input of a user's: file of psdmc, and whose it is."""

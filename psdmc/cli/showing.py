@@ -89,7 +89,7 @@ def _show_robot(found: Mechanism, json: bool) -> None:
 
         print_json("robot", mechanism_json(found))
         return
-    from psdmc.cli.show_robot import print_mechanism
+    from psdmc.cli.show_json import print_mechanism
 
     print_mechanism(found)
 

@@ -14,14 +14,12 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.limits import TINIEST
 from psdmc.robot.mjcf_faults import Follows
-from psdmc.robot.mjcf_kept import kept_tree
-from psdmc.robot.mjcf_names import Names
-from psdmc.robot.mjcf_terms import armatures
+from psdmc.robot.mjcf_terms import Names, armatures
 from psdmc.robot.names import free_name
 from psdmc.robot.source_words import BALL, DRIVE, MJCF, NOTE
 
@@ -206,3 +204,63 @@ def _number(value: Any) -> str:
     """All digits of a number; what is smaller than URDFs may have is zero."""
     plain = float(value)
     return repr(plain) if abs(plain) >= TINIEST else "0"
+
+
+# The same model in MJCF's own words. It shares no computation with the URDF above: every number is copied from MuJoCo's
+# arrays to the attribute that MuJoCo fills that array from.
+COMPILER = {
+    "angle": "radian",
+    "autolimits": "false",
+    "balanceinertia": "false",
+    "boundmass": "0",
+    "boundinertia": "0",
+    "fusestatic": "false",
+    "inertiafromgeom": "false",
+}
+"""Settings by which MuJoCo keeps these numbers."""
+
+
+def kept_tree(mujoco: Any, model: Any, names: Names) -> Element:
+    """A <mujoco> element: bodies, inertias, joints, their drives' inertias and gravity."""
+    root = Element("mujoco", model="kept")
+    SubElement(root, "compiler", COMPILER)
+    SubElement(root, "option", gravity=_mjcf_kept_numbers(model.opt.gravity))
+    drives = armatures(mujoco, model)
+    elements = [SubElement(root, "worldbody")]
+    for body in range(1, model.nbody):
+        place = {
+            "pos": _mjcf_kept_numbers(model.body_pos[body]),
+            "quat": _mjcf_kept_numbers(model.body_quat[body]),
+        }
+        element = SubElement(elements[model.body_parentid[body]], "body", {"name": names.body(body), **place})
+        elements.append(element)
+        _inertial(element, model, body)
+        first = int(model.body_jntadr[body])
+        for j in range(first, first + int(model.body_jntnum[body])):
+            _joint(element, mujoco, model, j, names.joint(j), drives[j])
+    return root
+
+
+def _inertial(element: Element, model: Any, body: int) -> None:
+    if model.body_mass[body] > 0.0 or model.body_inertia[body].any():
+        words = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
+        values = {word: getattr(model, f"body_{array}")[body] for word, array in words.items()}
+        SubElement(element, "inertial", {word: _mjcf_kept_numbers(value) for word, value in values.items()})
+
+
+def _joint(element: Element, mujoco: Any, model: Any, j: int, name: str, drive: float) -> None:
+    kinds = mujoco.mjtJoint
+    kind = kinds(model.jnt_type[j]).name.removeprefix("mjJNT_").lower()
+    joint = SubElement(element, "joint", name=name, type=kind)
+    if kind == "free":
+        return
+    joint.set("pos", _mjcf_kept_numbers(model.jnt_pos[j]))
+    joint.set("armature", _mjcf_kept_numbers(drive))
+    if kind != "ball":
+        joint.set("axis", _mjcf_kept_numbers(model.jnt_axis[j]))
+        joint.set("ref", _mjcf_kept_numbers(model.qpos0[model.jnt_qposadr[j]]))
+
+
+def _mjcf_kept_numbers(values: ArrayLike) -> str:
+    """All digits of one or several numbers."""
+    return " ".join(repr(float(value)) for value in np.atleast_1d(values))

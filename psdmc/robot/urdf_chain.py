@@ -3,35 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psdmc.errors import InputError
 from psdmc.reproducible import times
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
-from psdmc.robot.joints import URDF_TYPES, JointType
+from psdmc.robot.joints import FREE, URDF_TYPES, JointType
 from psdmc.robot.limits import shown
 from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
-from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
+from psdmc.robot.mechanism import Array, Joint, Limits, NamedFrame, Placement
 from psdmc.robot.mimic import mimic_coordinates
 from psdmc.robot.missing_inertia import judged_bodies
-from psdmc.robot.right_angles import coarse_right_angles
+from psdmc.robot.names import free_name
 from psdmc.robot.snap import (
     ROUNDING,
     angle_between,
+    coarse_right_angles,
     link_rotation,
     snap_axis,
     snap_rotation,
     snap_translation,
 )
 from psdmc.robot.tree import Route, find_route, listed
-from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
+from psdmc.robot.urdf import Origin, UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import bodies_of, hold_against_pinocchio, merged_parameters, place_of
-from psdmc.robot.urdf_floating import on_free_root
-from psdmc.robot.urdf_frames import urdf_frames
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""
@@ -226,3 +226,102 @@ def _faults(robot: UrdfRobot) -> list[str]:
         if fault:
             notes.append(f"link '{link}': {fault}: not physical")
     return notes
+
+
+ROOT_JOINT = "root_joint"
+"""Pinocchio's name of the free joint; more underscores follow where a joint of the file is called so."""
+
+WORLD = "universe"
+"""Pinocchio's name of what the free joint hangs on; more underscores follow where a link of the file is called so."""
+
+
+def on_free_root(robot: UrdfRobot) -> UrdfRobot:
+    """The robot with its root link on a free joint, whose frames are the world's and the root link's own."""
+    name = free_name(ROOT_JOINT, {joint.name for joint in robot.joints})
+    world = free_name(WORLD, set(robot.inertials))
+    free = UrdfJoint(
+        name=name,
+        type=FREE.urdf_words[0],
+        parent=world,
+        child=robot.root,
+        origin=Origin(),
+        axis=(0.0, 0.0, 1.0),
+        limits=Limits(),
+        mimic=None,
+        has_dynamics=False,
+    )
+    return replace(
+        robot,
+        root=world,
+        inertials={world: None, **robot.inertials},
+        joints=(free, *robot.joints),
+        free_root=name,
+    )
+
+
+def urdf_frames(
+    robot: UrdfRobot,
+    route: Route,
+    joints: Sequence[Joint],
+    tip: NamedFrame,
+    names: Iterable[str],
+    source: str,
+) -> tuple[NamedFrame, ...]:
+    """The named links, placed by the file's own numbers; the tip as in the chain.
+
+    InputError where a link does not exist, does not move, or is not rigidly on one of the chain's links.
+    """
+    carriers = {joint.name: number for number, joint in enumerate(joints)}
+    return tuple(
+        tip if name == tip.name else _urdf_frames_placed(robot, route, joints, carriers, name, source)
+        for name in names
+    )
+
+
+def _urdf_frames_placed(
+    robot: UrdfRobot, route: Route, joints: Sequence[Joint], carriers: dict[str, int], name: str, source: str
+) -> NamedFrame:
+    if name not in robot.inertials:
+        raise InputError(
+            f"{source}: frame {shown(name)} is no link of the file",
+            f"links that can be frames: {listed(_rigid(robot, carriers))}",
+        )
+    fixed, carrier = _carried_by(robot, name)
+    if carrier is None:
+        raise InputError(
+            f"{source}: frame {shown(name)} is fixed to the root: no joint moves it",
+            f"links that can be frames: {listed(_rigid(robot, carriers))}",
+        )
+    if carrier.name not in carriers:
+        above = carrier in route.to_base
+        where = "above the base" if above else f"not between '{route.base}' and the tip '{route.tip}'"
+        raise InputError(
+            f"{source}: frame {shown(name)} moves with joint '{carrier.name}', which is {where}: it is on no link of the "
+            "chain",
+            f"choose another --tip or --base, or one of {listed(_rigid(robot, carriers))}",
+        )
+    number = carriers[carrier.name]
+    place = joints[number].link_frame
+    for joint in fixed:
+        place = place @ place_of(joint)
+    return NamedFrame(name, number, place)
+
+
+def _carried_by(robot: UrdfRobot, link: str) -> tuple[list[UrdfJoint], UrdfJoint | None]:
+    """Fixed joints from the link that a joint moves down to this link, and that joint; None at the root."""
+    above = {joint.child: joint for joint in robot.joints}
+    fixed: list[UrdfJoint] = []
+    while link in above and not above[link].is_movable:
+        fixed.append(above[link])
+        link = above[link].parent
+    return fixed[::-1], above.get(link)
+
+
+def _rigid(robot: UrdfRobot, carriers: dict[str, int]) -> list[str]:
+    """The links that may be frames."""
+    found = []
+    for link in robot.inertials:
+        _, carrier = _carried_by(robot, link)
+        if carrier is not None and carrier.name in carriers:
+            found.append(link)
+    return found

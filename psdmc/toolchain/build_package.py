@@ -7,14 +7,15 @@ import os
 import re
 import shlex
 import shutil
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at
 from psdmc.backends.c.own_files import edited_files
 from psdmc.errors import InputError, ToolchainError
-from psdmc.progress import Progress, silent
-from psdmc.toolchain.build_progress import told
+from psdmc.progress import Progress, Step, silent
 from psdmc.toolchain.compiler_command import attempt, failure, find_compiler, run
 
 FAILED = ": FAILED"
@@ -144,3 +145,43 @@ def failed_checks(report: str) -> list[str]:
     """The failed checks of a self-test's report, each once: ctest numbers its lines, and repeats them."""
     lines = (re.sub(r"^\d+: ", "", line.strip()) for line in report.splitlines())
     return list(dict.fromkeys(line.removesuffix(FAILED) for line in lines if line.endswith(FAILED)))
+
+
+TICK = 0.25
+"""s between two looks."""
+
+OBJECTS = ("*.o", "*.obj")
+
+FOLDERS = ("src", "test")
+"""Of a package, as CMake names them in its build folder: objects elsewhere are of CMake's own trials."""
+
+
+@contextmanager
+def told(build: Path, files: int, progress: Progress) -> Iterator[None]:
+    """Tell `progress` of the share of `files` object files that have come below `build`, until the block ends.
+
+    A compiler says nothing while it works: without this a build would be one step, however long. Files of an earlier
+    build are there from the beginning, and then the time left is not known.
+    """
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.wait(TICK):
+            progress(_step(build, files))
+
+    progress(_step(build, files))
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        done.set()
+        watcher.join()
+
+
+def _step(build: Path, files: int) -> Step:
+    count = 0
+    with suppress(OSError):  # a folder that the build takes away at this moment
+        found = [path.parent for pattern in OBJECTS for path in build.rglob(pattern)]
+        count = min(files, sum(1 for folder in found if folder == build or folder.name in FOLDERS))
+    return Step(f"building: {count} of {files} files", count / max(files, 1))

@@ -8,20 +8,21 @@ the same entry, each in a folder of its own that it renames into place: the late
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
 import shutil
 import sys
 import sysconfig
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from psdmc.atomic import can_lock, lock, unlock
 from psdmc.errors import ToolchainError
-from psdmc.toolchain.cache_entry import is_sound, seal, touch
 from psdmc.toolchain.cache_place import cache_limit, open_cache, unusable
-from psdmc.toolchain.cache_room import hold, make_room, new_folder, remove, sweep
-from psdmc.toolchain.cache_turns import turn
+from psdmc.toolchain.cache_room import hold, is_sound, make_room, new_folder, remove, seal, sweep, touch
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
@@ -92,3 +93,43 @@ def _install(own: Path, final: Path) -> None:
         if os.path.lexists(final):
             remove(final)
         own.rename(final)
+
+
+LONGEST = 600.0
+"""Seconds that one waits for another process: as long as a run of the compiler may take. Then one builds beside it."""
+BETWEEN = 0.02
+"""Seconds between two looks."""
+
+
+@contextlib.contextmanager
+def turn(place: Path, key: str) -> Iterator[None]:
+    """Hold the only right to build an entry, waiting for the process or thread that has it.
+
+    The lock is given back explicitly: a process that was forked meanwhile has a copy of the handle, which would keep it.
+    Where the file system has no locks, no process waits.
+    """
+    path = place / f".turn-{key[:16]}"
+    handle = _taken(path)
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        unlock(handle)
+        os.close(handle)
+
+
+def _taken(path: Path) -> int:
+    """The lock file, open and locked. A file that was removed before it was locked excludes no other process: it is made
+    and locked again."""
+    until = time.monotonic() + LONGEST
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+        if not can_lock(handle):
+            return handle
+        while not lock(handle, wait=False):
+            if time.monotonic() > until:
+                return handle
+            time.sleep(BETWEEN)
+        if os.fstat(handle).st_nlink:
+            return handle
+        os.close(handle)

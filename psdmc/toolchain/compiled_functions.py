@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
+from html import escape
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import cffi
 import numpy as np
@@ -21,8 +22,138 @@ from psdmc.toolchain.call_arguments import RobotAxes, common_lead, parameters, s
 from psdmc.toolchain.interface import Interface, batch_symbol
 from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
 from psdmc.toolchain.origin import Origin
-from psdmc.toolchain.robot_facts import RobotFacts
 from psdmc.toolchain.stubs import result_name
+
+MOST_NAMES = 8
+"""Names that a repr lists."""
+
+Vector = NDArray[np.float64]
+
+
+class JointLimits(NamedTuple):
+    """Limits of n joints as (n,) arrays, in rad or m and their rates, N m or N; infinite where the robot's file has none."""
+
+    lower: Vector
+    upper: Vector
+    speed: Vector
+    acceleration: Vector
+    effort: Vector
+
+
+class RobotFacts:
+    """Names, sizes, limits and parameters of a compiled robot with n joints and l base parameters."""
+
+    def __init__(self, interface: Interface) -> None:
+        self._interface = interface
+
+    @property
+    def name(self) -> str:
+        """Name of the robot in C, the prefix of its functions."""
+        return self._interface.robot
+
+    @property
+    def n(self) -> int:
+        """Number of joints that do not follow another joint."""
+        return self._interface.n
+
+    @property
+    def nq(self) -> int:
+        """Length of q."""
+        return self._interface.nq
+
+    @property
+    def nv(self) -> int:
+        """Length of qd, qdd and tau."""
+        return self._interface.nv
+
+    @property
+    def l(self) -> int:  # noqa: E743  the paper's letter
+        """Number of base parameters."""
+        return self._interface.l
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints, from base to tip."""
+        return self._interface.joint_names
+
+    @property
+    def q_names(self) -> tuple[str, ...]:
+        """Names of the nq entries of q: the joint's name, or 'root_joint.x' and so on for a joint with several entries."""
+        return self._interface.q_names
+
+    @property
+    def v_names(self) -> tuple[str, ...]:
+        """Names of the nv entries of rates, accelerations and torques, such as 'elbow' or 'root_joint.vx'."""
+        return self._interface.v_names
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of the frames of poses, Jacobians and wrenches, in the order of results."""
+        return self._interface.frame_names
+
+    @property
+    def dtype(self) -> np.dtype[np.float64] | np.dtype[np.float32]:
+        """NumPy type of all results: float64 or float32."""
+        single, double = np.dtype(np.float32), np.dtype(np.float64)
+        return single if self._interface.dtype == "float32" else double
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """Names of the compiled functions."""
+        return tuple(dict.fromkeys(name.removesuffix("_theta") for name in self._interface.kernels))
+
+    @cached_property
+    def limits(self) -> JointLimits:
+        """Limits of the joints from the robot file, each (n,). The functions do not enforce them."""
+        columns = np.array(self._interface.limits, np.float64).T
+        return JointLimits(*(_frozen(column) for column in columns))
+
+    @cached_property
+    def gravity_acceleration(self) -> Vector:
+        """Gravity, (3,) m/s^2 in the base frame, or in the world frame of a floating base; it is part of the code."""
+        return _frozen(self._interface.gravity)
+
+    @cached_property
+    def theta_b(self) -> Vector | None:
+        """Base parameters in the code, (l,), SI; None if unknown: functions then need the argument `theta_b`."""
+        values = self._interface.theta_b
+        return None if values is None else _frozen(values)
+
+    def __repr__(self) -> str:
+        return "\n  ".join([self._title, *self._facts()])
+
+    def _repr_html_(self) -> str:
+        facts = "".join(f"<li>{escape(fact)}</li>" for fact in self._facts())
+        return f"<div><p><b>{escape(self._title)}</b></p><ul>{facts}</ul></div>"
+
+    @property
+    def _title(self) -> str:
+        return f"CompiledRobot {self.name!r}: {self.n} joints, {self._interface.dtype}"
+
+    def _facts(self) -> list[str]:
+        lengths = [] if self.nq == self.nv == self.n else [f"nq = {self.nq}, nv = {self.nv}"]
+        gravity = " ".join(f"{value:g}" for value in self._interface.gravity)
+        compiled_in = "given in calls" if self._interface.theta_b is None else "compiled in"
+        return [
+            f"joints: {_listed(map(repr, self.joint_names))}",
+            *lengths,
+            f"gravity: {gravity} m/s^2 in the {self._interface.base_frame}",
+            f"l = {self.l} base parameters, {compiled_in}",
+            f"functions: {_listed(self.functions)}",
+        ]
+
+
+def _listed(names: Iterable[str]) -> str:
+    found = tuple(names)
+    more = len(found) - MOST_NAMES
+    return ", ".join(found[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _frozen(values: object) -> Vector:
+    array = np.array(values, np.float64)
+    array.setflags(write=False)
+    return array
+
 
 Array = NDArray[Any]
 

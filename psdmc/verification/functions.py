@@ -16,7 +16,7 @@ from psdmc.recipes.packed import VALUES, unpacked
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.reproducible import in_any_order
 from psdmc.robot.mechanism import Array
-from psdmc.robot.reference_followers import OnCoordinates
+from psdmc.robot.reference import OnCoordinates
 
 STATES = 100
 SEED = 14_631

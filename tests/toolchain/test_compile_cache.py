@@ -17,11 +17,10 @@ import psdmc
 from psdmc import compiler
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError, InternalError
-from psdmc.toolchain import kept_kernels, kept_libraries
+from psdmc.toolchain import compile, kept_kernels
 from psdmc.toolchain.call import CompiledRobot
-from psdmc.toolchain.compile import LIBRARY
+from psdmc.toolchain.compile import INTERFACE, LIBRARY, compiled_once
 from psdmc.toolchain.interface import interface_from_json, interface_of, interface_to_json
-from psdmc.toolchain.kept_libraries import INTERFACE, compiled_once
 
 PARTS = ("hash", "auto", "float64")
 TRIG = [file.name for file in (resources.files("psdmc.templates") / "trig").iterdir()]
@@ -80,7 +79,7 @@ def editable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def forget_digests() -> None:
-    kept_libraries._emission.cache_clear()
+    compile._emission.cache_clear()
     kept_kernels.sources_digests.cache_clear()
 
 
@@ -107,10 +106,10 @@ def test_an_edited_source_makes_one(own_cache: Path, editable: Path, file: str) 
 
 
 def test_another_compiler_makes_one(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = kept_libraries.find_compiler()
+    found = compile.find_compiler()
 
     def update() -> None:
-        monkeypatch.setattr(kept_libraries, "find_compiler", lambda target: replace(found, version="newer"))
+        monkeypatch.setattr(compile, "find_compiler", lambda target: replace(found, version="newer"))
 
     assert calls(then=update) == 2
 
@@ -162,7 +161,7 @@ def test_a_key_is_no_path(own_cache: Path) -> None:
     (kept,) = own_cache.glob(f"*/{INTERFACE}")
     for forged in ("../cache", "/etc", "", kept.parent.name.upper()):
         kept.write_text(interface_to_json(interface_of(arm_package(names=["gravity"])), forged))
-        assert kept_libraries._opened(kept.parent) is None
+        assert compile._opened(kept.parent) is None
 
 
 def test_an_error_of_the_making_is_the_callers(own_cache: Path) -> None:
