@@ -34,7 +34,8 @@ def print_calibration(kept: Mapping[str, Any]) -> None:
         print("friction: of the motors, some of which drive several joints together")
     print_table(_joints(kept))
     if kept.get("springs"):
-        print_table(_springs(kept["springs"]))
+        each = [(one_line(row["spring"]), row["name"], _row(row), row["unit"]) for row in kept["springs"]]
+        print_table(Table(("spring", "value", "found", "unit"), each))
     print()
 
 
@@ -59,12 +60,6 @@ def _joints(kept: Mapping[str, Any]) -> Table:
         figures = [_number(held_out.get("r2"), ".4f"), _number(held_out.get("rmse"), ".3g")]
         rows.append((joint, *figures, *(_row(by_joint.get((joint, name))) for name in units)))
     return Table(("joint", "R^2 held out", "RMSE held out", *heads), rows)
-
-
-def _springs(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """A line for each value of a spring."""
-    each = [(one_line(row["spring"]), row["name"], _row(row), row["unit"]) for row in rows]
-    return Table(("spring", "value", "found", "unit"), each)
 
 
 def _row(row: Mapping[str, Any] | None) -> str:

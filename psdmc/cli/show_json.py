@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from psdmc.cli.show import cost_rows, followed, joint_errors, position_range
@@ -33,6 +33,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
     found, robot = summary(model), model.mechanism
     errors = joint_errors(robot, found.certificate)
     joints = [{**joint, "error": error} for joint, error in zip(_joints(robot), errors, strict=True)]
+    values = model.provenance.get("snap_torque_change")
     return {
         "name": found.name,
         "base": found.base,
@@ -50,7 +51,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
             for k, each in enumerate(found.base_parameters)
         ],
         "largest_torque_error": max(found.certificate),
-        "snap_torque_change": _numbers(model.provenance.get("snap_torque_change")),
+        "snap_torque_change": None if values is None else [_finite(float(value)) for value in values],
         "notes": list(found.notes),
         "calibration": _plain(model.provenance.get("calibration")),
         "source": {"name": found.source_name, "sha256": found.source_sha256},
@@ -121,10 +122,6 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _numbers(values: Iterable[float] | None) -> list[float | None] | None:
-    return None if values is None else [_finite(float(value)) for value in values]
-
-
 def _plain(value: Any) -> Any:
     """JSON's own types, numbers that JSON lacks as null."""
     if isinstance(value, dict):
@@ -140,7 +137,21 @@ def print_mechanism(found: Mechanism) -> None:
     shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
     print_line(f"{found.name}: {shape} of {count} joints with {own} coordinates, from {found.base_name}")
     print()
-    print_table(_bodies(found))
+    rows = []
+    for i, joint in enumerate(found.joints):
+        limits = joint.limits
+        rows.append(
+            (
+                joint.name,
+                joint.link_name,
+                found.parent_link(i),
+                joint.type.word,
+                followed(found, i),
+                position_range(limits.lower, limits.upper, joint.type.position_unit),
+                "unknown" if math.isnan(found.parameters[i, 0]) else f"{found.parameters[i, 0]:.6g} kg",
+            )
+        )
+    print_table(Table(("joint", "link", "hangs on", "type", "q", "position", "mass"), rows))
     print()
     for note in found.notes:
         print_note(note)
@@ -160,21 +171,3 @@ def why_not_derived(found: Mechanism) -> InputError | None:
     except InputError as refused:
         return refused
     return None
-
-
-def _bodies(found: Mechanism) -> Table:
-    rows = []
-    for i, joint in enumerate(found.joints):
-        limits = joint.limits
-        rows.append(
-            (
-                joint.name,
-                joint.link_name,
-                found.parent_link(i),
-                joint.type.word,
-                followed(found, i),
-                position_range(limits.lower, limits.upper, joint.type.position_unit),
-                "unknown" if math.isnan(found.parameters[i, 0]) else f"{found.parameters[i, 0]:.6g} kg",
-            )
-        )
-    return Table(("joint", "link", "hangs on", "type", "q", "position", "mass"), rows)

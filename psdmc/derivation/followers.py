@@ -42,7 +42,9 @@ def _of_followers(scaled: Scaled) -> Reduction:
         own = reduced(_flat(_seen(scaled, tree.pivots)))
         if own.is_clear:
             return Reduction(tree.pivots[own.pivots], times(own.echelon, tree.echelon), True)
-    rows = echelon_rows(_flat(_to_own_torque(_seen(extended(scaled), tree.pivots))))
+    rows = _seen(extended(scaled), tree.pivots)
+    largest = np.abs(rows).max(axis=(1, 2), keepdims=True, initial=0.0)
+    rows = echelon_rows(_flat(np.asarray(rows / np.where(largest > 0.0, largest, 1.0))))
     own = reduced_to_digits(rows, np.zeros(rows.shape[1], dtype=np.int64))
     return Reduction(tree.pivots[own.pivots], times(own.echelon, tree.echelon), False)
 
@@ -53,12 +55,6 @@ def _seen(scaled: Scaled, columns: NDArray[np.int64]) -> Long:
     count, nv, wide = rows.shape
     span = np.asarray((sparse.csr_array(scaled.span.T) @ rows.reshape(-1, wide).T).T)
     return np.asarray(span[:, columns].reshape(count, nv, -1).swapaxes(0, 1))
-
-
-def _to_own_torque(rows: Long) -> Long:
-    """(nv, STATES, k) with each coordinate's largest entry one."""
-    largest = np.abs(rows).max(axis=(1, 2), keepdims=True, initial=0.0)
-    return np.asarray(rows / np.where(largest > 0.0, largest, 1.0))
 
 
 def _flat(rows: Long) -> Long:

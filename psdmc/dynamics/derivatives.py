@@ -27,7 +27,7 @@ from typing import NamedTuple
 from psdmc.dynamics.body import Body, spun, turned
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import both_summed, on_coordinates, summed
-from psdmc.dynamics.frames import BASE, Frame, Turn, about_z, joint_angle, leaves
+from psdmc.dynamics.frames import BASE, Frame, about_z, joint_angle, leaves
 from psdmc.dynamics.joint_steps import Axis, Row, Step, Wrench, axis_and_step
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.moving_composite import (
@@ -136,7 +136,12 @@ def _composites(
         frame, step = frames[i], steps[i]
         whole = at_rest(bodies[i])
         if is_leaf[i] and frame.joint.about_z:
-            whole = at_rest(_leaf(frame, bodies[i], q[i], about_z(forward.states[i].turn), step, choices))
+            body = bodies[i]
+            turn = about_z(forward.states[i].turn)
+            angle = joint_angle(frame, q[i])
+            double = (angle + angle).turn() if choices.fold_double_angle else None
+            body = spun(body, turn) if double is None else turned(body, turn, double)
+            whole = at_rest(spun(body, step.turn) if step.joins else body)
         else:
             for child in hung[i]:
                 whole = both(whole, child)
@@ -153,14 +158,6 @@ def _composites(
             before = before_turn(whole, step.own)
             hung[frame.parent].append(moved_to(along_parent(frame, before), step.offset))
     return found
-
-
-def _leaf(frame: Frame, body: Body, q: Scalar, turn: Turn | None, step: Step, choices: Choices) -> Body:
-    """A body that carries no other, in its joint's orientation."""
-    angle = joint_angle(frame, q)
-    double = (angle + angle).turn() if choices.fold_double_angle else None
-    body = spun(body, turn) if double is None else turned(body, turn, double)
-    return spun(body, step.turn) if step.joins else body
 
 
 def _fill_row(

@@ -112,7 +112,17 @@ class _Inward:
             return ZERO, ZERO
         loads = _transposed([solve(factors, [column[k] for column in columns]) for k in range(6)])
         self.found[i] = _Held(own, loads, factors.pivots, along)
-        self._hand_on(i, from_rows(_relieved(rows, columns, loads, along)))
+        # The upper triangle of the inertia seen through the joint; exactly nothing is left along the joint.
+        relieved = [
+            [
+                0.0
+                if b < a or along in (a, b)
+                else rows[a][b] - _dot([c[a] for c in columns], [load[b] for load in loads])
+                for b in range(6)
+            ]
+            for a in range(6)
+        ]
+        self._hand_on(i, from_rows(relieved))
         total = [_dot(own, [column[k] for column in columns]) for k in range(6)]
         return (total[0], total[1], total[2]), (total[3], total[4], total[5])
 
@@ -176,24 +186,6 @@ def _along(frame: Frame) -> int | None:
     ((linear, angular),) = frame.joint.twists
     weights = (*linear, *angular)
     return weights.index(1.0) if sorted(weights) == [0.0] * 5 + [1.0] else None
-
-
-def _relieved(
-    rows: Sequence[Sequence[Scalar]],
-    columns: Sequence[Sequence[Scalar]],
-    loads: Sequence[Sequence[Scalar]],
-    along: int | None,
-) -> list[list[Scalar]]:
-    """The inertia seen through a joint that moves freely, its upper triangle; exactly nothing is left along the joint."""
-    return [
-        [
-            0.0
-            if b < a or along in (a, b)
-            else rows[a][b] - _dot([c[a] for c in columns], [load[b] for load in loads])
-            for b in range(6)
-        ]
-        for a in range(6)
-    ]
 
 
 def _combined(
@@ -303,8 +295,16 @@ def before_turn(inertia: Articulated, turn: Turn | Rotation | None) -> Articulat
         return inertia
     if isinstance(turn, Rotation):
         return rotated(inertia, turn.rows)
+    # The cross block is not symmetric.
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia.mixed
+    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
+    moved, crossed = turn.sine * slope, turn.cosine * slope
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    zx, zy, _ = turn.inward((zx, zy, 0.0))
     return Articulated(
-        _turned(inertia.linear, turn), _turned_mixed(inertia.mixed, turn), _turned(inertia.angular, turn)
+        _turned(inertia.linear, turn),
+        ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz)),
+        _turned(inertia.angular, turn),
     )
 
 
@@ -355,13 +355,3 @@ def _turned(six: Six, turn: Turn) -> Six:
     moved = turn.sine * slope
     xz, yz, _ = turn.inward((xz, yz, 0.0))
     return (xx - moved, yy + moved, zz, turn.cosine * slope - xy, xz, yz)
-
-
-def _turned_mixed(rows: Matrix, turn: Turn) -> Matrix:
-    """Rotate a matrix that is not symmetric."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rows
-    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
-    moved, crossed = turn.sine * slope, turn.cosine * slope
-    xz, yz, _ = turn.inward((xz, yz, 0.0))
-    zx, zy, _ = turn.inward((zx, zy, 0.0))
-    return ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))

@@ -68,17 +68,10 @@ def regressor(
                 force, moment = unit_wrench(name, motion)
                 for i, (linear, angular) in seen.items():
                     _put(rows[i], column, linear, force, angular, moment)
-        if PARAMETERS_PER_LINK * k + DRIVE in wanted:
-            _put_drive(rows, first[k], frame, PARAMETERS_PER_LINK * k + DRIVE, changes[k])
+        drive = PARAMETERS_PER_LINK * k + DRIVE
+        if drive in wanted and frame.joint.about_z:  # joints of several rates have no drive
+            rows[first[k]][drive] = changes[k]
     return rows
-
-
-def _put_drive(
-    rows: Sequence[dict[int, Scalar]], row: int, frame: Frame, column: int, change: Scalar
-) -> None:
-    """Joints of several rates have no drive."""
-    if frame.joint.about_z:
-        rows[row][column] = change
 
 
 def _put(

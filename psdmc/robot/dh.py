@@ -148,7 +148,14 @@ def _joint(value: object, number: int, problems: list[str]) -> DhJoint:
 def _limits(value: object, joint: JointType, where: str, problems: list[str]) -> Limits:
     table = CheckedTable(value, where, LIMIT_KEYS, problems)
     convert = partial(angle, accepted=limits.ANY) if joint.position_unit == "rad" else finite
-    lower, upper = table.read("position", range_of(convert), (-math.inf, math.inf))
+
+    def read(value: object) -> tuple[float, float]:
+        values = any_list(value)
+        if len(values) != 2 or convert(values[0]) > convert(values[1]):
+            raise ValueError(f"found {shown(value)}, expected [lower, upper]")
+        return convert(values[0]), convert(values[1])
+
+    lower, upper = table.read("position", read, (-math.inf, math.inf))
     speed, acceleration, effort = (
         table.read(key, not_negative(reader), math.inf)
         for key, reader in (("speed", convert), ("acceleration", convert), ("effort", finite))
@@ -304,18 +311,6 @@ def one_of(*words: str) -> Callable[[object], str]:
     return read
 
 
-def range_of(convert: Callable[[Any], float]) -> Callable[[object], tuple[float, float]]:
-    """A reader of [lower, upper]."""
-
-    def read(value: object) -> tuple[float, float]:
-        values = any_list(value)
-        if len(values) != 2 or convert(values[0]) > convert(values[1]):
-            raise ValueError(f"found {shown(value)}, expected [lower, upper]")
-        return convert(values[0]), convert(values[1])
-
-    return read
-
-
 BASE_NAME = "base"
 """The name of the base in `parent`, as in messages and frames."""
 
@@ -333,7 +328,13 @@ def parents_of(names: Sequence[str], given: Sequence[object]) -> tuple[tuple[int
     if BASE_NAME in names and BASE_NAME in given:
         faults.append(f"a joint is called '{BASE_NAME}', and a parent: rename the joint")
     for i, parent in enumerate(given):
-        open_rows = [BASE, *_carriers(parents, i - 1)]
+        # Open are the base, the row before, and the rows that carry that one, from the base outward.
+        row = i - 1
+        found: list[int] = []
+        while row != BASE:
+            found.append(row)
+            row = parents[row]
+        open_rows = [BASE, *found[::-1]]
         where = i - 1 if parent is None else _row(names, parent)
         if where is None:
             said = f"found {shown(parent)}, expected '{BASE_NAME}' or the name of a joint"
@@ -352,12 +353,3 @@ def _row(names: Sequence[str], parent: object) -> int | None:
     if parent == BASE_NAME:
         return BASE
     return names.index(parent) if isinstance(parent, str) and parent in names else None
-
-
-def _carriers(parents: Sequence[int], row: int) -> list[int]:
-    """A row and the rows that carry it, from the base outward."""
-    found: list[int] = []
-    while row != BASE:
-        found.append(row)
-        row = parents[row]
-    return found[::-1]

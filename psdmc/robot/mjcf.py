@@ -61,12 +61,29 @@ def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
 
     InputError where MuJoCo is not installed or refuses the file, and where the file has what psdmc does not model.
     """
-    mujoco = _mujoco(source)
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError(
+            f"{source}: an MJCF file, which MuJoCo reads, and MuJoCo is not installed",
+            "pip install 'psdmc[mjcf]', or give a URDF",
+        ) from None
     refuse_many_copies(path, source)
     model, warned = _compiled(mujoco, path, source)
     names = Names.of(mujoco, model)
     if root is not None:
-        others = _other_roots(mujoco, model, names, root, source)
+        # The world's other moving bodies are left out.
+        roots = _moving_roots(model)
+        if root not in [names.body(b) for b in roots]:
+            raise InputError(
+                f"{source}: --root {shown(root)} is none of the bodies under the world that move",
+                f"choose one of {_listed_roots(mujoco, model, names)}",
+            )
+        if not hasattr(getattr(mujoco, "MjSpec", None), "delete"):
+            raise InputError(
+                f"{source}: --root needs a newer MuJoCo than {mujoco.__version__}", "pip install -U mujoco"
+            )
+        others = [b for b in roots if names.body(b) != root]
         if others:
             model, warned = _compiled(mujoco, path, source, others)
             warned = [*warned, f"left out by --root {root}: {listed([names.body(b) for b in others])}"]
@@ -80,17 +97,6 @@ def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
     return MjcfRobot(
         tree_text(mujoco, model, names, follows, free, notes), gravity(mujoco, model), free is not None
     )
-
-
-def _mujoco(source: str) -> Any:
-    try:
-        import mujoco
-    except ImportError:
-        raise InputError(
-            f"{source}: an MJCF file, which MuJoCo reads, and MuJoCo is not installed",
-            "pip install 'psdmc[mjcf]', or give a URDF",
-        ) from None
-    return mujoco
 
 
 def _compiled(mujoco: Any, path: Path, source: str, left_out: Sequence[int] = ()) -> tuple[Any, list[str]]:
@@ -144,21 +150,6 @@ def _listed_roots(mujoco: Any, model: Any, names: Names) -> str:
     return ", ".join(
         f"{shown(names.body(b))}{' (free)' if b in free else ''}" for b in _moving_roots(model)[:MOST_LISTED]
     )
-
-
-def _other_roots(mujoco: Any, model: Any, names: Names, root: str, source: str) -> list[int]:
-    """The world's moving bodies but the one of that name; InputError where there is none of that name."""
-    roots = _moving_roots(model)
-    if root not in [names.body(b) for b in roots]:
-        raise InputError(
-            f"{source}: --root {shown(root)} is none of the bodies under the world that move",
-            f"choose one of {_listed_roots(mujoco, model, names)}",
-        )
-    if not hasattr(getattr(mujoco, "MjSpec", None), "delete"):
-        raise InputError(
-            f"{source}: --root needs a newer MuJoCo than {mujoco.__version__}", "pip install -U mujoco"
-        )
-    return [b for b in roots if names.body(b) != root]
 
 
 def _with_massless(mujoco: Any, path: Path, left_out: Sequence[int]) -> Any:

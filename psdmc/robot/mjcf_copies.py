@@ -113,11 +113,6 @@ def _root(path: Path, source: str) -> Element | None:
             f"{source}: not well-formed XML ({shown(str(error))}), so that what it repeats cannot be counted",
             "correct it, or write the copies out",
         ) from None
-    _refuse_depth(root, source)
-    return root
-
-
-def _refuse_depth(root: Element, source: str) -> None:
     level, depth = [root], 0
     while level:
         level, depth = [child for element in level for child in element], depth + 1
@@ -125,6 +120,7 @@ def _refuse_depth(root: Element, source: str) -> None:
         raise InputError(
             f"{source}: elements within each other {depth} deep, expected {MAX_DEPTH} at most", "nest less"
         )
+    return root
 
 
 def _text(path: Path, source: str) -> bytes:
@@ -148,7 +144,14 @@ def _of_element(element: Element, folder: Path, document: _Document, reading: _R
             for where in dict.fromkeys((folder, document.path.parent))
         ]
     elif element.tag == "model" and file:
-        inside.append(_model(folder / file, element.get("name"), document, reading))
+        # A model to attach, which MuJoCo reads where it is named; what is read again are copies.
+        path = folder / file
+        is_new = _resolved(path) not in reading.counts
+        found = _of_document(path, reading)
+        root = reading.documents[_resolved(path)].root
+        own = root.get("model") if root is not None else None
+        document.models[element.get("name") or own or ""] = path
+        inside.append(found if is_new else _Count(found.elements, found.elements))
     elif element.tag == "attach":
         inside.append(_attached(element, document, reading))
     elements = sum(part.elements for part in inside)
@@ -166,16 +169,6 @@ def _included(path: Path, document: _Document, reading: _Reading) -> _Count:
     document.included.add(where)
     root = _root(path, reading.source)
     return _Count(1.0, 0.0) if root is None else _of_element(root, path.parent, document, reading)
-
-
-def _model(path: Path, name: str | None, document: _Document, reading: _Reading) -> _Count:
-    """A model to attach, which MuJoCo reads where it is named; what is read again are copies."""
-    is_new = _resolved(path) not in reading.counts
-    found = _of_document(path, reading)
-    root = reading.documents[_resolved(path)].root
-    own = root.get("model") if root is not None else None
-    document.models[name or own or ""] = path
-    return found if is_new else _Count(found.elements, found.elements)
 
 
 def _attached(element: Element, document: _Document, reading: _Reading) -> _Count:

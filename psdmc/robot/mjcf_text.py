@@ -73,7 +73,12 @@ def tree_text(
     notes: Sequence[str],
 ) -> str:
     """A URDF; `follows` are the joints that follow others, `free` is the body that is to be the root, on a free joint."""
-    robot = Element("robot", name=_robot_name(model), version="1.1")
+    # The model's own name is the first of its names.
+    robot = Element(
+        "robot",
+        name=(model.names[: model.names.index(b"\0")].decode(errors="replace") or "robot"),
+        version="1.1",
+    )
     for note in notes:
         SubElement(robot, NOTE, text=note)
     drives = armatures(mujoco, model)
@@ -191,11 +196,6 @@ def _rotated(mujoco: Any, turn: Array, vector: Array) -> Array:
     return found
 
 
-def _robot_name(model: Any) -> str:
-    """The model's own name: the first of its names."""
-    return model.names[: model.names.index(b"\0")].decode(errors="replace") or "robot"
-
-
 def _numbers(values: Array | Sequence[float]) -> str:
     return " ".join(_number(value) for value in values)
 
@@ -234,18 +234,16 @@ def kept_tree(mujoco: Any, model: Any, names: Names) -> Element:
         }
         element = SubElement(elements[model.body_parentid[body]], "body", {"name": names.body(body), **place})
         elements.append(element)
-        _inertial(element, model, body)
+        if model.body_mass[body] > 0.0 or model.body_inertia[body].any():
+            words = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
+            values = {word: getattr(model, f"body_{array}")[body] for word, array in words.items()}
+            SubElement(
+                element, "inertial", {word: _mjcf_kept_numbers(value) for word, value in values.items()}
+            )
         first = int(model.body_jntadr[body])
         for j in range(first, first + int(model.body_jntnum[body])):
             _joint(element, mujoco, model, j, names.joint(j), drives[j])
     return root
-
-
-def _inertial(element: Element, model: Any, body: int) -> None:
-    if model.body_mass[body] > 0.0 or model.body_inertia[body].any():
-        words = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
-        values = {word: getattr(model, f"body_{array}")[body] for word, array in words.items()}
-        SubElement(element, "inertial", {word: _mjcf_kept_numbers(value) for word, value in values.items()})
 
 
 def _joint(element: Element, mujoco: Any, model: Any, j: int, name: str, drive: float) -> None:

@@ -213,7 +213,11 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
         raise NotCompared("MuJoCo reads no quat_xyzw")
     moving = [*loaded.mechanism.joint_names, *_held(loaded)]
     if loaded.options.floating:
-        _free_root(root, loaded.mechanism)
+        # The root link on a floating joint, which MuJoCo makes a free one.
+        free = SubElement(root, "joint", name=loaded.mechanism.joint_names[0], type="floating")
+        SubElement(root, "link", name=loaded.mechanism.base_name)
+        SubElement(free, "parent", link=loaded.mechanism.base_name)
+        SubElement(free, "child", link=loaded.mechanism.joints[0].link_name)
     _drop_still_bodies(root, moving)
     dropped = _massless(root)
     if dropped:
@@ -235,14 +239,6 @@ def _compiled(mujoco: Any, text: str, loaded: LoadedRobot) -> Any:
     disabled = mujoco.mjtDisableBit
     model.opt.disableflags |= disabled.mjDSBL_CONSTRAINT
     return model
-
-
-def _free_root(root: Element, chain: Mechanism) -> None:
-    """Put the root link on a floating joint, which MuJoCo makes a free one."""
-    free = SubElement(root, "joint", name=chain.joint_names[0], type="floating")
-    SubElement(root, "link", name=chain.base_name)
-    SubElement(free, "parent", link=chain.base_name)
-    SubElement(free, "child", link=chain.joints[0].link_name)
 
 
 def _drop_still_bodies(root: Element, moving: Collection[str]) -> None:

@@ -51,7 +51,9 @@ def reference_model(
         )
     if np.isnan(values).any():
         raise ValueError("inertial parameters are unknown: give `parameters`")
-    _set_bodies(model, chain, values, replaced)
+    for k in replaced:
+        link = model.frames[model.getFrameId(chain.joints[k].link_name, pinocchio.FrameType.BODY)]
+        model.inertias[k + 1] = link.placement.act(body_of(values[k]))
     model.armature = np.repeat(values[:, DRIVE], [kind.nv for kind in chain.types])
     return _placed_as(chain, model) if snapped else model
 
@@ -61,17 +63,14 @@ def as_written(loaded: LoadedRobot) -> pinocchio.Model:
     is_urdf = loaded.source_format == "urdf"
     model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
     if loaded.options.tool is not None:
-        _add_tool(model, loaded.mechanism.tip_name, loaded.options.tool)
+        # The tool frame in the tip's, by Pinocchio's own reading of the angles.
+        tool = loaded.options.tool
+        number = model.getFrameId(loaded.mechanism.tip_name)
+        place = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*tool[3:]), np.array(tool[:3]))
+        above = model.frames[number]
+        kind = pinocchio.FrameType.OP_FRAME
+        model.addFrame(pinocchio.Frame(TOOL, above.parentJoint, number, above.placement * place, kind))
     return model
-
-
-def _add_tool(model: pinocchio.Model, tip: str, tool: tuple[float, ...]) -> None:
-    """The tool frame in the tip's, by Pinocchio's own reading of the angles."""
-    number = model.getFrameId(tip)
-    place = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*tool[3:]), np.array(tool[:3]))
-    above = model.frames[number]
-    kind = pinocchio.FrameType.OP_FRAME
-    model.addFrame(pinocchio.Frame(TOOL, above.parentJoint, number, above.placement * place, kind))
 
 
 def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
@@ -117,13 +116,6 @@ def body_of(parameters: Array) -> pinocchio.Inertia:
         raise ValueError("Pinocchio has no body with a first moment but no mass")
     mass = parameters[0] or float(np.finfo(float).tiny)
     return pinocchio.Inertia.FromDynamicParameters(np.array([mass, *parameters[1:DRIVE]]))
-
-
-def _set_bodies(model: pinocchio.Model, chain: Mechanism, parameters: Array, which: list[int]) -> None:
-    """Give the joints `which` bodies by their standard parameters (n, 11) about the link frames."""
-    for k in which:
-        link = model.frames[model.getFrameId(chain.joints[k].link_name, pinocchio.FrameType.BODY)]
-        model.inertias[k + 1] = link.placement.act(body_of(parameters[k]))
 
 
 def has_assumptions(loaded: LoadedRobot) -> bool:
@@ -191,7 +183,9 @@ def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
     for number, row in enumerate(table["joint"], start=1):
         before, parent, frame = ends[row.get("parent", last)]
         kind = MODELS[row.get("type", "revolute")]()
-        whole = pinocchio.SE3((modified_matrix if is_modified else standard_matrix)(*_numbers(row)))
+        theta, alpha = _radians(row.get("theta", 0.0)), _radians(row.get("alpha", 0.0))
+        d, a = float(row.get("d", 0.0)), float(row.get("a", 0.0))
+        whole = pinocchio.SE3((modified_matrix if is_modified else standard_matrix)(theta, d, a, alpha))
         place, link = (before * whole, pinocchio.SE3.Identity()) if is_modified else (before, whole)
         last = row.get("name", f"joint{number}")
         parent = model.addJoint(parent, kind, place, last)
@@ -230,12 +224,6 @@ def modified_matrix(theta: float, d: float, a: float, alpha: float) -> Array:
             [0.0, 0.0, 0.0, 1.0],
         ]
     )
-
-
-def _numbers(row: Mapping[str, Any]) -> tuple[float, float, float, float]:
-    """theta, d, a, alpha of a row, in rad and m."""
-    theta, alpha = _radians(row.get("theta", 0.0)), _radians(row.get("alpha", 0.0))
-    return theta, float(row.get("d", 0.0)), float(row.get("a", 0.0)), alpha
 
 
 def _radians(value: float | str) -> float:

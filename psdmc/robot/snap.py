@@ -144,20 +144,21 @@ def coarse_right_angles(angles: Mapping[str, Sequence[float]], snap: float) -> t
 
     angles  rad, by the joint's name
     """
-    found = {name: coarse for name, own in angles.items() if (coarse := _coarse(own, snap))}
+    found = {
+        name: coarse
+        for name, own in angles.items()
+        if (coarse := [x for x in own if _off(x) > snap and any(x == round(_nearest(x), d) for d in DIGITS)])
+    }
     if not found or snap == 0.0:
         return ()
     each = [f"{shown(name)} ({', '.join(f'{x:g}' for x in own)})" for name, own in found.items()]
     said = ", ".join(each[:MOST]) + (f" and {len(each) - MOST} more" if len(each) > MOST else "")
     off = max(_off(x) for own in found.values() for x in own)
+    unit = 10.0 ** math.floor(math.log10(off))
     return (
         f"right angles written with few digits, at joint(s) {said}: kept as written, up to {off:.1e} rad off; "
-        f"--snap {_rounded_up(off):g} takes them for exact",
+        f"--snap {math.ceil(off / unit) * unit:g} takes them for exact",
     )
-
-
-def _coarse(angles: Sequence[float], snap: float) -> list[float]:
-    return [x for x in angles if _off(x) > snap and any(x == round(_nearest(x), d) for d in DIGITS)]
 
 
 def _nearest(angle: float) -> float:
@@ -167,9 +168,3 @@ def _nearest(angle: float) -> float:
 
 def _off(angle: float) -> float:
     return abs(angle - _nearest(angle))
-
-
-def _rounded_up(size: float) -> float:
-    """To one digit."""
-    unit = 10.0 ** math.floor(math.log10(size))
-    return math.ceil(size / unit) * unit

@@ -54,7 +54,12 @@ def find_route(
             )
     is_tree = base is None and tip is None and len(_last_joints(robot)) > 1
     route = _tree(robot, frames, source) if is_tree else _chain(robot, base, tip, source)
-    _refuse_many(route, source)
+    where = "" if route.ends else f" from '{route.base}' to '{route.tip}'"
+    if len(route.movable) > MAX_JOINTS:
+        raise InputError(
+            f"{source}: {len(route.movable)} movable joints{where}, psdmc reads at most {MAX_JOINTS}",
+            "choose a shorter chain with --base and --tip",
+        )
     if not route.movable:
         raise InputError(
             f"{source}: no movable joint between '{route.base}' and '{route.tip}'",
@@ -78,7 +83,10 @@ def _tree(robot: UrdfRobot, frames: Sequence[str], source: str) -> Route:
     path = tuple(outward(robot))
     last = _last_joints(robot)
     ends = tuple(_fixed_end(robot, joint.child) for joint in path if joint in last)
-    moved = _moved_links(path)
+    moved: set[str] = set()
+    for joint in path:
+        if joint.is_movable or joint.parent in moved:
+            moved.add(joint.child)
     tip = next((name for name in frames[:1] if name in moved), ends[0])
     return Route(robot.root, tip, (), path, (_whole_note(robot, ends, source),), ends)
 
@@ -109,15 +117,6 @@ def _last_joints(robot: UrdfRobot) -> list[UrdfJoint]:
     return [joint for joint in robot.joints if joint.is_movable and joint.child not in carrying]
 
 
-def _moved_links(path: Sequence[UrdfJoint]) -> set[str]:
-    """Links of a tree that some joint moves."""
-    moved: set[str] = set()
-    for joint in path:
-        if joint.is_movable or joint.parent in moved:
-            moved.add(joint.child)
-    return moved
-
-
 def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
     """Describe the tree, and the options that select the chain that psdmc took in earlier releases, unless its root is
     free."""
@@ -138,7 +137,7 @@ def _not_below(robot: UrdfRobot, start: str, end: str) -> str:
 def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
     if joints_between(robot, end, start) is not None:
         return f"a chain runs from its base to its tip: swap them, --base '{end}' --tip '{start}'"
-    below = _below(robot, start)
+    below = [link for link in _movable_depths(robot, start) if link != start]
     return (
         f"links below '{start}': {listed(below)}"
         if below
@@ -201,10 +200,6 @@ def _movable_depths(robot: UrdfRobot, base: str) -> dict[str, int]:
     return depth
 
 
-def _below(robot: UrdfRobot, base: str) -> list[str]:
-    return [link for link in _movable_depths(robot, base) if link != base]
-
-
 def _fixed_end(robot: UrdfRobot, link: str) -> str:
     """The far end of the longest sequence of fixed joints (tool flanges); of equally long ones the file's first. Links that
     are shapes for collisions alone, such as those along the calf of Unitree's Go2, are no ends."""
@@ -230,15 +225,6 @@ def _parting_link(robot: UrdfRobot, base: str, ends: Sequence[str]) -> str:
             break
         shared = links[0]
     return shared
-
-
-def _refuse_many(route: Route, source: str) -> None:
-    where = "" if route.ends else f" from '{route.base}' to '{route.tip}'"
-    if len(route.movable) > MAX_JOINTS:
-        raise InputError(
-            f"{source}: {len(route.movable)} movable joints{where}, psdmc reads at most {MAX_JOINTS}",
-            "choose a shorter chain with --base and --tip",
-        )
 
 
 def _refuse_other_planes(route: Route, source: str) -> None:

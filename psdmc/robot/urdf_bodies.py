@@ -42,12 +42,7 @@ def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
 
     Joints beside the chain and beyond the tip are locked at neutral.
     """
-    return merged_onto(robot, route.movable)
-
-
-def merged_onto(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[Array]:
-    """Merged parameters as above for any movable joints; all others are locked at neutral."""
-    return [without_noise(_merged(robot, body)) for body in bodies_of(robot, movable)]
+    return [without_noise(_merged(robot, body)) for body in bodies_of(robot, route.movable)]
 
 
 def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, Placement]]:

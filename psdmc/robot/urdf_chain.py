@@ -140,7 +140,7 @@ def _placed(route: Route, snap: float) -> _Placed:
         link = Placement(link_rotation(axis), np.zeros(3))
         where = f"joint '{joint.name}', merged"
         placement = merged_placement(at @ link.inverse(), where, snap, turned, n, reach)
-        joints.append(movable_joint(joint, placement, link))
+        joints.append(Joint(joint.name, joint.child, _kind(joint), placement, link, joint.limits))
         parents.append(outer.body)
         snaps += [replace(one, segment=n) for one in turned]
         ways[joint.child] = _Way(n, link)
@@ -157,11 +157,6 @@ def _reach(route: Route) -> float:
     for joint in route.path:
         far[joint.child] = far[joint.parent] + math.hypot(*joint.origin.xyz)
     return max(far.values())
-
-
-def movable_joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:
-    """The joint with its child link, whose frame sits at `link` in the joint frame."""
-    return Joint(joint.name, joint.child, _kind(joint), placement, link, joint.limits)
 
 
 def _kind(joint: UrdfJoint) -> JointType:

@@ -48,15 +48,16 @@ def build_package(directory: str | Path, edited: bool = False, progress: Progres
     for tool in ("cmake", "make"):
         if shutil.which(tool):
             if tool == "cmake":
-                _check_name(root)
-            with _own_build(build), told(build, _files(root), progress):
+                path = Path(os.path.abspath(root))
+                found = NOT_FOR_CMAKE.search(path.as_posix().removeprefix(path.drive))
+                if found:
+                    raise InputError(
+                        f"{root}: CMake cannot take {found[0]!r} in a folder's path",
+                        "move the package to a folder without it, or build it with make in the package's folder",
+                    )
+            with _own_build(build), told(build, len(list((root / "src").glob("*.c"))) + 1, progress):
                 return _with_cmake(root) if tool == "cmake" else _with_make(root, compiler)
     raise ToolchainError("neither cmake nor make was found", "install one (Debian: apt install cmake)")
-
-
-def _files(root: Path) -> int:
-    """How many files a build compiles: the sources and the self-test."""
-    return len(list((root / "src").glob("*.c"))) + 1
 
 
 def _check_files(root: Path, edited: bool) -> None:
@@ -71,17 +72,6 @@ def _check_files(root: Path, edited: bool) -> None:
         raise InputError(
             f"{root}: not as emit-c wrote it: {', '.join(found[:3])}{' ...' if len(found) > 3 else ''}",
             "emit it again, or build it all the same with --edited",
-        )
-
-
-def _check_name(root: Path) -> None:
-    """InputError where CMake cannot take the folder's path."""
-    path = Path(os.path.abspath(root))
-    found = NOT_FOR_CMAKE.search(path.as_posix().removeprefix(path.drive))
-    if found:
-        raise InputError(
-            f"{root}: CMake cannot take {found[0]!r} in a folder's path",
-            "move the package to a folder without it, or build it with make in the package's folder",
         )
 
 
@@ -123,7 +113,8 @@ def _self_test(words: list[str], root: Path) -> str:
     done = attempt(words, str(root))
     if done.returncode == 0:
         return done.stdout
-    failed = failed_checks(done.stdout)
+    lines = (re.sub(r"^\d+: ", "", line.strip()) for line in done.stdout.splitlines())
+    failed = list(dict.fromkeys(line.removesuffix(FAILED) for line in lines if line.endswith(FAILED)))
     if not failed:
         raise failure(words, str(root), done)
     first = "; ".join(failed[:SHOWN]) + ("; ..." if len(failed) > SHOWN else "")
@@ -139,12 +130,6 @@ def checks_of(report: str) -> str:
     """Return the self-test's summary: '39 checks of 15 functions'."""
     found = re.findall(r": (\d+ checks of \d+ functions), 0 failed", report)
     return found[-1] if found else "nothing to check"
-
-
-def failed_checks(report: str) -> list[str]:
-    """The failed checks of a self-test's report, each once: ctest numbers its lines, and repeats them."""
-    lines = (re.sub(r"^\d+: ", "", line.strip()) for line in report.splitlines())
-    return list(dict.fromkeys(line.removesuffix(FAILED) for line in lines if line.endswith(FAILED)))
 
 
 TICK = 0.25

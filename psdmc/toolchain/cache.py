@@ -55,7 +55,19 @@ def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()
             if is_sound(final):  # made by another process meanwhile
                 touch(final)
                 return final
-            _build(place, final, build, products)
+            handle, own = new_folder(place)
+            try:
+                build(own)
+                for product in products:
+                    if not (own / product).is_file() or not (own / product).stat().st_size:
+                        raise ToolchainError(
+                            f"the compiler made no {product}", "set CC to a C compiler, or unset it"
+                        )
+                seal(own)
+                _install(own, final)
+            finally:
+                shutil.rmtree(own, ignore_errors=True)
+                os.close(handle)
         make_room(place, final, limit)
     except OSError as error:
         raise unusable(place, error) from error
@@ -69,20 +81,6 @@ def found(key: str) -> Path | None:
         return None
     touch(final)
     return final
-
-
-def _build(place: Path, final: Path, build: Callable[[Path], None], products: Sequence[str]) -> None:
-    handle, own = new_folder(place)
-    try:
-        build(own)
-        for product in products:
-            if not (own / product).is_file() or not (own / product).stat().st_size:
-                raise ToolchainError(f"the compiler made no {product}", "set CC to a C compiler, or unset it")
-        seal(own)
-        _install(own, final)
-    finally:
-        shutil.rmtree(own, ignore_errors=True)
-        os.close(handle)
 
 
 def _install(own: Path, final: Path) -> None:

@@ -139,19 +139,15 @@ def _entries(place: Path) -> list[tuple[float, int, Path]]:
     return known
 
 
-def _removed(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
-
-
 def _remove_if_dead(folder: Path) -> None:
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
         try:
             if lock(handle, wait=False):
-                _removed(folder)
+                if folder.is_dir() and not folder.is_symlink():
+                    shutil.rmtree(folder, ignore_errors=True)
+                else:
+                    folder.unlink(missing_ok=True)
         finally:
             os.close(handle)
 
@@ -187,7 +183,7 @@ def is_sound(folder: Path) -> bool:
     try:
         if not _is_own(folder, stat.S_ISDIR):
             return False
-        files = _sealed(folder)["files"]
+        files = _seal_of(folder)[0]["files"]
         return bool(files) and all(
             _is_own(folder / name, stat.S_ISREG) and _digest(folder / name) == value
             for name, value in files.items()
@@ -216,10 +212,6 @@ def _is_own(path: Path, kind: object) -> bool:
     """Whether the path is a file or folder of that kind, no link, that no other user may write."""
     status = path.lstat()
     return bool(kind(status.st_mode)) and is_private(status)  # type: ignore[operator]
-
-
-def _sealed(folder: Path) -> dict[str, Any]:
-    return _seal_of(folder)[0]
 
 
 def _seal_of(folder: Path) -> tuple[dict[str, Any], float]:

@@ -92,28 +92,22 @@ def _build(package: PackageView, files: dict[str, str], compiler: Compiler, fold
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8", newline="\n")
-    commands = [_compile_command(compiler, source) for source in package.sources]
-    _run_all(commands, package.robot, folder)
+    commands = [
+        [*compiler.command, "-std=c99", *compiler.flags, "-Iinclude", "-c", source, "-o", _object(source)]
+        for source in package.sources
+    ]
+    from concurrent.futures import ThreadPoolExecutor  # here: who compiles nothing does not wait for it
+
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
+        list(pool.map(lambda words: run(words, package.robot, str(folder)), commands))
+    finally:
+        pool.shutdown(cancel_futures=True)
     objects = [_object(source) for source in package.sources]
     link = [*compiler.command, "-shared", "-o", LIBRARY, *objects, "-lm"]
     run(link, package.robot, str(folder))
     for name in objects:
         (folder / name).unlink(missing_ok=True)
-
-
-def _run_all(commands: list[list[str]], robot: str, folder: Path) -> None:
-    """Run the commands, several at a time; after an error or Ctrl-C no further one is started."""
-    from concurrent.futures import ThreadPoolExecutor  # here: who compiles nothing does not wait for it
-
-    pool = ThreadPoolExecutor(os.cpu_count())
-    try:
-        list(pool.map(lambda words: run(words, robot, str(folder)), commands))
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _compile_command(compiler: Compiler, source: str) -> list[str]:
-    return [*compiler.command, "-std=c99", *compiler.flags, "-Iinclude", "-c", source, "-o", _object(source)]
 
 
 def _object(source: str) -> str:

@@ -90,7 +90,7 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     free = reference(loaded, parameters=parameters) if snapped else written
     robot = OnCoordinates.of(free, model.mechanism)
     angles = angles_by_segment(loaded.snap_report, model.n, loaded.options.snap)
-    condition = _condition(model, robot)
+    condition = float(np.linalg.cond(robot.mass_matrix(_states(model.mechanism)[0])).max())
     rows = (*_compared(model, theta, robot, condition), *_functions(model, theta, robot, condition))
     rows += _placements(model, written, angles)
     if snapped:
@@ -109,11 +109,6 @@ def readers(rows: Sequence[CheckRow]) -> str:
 def _states(robot: Mechanism) -> tuple[Array, Array, Array]:
     """q (STATES, nq), qd and qdd (STATES, nv)."""
     return states_of(robot, np.random.default_rng(SEED), STATES)
-
-
-def _condition(model: DynamicsModel, robot: OnCoordinates) -> float:
-    """The largest condition number of the mass matrix at the states that are compared."""
-    return float(np.linalg.cond(robot.mass_matrix(_states(model.mechanism)[0])).max())
 
 
 def _compared(
@@ -179,8 +174,8 @@ def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tupl
     q = Following.of(chain.coordinates, chain.types).positions(_states(model.mechanism)[0])
     links = [joint.link_name for joint in chain.joints]
     expected = written.poses(q, links)
-    above = frames_above(chain)
-    errors = placement_errors(chain_poses(chain, q), expected, above)
+    above = (*chain.parents, chain.tip_body)
+    errors = placement_errors(np.array([_poses_at(chain, row) for row in q]), expected, above)
     lever = max(1.0, written.path_length / reach_of(expected, above))
     beyond = errors - ANGLES_ACTED_ON * lever * angles[:-1]
     gravity = gravity_error(chain.gravity, written.gravity_vector) - ANGLES_ACTED_ON * angles[-1]
@@ -230,11 +225,6 @@ def _bound(robot: OnCoordinates, angles: Array, states: tuple[Array, Array, Arra
     return np.asarray(bound @ np.abs(robot.following.ratios))
 
 
-def chain_poses(chain: Mechanism, q: Array) -> Array:
-    """(k, n + 1, 4, 4) of the links' frames and the tip's in the base frame, at q of all joints, followers too."""
-    return np.array([_poses_at(chain, row) for row in q])
-
-
 def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Array:
     """(n + 1,) largest error of each link's pose in the one that it hangs on, and the tip's in its link.
 
@@ -264,11 +254,6 @@ def reach_of(poses: Array, above: Sequence[int]) -> float:
     for step, outer in zip(steps.tolist(), above, strict=True):
         far.append(step + (0.0 if outer == BASE else far[outer]))
     return max(far) or 1.0
-
-
-def frames_above(chain: Mechanism) -> tuple[int, ...]:
-    """What each of chain_poses hangs on: the joints' parents, and the tip's body."""
-    return (*chain.parents, chain.tip_body)
 
 
 def _in_the_one_above(poses: Array, above: Sequence[int]) -> Array:
