@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psdmc.cli.lists import assignments, names, numbers
-from psdmc.cli.next_step import say_next
-from psdmc.cli.one_line import one_line
+from psdmc.cli.lists import assignments, names, numbers, parsed_torque_constants
+from psdmc.cli.next_step import one_line, say_next
 from psdmc.cli.output import check_output, check_report
 from psdmc.cli.progress import steps
-from psdmc.cli.torque_constants import parsed_torque_constants
 from psdmc.errors import InputError
+
+if TYPE_CHECKING:
+    from psdmc.calibration.description.table_fit import FitChoice
 
 
 def calibrate(
@@ -190,9 +191,6 @@ def calibrate(
         raise typer.Exit(verdict.exit_status)
     say_next("emit-c", output, "-o", output.stem)
 
-
-if TYPE_CHECKING:
-    from psdmc.calibration.description.table_fit import FitChoice
 
 DRAFT = Path("log.toml")
 

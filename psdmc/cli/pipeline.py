@@ -304,7 +304,7 @@ def emit_c(
     from psdmc.backends.c.adapters import lacking
     from psdmc.backends.c.names import identifier
     from psdmc.backends.c.write import require_own_folder
-    from psdmc.cli.one_line import one_line
+    from psdmc.cli.next_step import one_line
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction

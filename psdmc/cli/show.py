@@ -13,8 +13,8 @@ from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
+from psdmc.robot.limits import listed
 from psdmc.robot.mechanism import Mechanism
-from psdmc.robot.tree import listed
 
 
 def print_model(model: DynamicsModel) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from psdmc.cli.one_line import one_line
+from psdmc.cli.next_step import one_line
 from psdmc.cli.tables import Table, print_table
 from psdmc.model.joined_units import joined_units
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import listed, shown
 from psdmc.robot.mjcf_copies import refuse_many_copies
 from psdmc.robot.mjcf_faults import (
     followers,
@@ -27,7 +27,6 @@ from psdmc.robot.mjcf_faults import (
 from psdmc.robot.mjcf_terms import Names, acting, gravity, is_active, is_odd, named
 from psdmc.robot.mjcf_text import tree_text
 from psdmc.robot.mujoco_warnings import kept_warnings
-from psdmc.robot.tree import listed
 
 NOT_A_NUMBER = "NaN"
 """What MuJoCo's warning of such a number has in it."""

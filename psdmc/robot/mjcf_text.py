@@ -224,22 +224,20 @@ def kept_tree(mujoco: Any, model: Any, names: Names) -> Element:
     """A <mujoco> element: bodies, inertias, joints, their drives' inertias and gravity."""
     root = Element("mujoco", model="kept")
     SubElement(root, "compiler", COMPILER)
-    SubElement(root, "option", gravity=_mjcf_kept_numbers(model.opt.gravity))
+    SubElement(root, "option", gravity=_kept_numbers(model.opt.gravity))
     drives = armatures(mujoco, model)
     elements = [SubElement(root, "worldbody")]
     for body in range(1, model.nbody):
         place = {
-            "pos": _mjcf_kept_numbers(model.body_pos[body]),
-            "quat": _mjcf_kept_numbers(model.body_quat[body]),
+            "pos": _kept_numbers(model.body_pos[body]),
+            "quat": _kept_numbers(model.body_quat[body]),
         }
         element = SubElement(elements[model.body_parentid[body]], "body", {"name": names.body(body), **place})
         elements.append(element)
         if model.body_mass[body] > 0.0 or model.body_inertia[body].any():
             words = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
             values = {word: getattr(model, f"body_{array}")[body] for word, array in words.items()}
-            SubElement(
-                element, "inertial", {word: _mjcf_kept_numbers(value) for word, value in values.items()}
-            )
+            SubElement(element, "inertial", {word: _kept_numbers(value) for word, value in values.items()})
         first = int(model.body_jntadr[body])
         for j in range(first, first + int(model.body_jntnum[body])):
             _joint(element, mujoco, model, j, names.joint(j), drives[j])
@@ -252,13 +250,13 @@ def _joint(element: Element, mujoco: Any, model: Any, j: int, name: str, drive: 
     joint = SubElement(element, "joint", name=name, type=kind)
     if kind == "free":
         return
-    joint.set("pos", _mjcf_kept_numbers(model.jnt_pos[j]))
-    joint.set("armature", _mjcf_kept_numbers(drive))
+    joint.set("pos", _kept_numbers(model.jnt_pos[j]))
+    joint.set("armature", _kept_numbers(drive))
     if kind != "ball":
-        joint.set("axis", _mjcf_kept_numbers(model.jnt_axis[j]))
-        joint.set("ref", _mjcf_kept_numbers(model.qpos0[model.jnt_qposadr[j]]))
+        joint.set("axis", _kept_numbers(model.jnt_axis[j]))
+        joint.set("ref", _kept_numbers(model.qpos0[model.jnt_qposadr[j]]))
 
 
-def _mjcf_kept_numbers(values: ArrayLike) -> str:
+def _kept_numbers(values: ArrayLike) -> str:
     """All digits of one or several numbers."""
     return " ".join(repr(float(value)) for value in np.atleast_1d(values))

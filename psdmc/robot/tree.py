@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from psdmc.errors import InputError
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.limits import MAX_JOINTS, shown
+from psdmc.robot.limits import MAX_JOINTS, listed, shown
 from psdmc.robot.urdf import LOCKABLE, MOVABLE, UrdfJoint, UrdfRobot
 
 BALLS = ("spherical", "ball")
@@ -75,7 +75,9 @@ def _chain(robot: UrdfRobot, base: str | None, tip: str | None, source: str) -> 
     end, notes = (tip, ()) if tip is not None else default_tip(robot, start, source)
     path = joints_between(robot, start, end)
     if path is None:
-        raise InputError(f"{source}: " + _not_below(robot, start, end), _way_out(robot, start, end))
+        above = " but above it" if joints_between(robot, end, start) is not None else ""
+        fault = f"{source}: tip link '{end}' is not below base link '{start}'{above}"
+        raise InputError(fault, _way_out(robot, start, end))
     return Route(start, end, joints_between(robot, robot.root, start) or (), path, notes)
 
 
@@ -129,11 +131,6 @@ def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
     return f"the whole tree, to its ends {listed(ends)}; --tip LINK takes one chain of it{before}"
 
 
-def _not_below(robot: UrdfRobot, start: str, end: str) -> str:
-    above = " but above it" if joints_between(robot, end, start) is not None else ""
-    return f"tip link '{end}' is not below base link '{start}'{above}"
-
-
 def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
     if joints_between(robot, end, start) is not None:
         return f"a chain runs from its base to its tip: swap them, --base '{end}' --tip '{start}'"
@@ -180,12 +177,6 @@ def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[st
         raise InputError(f"{source}: several chains end in {listed(ends)}", "choose one with --tip LINK")
     note = f"tip '{parting}': there the chain parts towards {listed(ends)}; --tip chooses another"
     return parting, (note,)
-
-
-def listed(names: Iterable[str], most: int = 12) -> str:
-    """Names in quotes for a message, shortened where there are many."""
-    quoted = [f"'{name}'" for name in names]
-    return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
 
 
 def _movable_depths(robot: UrdfRobot, base: str) -> dict[str, int]:

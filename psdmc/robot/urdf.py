@@ -12,7 +12,7 @@ from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import listed, shown
 from psdmc.robot.mechanism import WARNING, Limits, Placement
 from psdmc.robot.names import name_faults, naming_faults
 from psdmc.robot.urdf_words import (
@@ -169,10 +169,7 @@ def _each(root: Element, tag: str, read: Callable[[Element], Made], problems: li
 
 def _refuse(problems: Sequence[str], source: str, hint: str) -> None:
     if problems:
-        more = (
-            [f"and {len(problems) - limits.MOST_FAULTS} more"] if len(problems) > limits.MOST_FAULTS else []
-        )
-        raise InputError(f"{source}: " + "; ".join([*problems[: limits.MOST_FAULTS], *more]), hint)
+        raise InputError(f"{source}: {limits.joined(problems)}", hint)
 
 
 def _refuse_sizes(root: Element, source: str) -> None:
@@ -305,9 +302,6 @@ def _limits(joint: Element, kind: str) -> Limits:
 Ends = tuple[str, str, str]
 """A joint's name, its parent link and its child link."""
 
-LISTED = 12
-"""Largest number of links in a message."""
-
 
 def tree_faults(links: Sequence[str], joints: Sequence[Ends]) -> list[str]:
     """The reasons why the links are not one tree, one sentence each."""
@@ -325,7 +319,7 @@ def tree_faults(links: Sequence[str], joints: Sequence[Ends]) -> list[str]:
             faults.append(f"link '{link}' is the child of joints {quoted}: a loop")
     roots = [name for name in links if name not in parents]
     if not faults and len(roots) > 1:
-        faults.append(f"links {_listed(roots)} all have no parent joint")
+        faults.append(f"links {listed(roots)} all have no parent joint")
     return faults or _cycle_faults(links, joints, roots)
 
 
@@ -341,9 +335,4 @@ def _cycle_faults(links: Sequence[str], joints: Sequence[Ends], roots: Sequence[
             reached[child] = None
             queue.append(child)
     ring = [name for name in links if name not in reached]
-    return [f"links {_listed(ring)} form a loop"] if ring else []
-
-
-def _listed(names: Sequence[str]) -> str:
-    quoted = ", ".join(f"'{name}'" for name in names[:LISTED])
-    return quoted + (f" and {len(names) - LISTED} more" if len(names) > LISTED else "")
+    return [f"links {listed(ring)} form a loop"] if ring else []

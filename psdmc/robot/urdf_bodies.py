@@ -10,7 +10,7 @@ from psdmc.errors import InputError
 from psdmc.reproducible import times
 from psdmc.robot.inertia import inertia_matrix, six_of, standard_parameters, without_noise
 from psdmc.robot.joints import REVOLUTE
-from psdmc.robot.mechanism import Array, Placement
+from psdmc.robot.mechanism import Array, NamedFrame, Placement
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
 from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.snap import snap_rotation
@@ -124,3 +124,16 @@ def _compare(own: Array, other: object, link: str, what: str, source: str) -> No
 
 def _listed(values: Array) -> str:
     return " ".join(f"{value:.9g}" for value in values)
+
+
+TOOL = "tool"
+"""Name of the frame."""
+
+
+def tool_frame(tip: NamedFrame, tool: Sequence[float]) -> NamedFrame:
+    """The frame 'tool', given by x y z (m), roll pitch yaw (rad) in the tip's."""
+    # Turns are about fixed axes x, y, z in turn, as in URDF.
+    x, y, z, roll, pitch, yaw = tool
+    return NamedFrame(
+        TOOL, tip.joint, tip.placement @ placement_of(Origin(xyz=(x, y, z), rpy=(roll, pitch, yaw)))
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,8 @@ from psdmc.reproducible import times
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
 from psdmc.robot.joints import FREE, URDF_TYPES, JointType
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import listed, shown
+from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
 from psdmc.robot.mechanism import Array, Joint, Limits, NamedFrame, Placement
@@ -29,7 +30,7 @@ from psdmc.robot.snap import (
     snap_rotation,
     snap_translation,
 )
-from psdmc.robot.tree import Route, find_route, listed
+from psdmc.robot.tree import Route, find_route
 from psdmc.robot.urdf import Origin, UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import bodies_of, hold_against_pinocchio, merged_parameters, place_of
 
@@ -38,35 +39,27 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 
 ALONG_Z = (0.0, 0.0, 1.0)
 
-NO_LOCK: Mapping[str, float] = {}
 
-
-def urdf_draft(
-    text: str,
-    source: str,
-    base: str | None,
-    tip: str | None,
-    gravity: Array | None,
-    snap: float,
-    frames: Sequence[str] = (),
-    lock: Mapping[str, float] = NO_LOCK,
-    floating: bool = False,
-    unknown: Sequence[str] = (),
-) -> Draft:
-    """The chain from base to tip, or the whole tree (find_route); gravity in the root frame; rotations near exact ones
-    snapped (rad); the links `frames` as named frames, a tree's ends where none are named; the joints `lock` held;
-    `floating`: the root link on a free joint; `unknown`: links whose inertia is unknown, whatever the file says."""
+def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
+    """The chain from base to tip, or the whole tree (find_route), with gravity in the root frame, rotations near exact ones
+    snapped, joints locked, the root freed and inertias unknown as the options say. A tree's ends are its named frames
+    where none are named."""
+    snap, frames = options.snap, options.frames
     read = read_urdf(text, source)
-    robot = locked(read, lock, source)
-    if floating:
+    robot = locked(read, options.lock, source)
+    if options.floating:
         robot = on_free_root(robot)
-    route = find_route(robot, base, tip, source, frames)
+    route = find_route(robot, options.base, options.tip, source, frames)
     placed = _placed(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)
-    root_gravity = np.array(STANDARD_GRAVITY) if gravity is None else gravity
+    root_gravity = np.array(STANDARD_GRAVITY if options.gravity is None else options.gravity)
     bodies = merged_parameters(robot, route)
-    hold_against_pinocchio(robot, route, bodies, text, source, held_positions(read, lock, source))
-    found = judged_bodies(robot, route, bodies_of(robot, route.movable), bodies, unknown, source)
+    hold_against_pinocchio(robot, route, bodies, text, source, held_positions(read, options.lock, source))
+    found = judged_bodies(robot, route, bodies_of(robot, route.movable), bodies, options.unknown, source)
+    springy = [joint.name for joint in route.movable if joint.has_dynamics]
+    unmodelled = (
+        [f"<dynamics> (damping, friction) of joints is not modelled: {listed(springy)}"] if springy else []
+    )
     return Draft(
         name=robot.name,
         convention="urdf",
@@ -84,7 +77,7 @@ def urdf_draft(
             *route.notes,
             *found.notes,
             *_of_several_coordinates(route),
-            *_unmodelled(route),
+            *unmodelled,
             *coarse_right_angles(
                 {j.name: j.origin.rpy for j in route.path if j.origin.quaternion is None}, snap
             ),
@@ -204,13 +197,6 @@ def _of_several_coordinates(route: Route) -> list[str]:
     ]
 
 
-def _unmodelled(route: Route) -> list[str]:
-    """A note that names the chain's joints with friction, damping or springs, which the model of rigid bodies leaves
-    out."""
-    names = [joint.name for joint in route.movable if joint.has_dynamics]
-    return [f"<dynamics> (damping, friction) of joints is not modelled: {listed(names)}"] if names else []
-
-
 def _faults(robot: UrdfRobot) -> list[str]:
     """A note for each link whose inertia no body could have."""
     notes = []
@@ -268,12 +254,11 @@ def urdf_frames(
     """
     carriers = {joint.name: number for number, joint in enumerate(joints)}
     return tuple(
-        tip if name == tip.name else _urdf_frames_placed(robot, route, joints, carriers, name, source)
-        for name in names
+        tip if name == tip.name else _frame_on(robot, route, joints, carriers, name, source) for name in names
     )
 
 
-def _urdf_frames_placed(
+def _frame_on(
     robot: UrdfRobot, route: Route, joints: Sequence[Joint], carriers: dict[str, int], name: str, source: str
 ) -> NamedFrame:
     if name not in robot.inertials:

@@ -11,9 +11,8 @@ from typing import Any
 
 from psdmc.errors import InputError
 from psdmc.reading import read_file
-from psdmc.robot.limits import MAX_BYTES, shown
+from psdmc.robot.limits import MAX_BYTES, listed, shown
 from psdmc.robot.ros_packages import package_folder
-from psdmc.robot.tree import listed
 
 REASON = 300
 """Characters of xacro's own message that an error repeats."""

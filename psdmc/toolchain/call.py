@@ -17,8 +17,7 @@ from psdmc.program.signature import Q, Signature
 from psdmc.toolchain.call_arguments import bound_arguments, signature_of
 from psdmc.toolchain.compiled_functions import CompiledFunctions, results
 from psdmc.toolchain.direct_calls import MOST_ARRAYS, MOST_UNITS, direct_calls
-from psdmc.toolchain.interface import Interface
-from psdmc.toolchain.origin import Origin
+from psdmc.toolchain.interface import Interface, Origin
 from psdmc.toolchain.stubs import documentation
 
 

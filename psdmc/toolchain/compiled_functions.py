@@ -19,9 +19,8 @@ from psdmc.errors import InputError, ToolchainError
 from psdmc.program.signature import Signature
 from psdmc.toolchain import given_outputs
 from psdmc.toolchain.call_arguments import RobotAxes, common_lead, parameters, states
-from psdmc.toolchain.interface import Interface, batch_symbol
+from psdmc.toolchain.interface import Interface, Origin, batch_symbol
 from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
-from psdmc.toolchain.origin import Origin
 from psdmc.toolchain.stubs import result_name
 
 MOST_NAMES = 8
@@ -182,7 +181,12 @@ class CompiledFunctions(RobotFacts):
         self._axes = RobotAxes(interface.sizes, interface.names, interface.units)
         self._dtype = np.dtype(interface.dtype)
         self._pointer = self._ffi.typeof(f"{interface.real} *")
-        self._kernels = {name: _bound(interface, self._library, name) for name in interface.kernels}
+        self._kernels = {
+            name: _Kernel(
+                interface.kernels[name], getattr(self._library, batch_symbol(interface.robot, name))
+            )
+            for name in interface.kernels
+        }
         self._patterns = dict(interface.patterns)
         self.library = library
         self._more = more
@@ -339,10 +343,6 @@ class _Kernel:
 
     tails: tuple[tuple[int, ...], ...]
     batch: Callable[..., int | None]
-
-
-def _bound(interface: Interface, library: Any, name: str) -> _Kernel:
-    return _Kernel(interface.kernels[name], getattr(library, batch_symbol(interface.robot, name)))
 
 
 @cache

@@ -8,8 +8,9 @@ rendered or parsed again.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.patterns import patterns
@@ -147,3 +148,17 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
         return found, str(whole["library"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InternalError(f"a kept interface cannot be read: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """How a compiled robot is had again.
+
+    again    importable by name; returns the robot
+    request  its argument, which can be pickled
+    key      the same for equal robots
+    """
+
+    again: Callable[[Any], Any]
+    request: Any
+    key: str
