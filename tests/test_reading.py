@@ -169,9 +169,8 @@ OWN = {
     "backends/c/render.py": "psdmc's own templates",
     "report/bench_page.py": "psdmc's own templates",
     "robot/new_file.py": "psdmc's own template",
-    "toolchain/cache_entry.py": "the user's own cache, by its size",
+    "toolchain/cache_room.py": "the user's own cache, by its size",
     "toolchain/direct_calls.py": "psdmc's own sources",
-    "toolchain/kept_kernels.py": "the user's own cache, sealed",
     "toolchain/compile.py": "the user's own cache, sealed",
     "toolchain/stubs.py": "psdmc's own sources",
 }

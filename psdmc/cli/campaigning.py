@@ -179,6 +179,7 @@ def simulate(
     say_next_line(f"psdmc calibrate MODEL.npz {quoted(campaign)} -o calibrated.npz --report calibrated.html")
 
 
+# Values of joints on the command line: JOINT=NUMBER and JOINT=LOW:HIGH, and a load.
 LARGEST_LOAD, SMALLEST_LOAD = 1e4, 1e-3
 """kg"""
 LARGEST_ARM = 100.0

@@ -152,6 +152,7 @@ def assembled(
     return exponents, tuple(matrices)
 
 
+# Gravity: the derivative of a potential that is of first order in every joint.
 def gravity_terms(
     frames: Sequence[Frame],
     link_frames: Sequence[Placed],

@@ -64,6 +64,7 @@ def _flat(rows: Long) -> Long:
 
 Array = NDArray[np.float64]
 
+# The free tree: the echelon form of the regressor at sampled states, or link by link for long chains.
 SEED = 20_210_156
 """Seed of the sampled states. Any seed gives the same pivots; a fixed one gives the same bytes."""
 

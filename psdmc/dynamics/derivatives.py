@@ -212,6 +212,7 @@ def _fill_column(
             by_q[place][k], by_qd[place][k] = x, y
 
 
+# Wrenches between a joint and the bodies beyond it: its own row A, B, C, and those that its motion requires.
 def torque_rows(frame: Frame, axis: Axis, composite: Composite) -> list[Row]:
     """A, B and C of each of a joint's rates about its own origin."""
     if frame.joint.about_z:

@@ -221,6 +221,8 @@ def _is_nothing(value: Scalar) -> bool:
     return isinstance(value, float) and value == 0.0
 
 
+# Articulated inertias: the wrench per acceleration of a body whose further joints move freely, as symmetric 6 x 6 matrices
+# in blocks.
 Six = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
 """A symmetric matrix: xx, yy, zz, xy, xz, yz; or a force and a moment, a linear and an angular acceleration."""
 

@@ -72,22 +72,18 @@ class DhRobot:
 def read_dh(text: str, source: str) -> DhRobot:
     """The file's content; InputError names everything that is wrong with it at once."""
     problems: list[str] = []
-    robot = _robot(_parsed(text, source), problems)
+    hint = "give a URDF or a DH .toml file"
+    try:
+        value = tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{source}: not a TOML file: nested too deeply", hint) from None
+    except ValueError as error:  # also of integers of thousands of digits
+        reason = " ".join(str(error).split())
+        raise InputError(f"{source}: not a TOML file: {reason}", hint) from None
+    robot = _robot(value, problems)
     if problems or robot is None:
         raise InputError(f"{source}: {limits.joined(problems)}", "see the DH format in docs/robot_files.md")
     return robot
-
-
-def _parsed(text: str, source: str) -> object:
-    """The parsed TOML; ValueError also for integers of thousands of digits, which the parser raises."""
-    hint = "give a URDF or a DH .toml file"
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InputError(f"{source}: not a TOML file: nested too deeply", hint) from None
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{source}: not a TOML file: {reason}", hint) from None
 
 
 def _robot(value: object, problems: list[str]) -> DhRobot | None:
@@ -193,6 +189,7 @@ def _zero_names(value: object) -> tuple[str, ...]:
     return names
 
 
+# Readers of values: each returns a typed value, or raises ValueError with what was found and expected.
 Triple = tuple[float, float, float]
 
 

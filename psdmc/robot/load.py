@@ -19,10 +19,10 @@ from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
 from psdmc.robot.missing_inertia import with_massless_warning
-from psdmc.robot.ros_packages import checked_packages
 from psdmc.robot.source_words import with_source_words
 from psdmc.robot.urdf_bodies import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
+from psdmc.robot.xacro_file import checked_packages
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
 
 PACKED = b"PK\x03\x04"

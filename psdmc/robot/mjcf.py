@@ -163,9 +163,8 @@ def _with_massless(mujoco: Any, path: Path, left_out: Sequence[int]) -> Any:
             raise
         model = _without(mujoco, path, left_out, LEAST)
         bare, least = model.body_mass == LEAST, model.body_inertia == LEAST
-        if (
-            least.any(axis=1) & ~bare
-        ).any():  # mass in a point, or none about an axis, which psdmc takes from nobody
+        # Mass in a point, or none about an axis, which psdmc takes from nobody.
+        if (least.any(axis=1) & ~bare).any():
             raise
         model.body_mass[bare], model.body_inertia[bare] = 0.0, 0.0
         return model

@@ -205,6 +205,7 @@ def _resolved(path: Path) -> Path:
         return path
 
 
+# Sizes that a single line asks for: MuJoCo has no bounds of its own on the meshes, fields and arrays that it makes.
 MAX_POINTS = 10_000
 """Of a mesh that MuJoCo makes: its hull takes a second or two."""
 MAX_CORNERS = 1_000

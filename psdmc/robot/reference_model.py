@@ -1,7 +1,7 @@
 """Pinocchio's own model of a robot's source, as the reference for everything else.
 
 It shares the file's text with the chain and as little code as possible: a URDF is read, merged and locked by Pinocchio,
-a DH table is read by dh_textbook. Only names come from the chain: of its joints, links, base and tip. For the snapped
+a DH table is read by `dh_model`. Only names come from the chain: of its joints, links, base and tip. For the snapped
 robot the joints' placements come from the chain too, because the file does not have them; the bodies are still
 Pinocchio's.
 
@@ -163,8 +163,6 @@ def _se3(placement: Placement) -> pinocchio.SE3:
 # (Craig, Introduction to Robotics, eq. 3.6). The joint variable is added to theta, or to d; either leaves a rotation
 # about z (a displacement along z) that commutes to the outer end of a standard row and to the inner end of a modified
 # one, where Pinocchio's joint is.
-
-
 MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelPZ}
 """Pinocchio's joints by a row's type. Written here again, because this reader shares nothing with the other."""
 

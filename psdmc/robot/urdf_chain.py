@@ -209,6 +209,7 @@ def _faults(robot: UrdfRobot) -> list[str]:
     return notes
 
 
+# A root link on a free joint, and links as named frames.
 ROOT_JOINT = "root_joint"
 """Pinocchio's name of the free joint; more underscores follow where a joint of the file is called so."""
 

@@ -132,6 +132,7 @@ def checks_of(report: str) -> str:
     return found[-1] if found else "nothing to check"
 
 
+# How far a build is, by the object files that have come into its folder.
 TICK = 0.25
 """s between two looks."""
 

@@ -21,8 +21,19 @@ from pathlib import Path
 
 from psdmc.atomic import can_lock, lock, unlock
 from psdmc.errors import ToolchainError
-from psdmc.toolchain.cache_place import cache_limit, open_cache, unusable
-from psdmc.toolchain.cache_room import hold, is_sound, make_room, new_folder, remove, seal, sweep, touch
+from psdmc.toolchain.cache_room import (
+    cache_limit,
+    hold,
+    is_sound,
+    make_room,
+    new_folder,
+    open_cache,
+    remove,
+    seal,
+    sweep,
+    touch,
+    unusable,
+)
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
@@ -93,6 +104,7 @@ def _install(own: Path, final: Path) -> None:
         own.rename(final)
 
 
+# One builder at a time for each entry: others wait for it and use what it made.
 LONGEST = 600.0
 """Seconds that one waits for another process: as long as a run of the compiler may take. Then one builds beside it."""
 BETWEEN = 0.02

@@ -17,8 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
 from psdmc.program.signature import Signature
-from psdmc.toolchain import given_outputs
-from psdmc.toolchain.call_arguments import RobotAxes, common_lead, parameters, states
+from psdmc.toolchain.call_arguments import (
+    RobotAxes,
+    checked_outputs,
+    common_lead,
+    parameters,
+    states,
+    takes_results,
+)
 from psdmc.toolchain.interface import Interface, Origin, batch_symbol
 from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
 from psdmc.toolchain.stubs import result_name
@@ -231,8 +237,8 @@ class CompiledFunctions(RobotFacts):
         if theta_b is not None:
             rows.append(parameters(function, self._sizes.l, theta_b, self._dtype))
         shapes = [lead + tail for tail in kernel.tails]
-        kept = () if out is None else given_outputs.checked(function, out, shapes, self._dtype)
-        is_direct = bool(kept) and all(given_outputs.is_direct(array, rows) for array in kept)
+        kept = () if out is None else checked_outputs(function, out, shapes, self._dtype)
+        is_direct = bool(kept) and all(takes_results(array, rows) for array in kept)
         outs = kept if is_direct else tuple(np.empty(shape, self._dtype) for shape in shapes)
         kernel.batch(math.prod(lead), *map(self._address, rows), *map(self._address, outs))
         if kept and not is_direct:

@@ -277,6 +277,7 @@ def _matrix(place: Placement) -> Array:
     return matrix
 
 
+# Differences relative to the size of torques and matrices, joint by joint.
 NO_TORQUE = 1e-9
 """Share of the largest torque below which a joint's torque is rounding."""
 

@@ -19,7 +19,7 @@ from unoptimised import without_optimisation
 from psdmc.errors import ToolchainError
 from psdmc.toolchain import cache
 from psdmc.toolchain.cache import cache_key, cached
-from psdmc.toolchain.cache_place import cache_directory
+from psdmc.toolchain.cache_room import cache_directory
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
 from psdmc.toolchain.compiler_command import find_compiler

@@ -17,7 +17,7 @@ import psdmc
 from psdmc import compiler
 from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError, InternalError
-from psdmc.toolchain import compile, kept_kernels
+from psdmc.toolchain import compile
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import INTERFACE, LIBRARY, compiled_once
 from psdmc.toolchain.interface import interface_from_json, interface_of, interface_to_json
@@ -80,7 +80,7 @@ def editable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def forget_digests() -> None:
     compile._emission.cache_clear()
-    kept_kernels.sources_digests.cache_clear()
+    compile.sources_digests.cache_clear()
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
-from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
+from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector, WideJoint
 from psdmc.robot.joints.quaternion import arc
 from psdmc.robot.joints.scalars import TINY, root, sign, sincos, square_of, unit
-from psdmc.robot.joints.wide_joint import WideJoint
 
 
 class Planar(WideJoint):
