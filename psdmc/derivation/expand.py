@@ -81,7 +81,8 @@ def expand(
     chosen = scaled.span[:, reduction.pivots]
     mass = _mass_matrix(scaled, chosen, monomials, precision.zero)
     progress("gravity")
-    gravity = _gravity(scaled, chosen, monomials, precision.zero)
+    potential = gravity_terms(scaled.frames, scaled.link_frames, scaled.up, monomials, precision.zero)
+    gravity = times_matrix(potential, chosen, precision.zero)
     progress("velocity terms")
     carried = carried_by(scaled.frames)
     count, needed = velocity_bytes(mass, monomials, carried)
@@ -115,12 +116,6 @@ def _mass_matrix(
         pair: times_matrix(terms._replace(row=np.zeros_like(terms.row)), chosen, zero)
         for pair, terms in found.items()
     }
-
-
-def _gravity(scaled: Scaled, chosen: Array, monomials: Monomials, zero: float) -> Terms:
-    up: Vector = scaled.up
-    terms = gravity_terms(scaled.frames, scaled.link_frames, up, monomials, zero)
-    return times_matrix(terms, chosen, zero)
 
 
 def assembled(

@@ -30,7 +30,7 @@ from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, seen_bodies, sweep_inward
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transpose
 from psdmc.dynamics.slices import first_rates, flat, rates
-from psdmc.dynamics.solve import Factors, SingularMassMatrix, factorize, solve
+from psdmc.dynamics.solve import Factors, SingularMassMatrix, factorize, inner_product, solve
 from psdmc.dynamics.twist import combined, efforts, own_rates
 
 Accelerations = tuple[list[Scalar], tuple[Scalar, ...]]
@@ -105,25 +105,27 @@ class _Inward:
         rows = rows_of(whole)
         columns = [_combined(rows, twist) for twist in frame.joint.twists]
         factors = self._factors(i, columns)
-        along = _along(frame) if _is_nothing(self.drives[i]) else None
+        drive = self.drives[i]
+        along = _along(frame) if isinstance(drive, float) and drive == 0.0 else None
         own = solve(factors, left)
         if frame.parent == BASE:
             self.found[i] = _Held(own, [], factors.pivots, along)
             return ZERO, ZERO
-        loads = _transposed([solve(factors, [column[k] for column in columns]) for k in range(6)])
+        solved = [solve(factors, [column[k] for column in columns]) for k in range(6)]
+        loads = [list(row) for row in zip(*solved, strict=True)]
         self.found[i] = _Held(own, loads, factors.pivots, along)
         # The upper triangle of the inertia seen through the joint; exactly nothing is left along the joint.
         relieved = [
             [
                 0.0
                 if b < a or along in (a, b)
-                else rows[a][b] - _dot([c[a] for c in columns], [load[b] for load in loads])
+                else rows[a][b] - inner_product([c[a] for c in columns], [load[b] for load in loads])
                 for b in range(6)
             ]
             for a in range(6)
         ]
         self._hand_on(i, from_rows(relieved))
-        total = [_dot(own, [column[k] for column in columns]) for k in range(6)]
+        total = [inner_product(own, [column[k] for column in columns]) for k in range(6)]
         return (total[0], total[1], total[2]), (total[3], total[4], total[5])
 
     def _factors(self, i: int, columns: Sequence[Sequence[Scalar]]) -> Factors:
@@ -170,10 +172,10 @@ def _accelerated(
     """A joint's accelerations, and those of its frame besides; `before`: without the joint's."""
     if joint.along is not None:
         others = [k for k in range(6) if k != joint.along]
-        whole = joint.own[0] - _dot([joint.loads[0][k] for k in others], [before[k] for k in others])
+        whole = joint.own[0] - inner_product([joint.loads[0][k] for k in others], [before[k] for k in others])
         values = [whole if k == joint.along else x for k, x in enumerate(before)]
         return [whole - before[joint.along]], _halves(values)
-    own = [a - _dot(load, before) for a, load in zip(joint.own, joint.loads, strict=True)]
+    own = [a - inner_product(load, before) for a, load in zip(joint.own, joint.loads, strict=True)]
     linear, angular = combined(frame.joint, own)
     moved, turned = _halves(before)
     return own, (add(moved, linear), add(turned, angular))
@@ -202,23 +204,8 @@ def _combined(
     return found
 
 
-def _transposed(rows: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    return [list(column) for column in zip(*rows, strict=True)]
-
-
 def _halves(values: Sequence[Scalar]) -> tuple[Vector, Vector]:
     return (values[0], values[1], values[2]), (values[3], values[4], values[5])
-
-
-def _dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    total: Scalar = 0.0
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
-
-
-def _is_nothing(value: Scalar) -> bool:
-    return isinstance(value, float) and value == 0.0
 
 
 # Articulated inertias: the wrench per acceleration of a body whose further joints move freely, as symmetric 6 x 6 matrices

@@ -114,7 +114,10 @@ def sweep_inward(
             turn = state.turn if forward.folded[i] else None
             own_force, own_moment = _relieved(own_force, own_moment, external[i], turn)
         force, moment = add(forces[i], own_force), add(moments[i], own_moment)
-        torques[i] = _driven(efforts(frame.joint, force, moment), frame, drive_inertia[i], changes[i])
+        own = efforts(frame.joint, force, moment)
+        if frame.joint.about_z:  # joints of several rates have no drive
+            own = (own[0] + drive_inertia[i] * changes[i],)
+        torques[i] = own
         if yielded is not None:
             further_force, further_moment = yielded(i, torques[i])
             force, moment = add(force, further_force), add(moment, further_moment)
@@ -135,10 +138,3 @@ def sweep_inward(
         force = handed_vector(frame, force)
         forces[parent], moments[parent] = add(forces[parent], force), add(moments[parent], carried)
     return tuple(flat(torques))
-
-
-def _driven(
-    efforts: tuple[Scalar, ...], frame: Frame, drive_inertia: Scalar, qdd: Scalar
-) -> tuple[Scalar, ...]:
-    """A joint's efforts with the torque of its own drive inertia, drive_inertia qdd; joints of several rates have none."""
-    return (efforts[0] + drive_inertia * qdd,) if frame.joint.about_z else efforts

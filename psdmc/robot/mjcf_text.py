@@ -139,7 +139,9 @@ def _at_reference(writer: _Writer, j: int, origin: Array, turn: Array, axis: Arr
 def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array, Array]) -> None:
     model, name = writer.model, writer.names.joint(j)
     if _is_ball(writer, j):
-        _ball(writer, j, writer.joint(name, "floating", parent, child, place))
+        element = writer.joint(name, "floating", parent, child, place)
+        _dynamics(writer, j, element)
+        SubElement(element, BALL)
         return
     slides = model.jnt_type[j] == writer.mujoco.mjtJoint.mjJNT_SLIDE
     limited, forced = bool(model.jnt_limited[j]), bool(model.jnt_actfrclimited[j])
@@ -150,7 +152,10 @@ def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array
     if limited:
         limits |= dict(zip(("lower", "upper"), map(_number, model.jnt_range[j]), strict=True))
     if forced:
-        limits["effort"] = _number(_effort(*model.jnt_actfrcrange[j]))
+        # The effort that a joint has in both directions; where it has but one, what it has in that.
+        least, most = model.jnt_actfrcrange[j]
+        both = min(-least, most)
+        limits["effort"] = _number(both if both > 0.0 else max(abs(least), abs(most)))
     if limits:
         SubElement(element, "limit", limits)
     _dynamics(writer, j, element)
@@ -162,20 +167,8 @@ def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array
         SubElement(element, DRIVE, inertia=_number(writer.armatures[j]))
 
 
-def _effort(least: float, most: float) -> float:
-    """The effort that a joint has in both directions; where it has but one, what it has in that."""
-    both = min(-least, most)
-    return both if both > 0.0 else max(abs(least), abs(most))
-
-
 def _is_ball(writer: _Writer, j: int) -> bool:
     return bool(writer.model.jnt_type[j] == writer.mujoco.mjtJoint.mjJNT_BALL)
-
-
-def _ball(writer: _Writer, j: int, element: Element) -> None:
-    """Return the elements that turn a floating joint into a ball joint for psdmc."""
-    _dynamics(writer, j, element)
-    SubElement(element, BALL)
 
 
 def _dynamics(writer: _Writer, j: int, element: Element) -> None:

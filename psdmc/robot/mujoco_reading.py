@@ -12,7 +12,7 @@ import numpy as np
 from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
-from psdmc.robot.mechanism import DRIVE, Array, Mechanism, Placement
+from psdmc.robot.mechanism import DRIVE, Array, Mechanism
 from psdmc.robot.mujoco_warnings import kept_warnings
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference_model import has_assumptions
@@ -144,13 +144,11 @@ def _free_joint(chain: Mechanism) -> bool:
         raise NotCompared(f"MuJoCo has no joint like {shown(chain.joints[kinds.index('none')].name)}")
     if "free" in kinds[1:]:
         raise NotCompared("MuJoCo's free joints are compared where they come first")
-    if "free" in kinds and not _is_world(chain.joints[0].placement):
+    root = chain.joints[0].placement
+    is_world = np.all(root.rotation == np.eye(3)) and not root.translation.any()
+    if "free" in kinds and not is_world:
         raise NotCompared("MuJoCo's free joints are about the world's frame")
     return "free" in kinds
-
-
-def _is_world(placement: Placement) -> bool:
-    return bool(np.all(placement.rotation == np.eye(3)) and not placement.translation.any())
 
 
 def _entries(first: Array, counts: Sequence[int]) -> list[int]:

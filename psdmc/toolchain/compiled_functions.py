@@ -198,6 +198,7 @@ class CompiledFunctions(RobotFacts):
         self._more = more
         self._origin = origin
         self._others: list[CompiledFunctions] = []  # whose libraries stay open as long as this one's
+        self._bind(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the request that the robot was compiled for, its model included, without machine code."""
