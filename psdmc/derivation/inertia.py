@@ -27,8 +27,9 @@ from psdmc.derivation.terms import Terms, joined
 from psdmc.dynamics.frames import BASE, Frame, joint_angle, joint_offset
 from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.motion import JointState
-from psdmc.dynamics.regressor import Placed, Twist, carried, own_twist, twist_in
+from psdmc.dynamics.regressor import Placed, Twist, carried, twist_in
 from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
+from psdmc.dynamics.twist import axis_twist
 from psdmc.robot.joints import JointType
 from psdmc.robot.joints.basis import Basis
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
@@ -117,7 +118,7 @@ def mass_matrix_terms(
     for k, frame in enumerate(frames):
         joint = moving(frame)
         before = [] if frame.parent == BASE else twists[frame.parent]
-        linear, angular = own_twist(frame)
+        linear, angular = axis_twist(frame.joint)
         twists.append(
             [carried_twist(joint, twist) for twist in before] + [(_as_arrays(linear), _as_arrays(angular))]
         )

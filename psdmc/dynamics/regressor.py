@@ -18,7 +18,6 @@ from psdmc.dynamics.motion import JointState, LinkMotion, sweep_outward
 from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, dot, transform, transpose
 from psdmc.dynamics.slices import first_rates, rates
 from psdmc.dynamics.spin import Rates, spin_of
-from psdmc.dynamics.twist import axis_twist
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
 
 Twist = tuple[Vector, Vector]
@@ -72,11 +71,6 @@ def regressor(
         if drive in wanted and frame.joint.about_z:  # joints of several rates have no drive
             rows[first[k]][drive] = changes[k]
     return rows
-
-
-def own_twist(frame: Frame) -> Twist:
-    """The twist that the unit rate of a joint of one rate gives its own frame."""
-    return axis_twist(frame.joint)
 
 
 def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:
