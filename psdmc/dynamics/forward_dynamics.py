@@ -284,17 +284,15 @@ def before_turn(inertia: Articulated, turn: Turn | Rotation | None) -> Articulat
         return inertia
     if isinstance(turn, Rotation):
         return rotated(inertia, turn.rows)
+    linear = _turned(inertia.linear, turn)
     # The cross block is not symmetric.
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia.mixed
     slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
     moved, crossed = turn.sine * slope, turn.cosine * slope
     xz, yz, _ = turn.inward((xz, yz, 0.0))
     zx, zy, _ = turn.inward((zx, zy, 0.0))
-    return Articulated(
-        _turned(inertia.linear, turn),
-        ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz)),
-        _turned(inertia.angular, turn),
-    )
+    mixed = ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
+    return Articulated(linear, mixed, _turned(inertia.angular, turn))
 
 
 def rotated(inertia: Articulated, rows: Matrix) -> Articulated:

@@ -93,15 +93,14 @@ def before_turn(composite: Composite, turn: Turn | Rotation | None) -> Composite
     if isinstance(turn, Rotation):
         return _rotated(composite, turn)
     force, moment = (turn.inward(v) for v in composite.wrench)
+    body = spun(composite.body, turn)
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = composite.momenta.second
     slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
     moved, crossed = turn.sine * slope, turn.cosine * slope
     xz, yz, _ = turn.inward((xz, yz, 0.0))
     zx, zy, _ = turn.inward((zx, zy, 0.0))
     second = ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
-    return Composite(
-        spun(composite.body, turn), Momenta(second, turn.inward(composite.momenta.first)), (force, moment)
-    )
+    return Composite(body, Momenta(second, turn.inward(composite.momenta.first)), (force, moment))
 
 
 def _rotated(composite: Composite, turn: Rotation) -> Composite:
