@@ -12,10 +12,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from psdmc.errors import InputError
+from psdmc.friction.terms import with_present_names
 from psdmc.model.archive import BEGINS, LARGEST, BrokenArchiveError, opened, read_arrays
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.from_parts import model_from
-from psdmc.model.linear_friction import with_names_of_exponents
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
 from psdmc.reading import read_file
 
@@ -131,7 +131,7 @@ def _with_names(manifest: dict[str, Any]) -> dict[str, Any]:
     """The manifest with the present names of a calibration's friction; what is damaged stays for its readers."""
     try:
         provenance = manifest["provenance"]
-        kept = with_names_of_exponents(provenance["calibration"])
+        kept = with_present_names(provenance["calibration"])
         return manifest | {"provenance": {**provenance, "calibration": kept}}
     except (AttributeError, KeyError, TypeError, ValueError):
         return manifest

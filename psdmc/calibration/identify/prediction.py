@@ -5,14 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 from psdmc.calibration.identify.coupling import Matrix
 from psdmc.calibration.identify.steps import StepOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.low_pass import FilterOptions
+from psdmc.friction.law import Term
+from psdmc.friction.terms import every_joint_s
 
-Law = Literal["linear", "lugre"]
+LINEAR = "linear"
+"""The law of friction that is a sum of linear terms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,16 +32,16 @@ class FrictionRunConstants:
 class Prediction:
     """Numbers of the prediction that are neither theta_b nor a row of friction or motors.
 
-    law         of friction: linear (Coulomb, viscous terms, offset), or LuGre
+    law         of friction: "linear" (a sum of terms), or the name of a law with a state
     steps       filter and split by step: "all" of one log, else motor, gravity, friction, inertial
-    sign_speed  rad/s over which Coulomb friction changes sign, linear law
-    exponents   of the viscous terms, linear law;  offset  whether each joint has one
+    sign_speed  rad/s over which friction changes sign, linear law
+    exponents   of the terms of every joint, linear law;  offset  whether each joint has one
     coupling    C of q_joint = C q_motor, linear law: friction is of motors; empty: of joints
-    runs        constants of the friction runs by joint, LuGre
+    runs        constants of the friction runs by joint, law with a state
     columns     tables of springs and further friction, linear law (columns.read_columns)
     """
 
-    law: Law
+    law: str
     steps: Mapping[str, StepOptions]
     sign_speed: float = 0.0
     exponents: tuple[float, ...] = ()
@@ -46,6 +49,15 @@ class Prediction:
     runs: Mapping[str, FrictionRunConstants] = field(default_factory=dict)
     coupling: Matrix = ()
     columns: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_linear(self) -> bool:
+        return self.law == LINEAR
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Linear friction of every joint."""
+        return every_joint_s(self.exponents, self.offset)
 
     def as_json(self) -> dict[str, Any]:
         """Plain values, which read back the same."""

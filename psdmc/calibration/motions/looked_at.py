@@ -56,9 +56,9 @@ def _torques(model: DynamicsModel, chain: Mechanism, regressor: Regressor) -> To
         return None
     known = "calibration" in model.provenance
     try:
-        friction = linear_friction(model).torque if known else None
+        friction = linear_friction(model).by_speed if known else None
     except InputError:
-        friction = None  # of a campaign: LuGre's
+        friction = None  # of a campaign: it has a state
     return TorqueLimits(chain, regressor, largest, model.theta_b, friction)
 
 

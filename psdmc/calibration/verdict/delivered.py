@@ -24,12 +24,12 @@ from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import judge_gravity
 from psdmc.calibration.identify.inertial import judge_inertial
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_names, friction_terms
-from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
+from psdmc.calibration.identify.linear_problem import friction_columns, names_of
 from psdmc.calibration.identify.motor import judge_motors
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.prediction import Prediction, prediction_from_json
 from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.identify.state_friction import PARAMETERS
 from psdmc.calibration.identify.steps import StepOptions, StepQuality, judged
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
@@ -37,6 +37,7 @@ from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
+from psdmc.friction.state import STATE_LAW
 from psdmc.model import recursive
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
@@ -203,10 +204,9 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
     law = found.prediction
     coupling = coupling_of(law.coupling)
     speed = qd if coupling is None else coupling.to_motors(qd)
-    terms = friction_terms(speed, law.sign_speed, law.exponents, law.offset)
-    names = friction_names(law.exponents, law.offset)
+    terms = friction_columns(law.terms, speed, law.sign_speed)
     extra = found.columns.values(motion_of(q, qd, law.sign_speed, rigid, coupling)) @ found.extra
-    for name, term in zip(names, terms, strict=True):
+    for name, term in zip(names_of(law.terms), terms, strict=True):
         torque = term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
         rigid = rigid + (torque if coupling is None else coupling.torque_of_joints(torque))
     return np.asarray(rigid + extra)
@@ -215,7 +215,7 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
 def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
     chain, motors, theta, steps = found.model.mechanism, found.motors, found.theta_b, found.prediction.steps
     regressor = ChainRegressor(found.model)
-    friction = _lugre(found)
+    friction = _with_state(found)
     joints = friction.joints
     alone = prepared_runs(chain, regressor, motors, theta, runs.friction, steps["friction"])
     motor = (judge_motors(chain, runs.motor, steps["motor"], _identified(found)),) if runs.motor else ()
@@ -233,10 +233,10 @@ def _identified(found: Delivered) -> dict[str, float]:
     return {row["joint"]: found.constants[row["joint"]] for row in rows if row["seen"]}
 
 
-def _lugre(found: Delivered) -> FrictionResult:
+def _with_state(found: Delivered) -> FrictionResult:
     joints = {}
     for joint, run in found.prediction.runs.items():
-        law = Lugre(*(found.friction[joint, name] for name in PARAMETERS))
+        values = STATE_LAW.require(np.array([found.friction[joint, name] for name in PARAMETERS]))
         exact = np.zeros((len(PARAMETERS), len(PARAMETERS)))
-        joints[joint] = JointFriction(joint, law, exact, (), run.inertia, run.offset, run.delay)
+        joints[joint] = JointFriction(joint, values, exact, (), run.inertia, run.offset, run.delay)
     return FrictionResult(joints, ())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from psdmc.calibration.identify.four_steps import FourSteps
-from psdmc.calibration.identify.lugre import PARAMETERS, UNITS
 from psdmc.calibration.identify.prediction import FrictionRunConstants, Prediction
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.identify.visibility import visibility, visibility_warnings, weak_notes
@@ -19,6 +18,8 @@ from psdmc.calibration.verdict.record_rows import (
     parameter_rows,
     unit_of,
 )
+from psdmc.friction.law import Term
+from psdmc.friction.state import STATE_LAW
 from psdmc.model.dynamics_model import DynamicsModel
 
 
@@ -62,11 +63,11 @@ def four_step_record(
             model=model,
             parameters=parameter_rows(model, theta_b, inertial.std, groups, seen),
             motors=motor_rows(model, found.motors, found.motor),
-            friction=_lugre_rows(model, found),
+            friction=_friction_rows(model, found),
             steps=(),
             warnings=(*dropped_links(model), *found.warnings, *visibility_warnings("inertial", names, seen)),
             facts=facts,
-            prediction=Prediction("lugre", steps, runs=runs),
+            prediction=Prediction(STATE_LAW.name, steps, runs=runs),
             notes=weak_notes("inertial", names, seen),
             covariance=inertial.covariance + inertial.prior_covariance,
         ),
@@ -74,13 +75,14 @@ def four_step_record(
     )
 
 
-def _lugre_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
+def _friction_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
     """The seven per joint; the uncertainty of forces includes the torque constant's."""
     relative = dict(zip(model.joint_names, found.motors.relative_std.tolist(), strict=True))
     rows: list[NumberRow] = []
     joints = {joint.name: joint for joint in model.mechanism.joints}
+    units = Term(STATE_LAW).units()
     for name, joint in found.friction.joints.items():
-        values = zip(PARAMETERS, joint.friction.as_array().tolist(), joint.std.tolist(), UNITS, strict=True)
+        values = zip(STATE_LAW.parameters, joint.friction.tolist(), joint.std.tolist(), units, strict=True)
         for parameter, value, std, unit in values:
             by_constant = relative[name] * value if unit.startswith("Nm") else 0.0
             seen = parameter not in joint.unseen

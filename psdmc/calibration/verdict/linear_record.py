@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.linear_fit import LinearResult
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.prediction import Prediction
+from psdmc.calibration.identify.prediction import LINEAR, Prediction
 from psdmc.calibration.identify.steps import StepOptions
 from psdmc.calibration.identify.visibility import (
     IDENTIFIED,
@@ -37,7 +37,7 @@ def linear_record(
     """The record of a linear fit with these values of the whole vector, without its quality."""
     problem, solved = found.problem, found.estimate
     names = (*model.base_parameters.labels, *problem.names)
-    at = kept_at(model, values, found.prior.scale)
+    at = kept_at(model, values, found.prior.scale, found.prior.values)
     seen = visibility(names, values, solved.std, solved.unseen, at)
     dropped = np.zeros(len(values), dtype=bool) if found.dropped is None else found.dropped
     stated = np.arange(len(values)) < (model.l if found.stated else 0)
@@ -58,8 +58,11 @@ def linear_record(
         return NumberRow(owner, name, float(values[k]), float(std[k]), unit, word == IDENTIFIED, word)
 
     joints = {joint.name: joint for joint in model.mechanism.joints}
+    turning = {
+        name: unit for term in problem.terms for name, unit in zip(term.names, term.units(), strict=True)
+    }
     friction = [
-        row(k, owner, name, unit_of(joints[owner], _friction_unit(name)))
+        row(k, owner, name, unit_of(joints[owner], turning[name]))
         for k, (owner, name) in enumerate(problem.plain, start=model.l)
     ]
     unknowns = enumerate(problem.columns.unknowns, start=problem.first_extra)
@@ -84,7 +87,7 @@ def linear_record(
             ),
             facts=facts,
             prediction=Prediction(
-                "linear",
+                LINEAR,
                 {"all": step},
                 options.sign_speed,
                 options.exponents,
@@ -108,11 +111,3 @@ def _coupled_notes(options: LinearOptions) -> tuple[str, ...]:
 
 def _chosen(rows: Sequence[NumberRow], wanted: NDArray[np.bool_]) -> tuple[NumberRow, ...]:
     return tuple(row for row, is_wanted in zip(rows, wanted.tolist(), strict=True) if is_wanted)
-
-
-def _friction_unit(name: str) -> str:
-    """Of a joint that turns."""
-    if not name.startswith("viscous"):
-        return "Nm"
-    _, _, exponent = name.partition("^")
-    return f"Nm (s/rad)^{exponent}" if exponent else "Nms/rad"

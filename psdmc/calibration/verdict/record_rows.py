@@ -9,6 +9,7 @@ from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.visibility import IDENTIFIED, Visibility
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.record import NumberRow, ParameterRow
+from psdmc.friction.law import unit_of as own_unit
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.mechanism import Joint
 from psdmc.robot.missing_inertia import massless_words, unknown_option
@@ -18,14 +19,15 @@ MOVED = 1e-6
 physical consistency."""
 
 
-def kept_at(model: DynamicsModel, values: Array, scale: Array) -> list[str]:
-    """The value that each unseen parameter is kept at, in words: friction at zero, theta_b at the file's."""
-    prior = np.zeros(len(values))
+def kept_at(model: DynamicsModel, values: Array, scale: Array, start: Array | None = None) -> list[str]:
+    """The value that each unseen parameter is kept at, in words: theta_b at the file's, what follows it at `start`, zero
+    where that is None."""
+    prior = np.zeros(len(values)) if start is None else start.copy()
     known, unknown = model.file_theta_b, model.unknown_base_parameters
     prior[: model.l] = 0.0 if known is None else known
     words = ["the known links' part" if k in unknown else "the file's value" for k in range(model.l)]
     names = ["zero"] * model.l if known is None else words
-    names += ["zero"] * (len(values) - model.l)
+    names += [f"{start:g}" if start else "zero" for start in prior[model.l :]]
     moved = np.abs(values - prior) > MOVED * scale
     return [
         f"the physical value nearest to {name}" if m else name for name, m in zip(names, moved, strict=True)
@@ -45,7 +47,7 @@ def dropped_links(model: DynamicsModel) -> tuple[str, ...]:
 
 def unit_of(joint: Joint, turning: str) -> str:
     """The unit of a joint's number, given that of one that turns: for Nms/rad Ns/m where it slides."""
-    return turning.replace("Nm", "N").replace("rad", "m") if joint.type.effort_unit == "N" else turning
+    return own_unit(joint.type.effort_unit, turning)
 
 
 def by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:
