@@ -102,6 +102,7 @@ class _Inward:
             whole = both(whole, self.beyond[i])
         given = own_rates(frame.joint, self.torques[i])
         left = [tau - own for tau, own in zip(given, needed, strict=True)]
+        # With I the articulated inertia and S the joint's axes: the columns U = I S, factors of D = S^T U, and D^-1 left.
         rows = rows_of(whole)
         columns = [_combined(rows, twist) for twist in frame.joint.twists]
         factors = self._factors(i, columns)
@@ -114,7 +115,7 @@ class _Inward:
         solved = [solve(factors, [column[k] for column in columns]) for k in range(6)]
         loads = [list(row) for row in zip(*solved, strict=True)]
         self.found[i] = _Held(own, loads, factors.pivots, along)
-        # The upper triangle of the inertia seen through the joint; exactly nothing is left along the joint.
+        # Seen through the joint: I - U D^-1 U^T, its upper triangle; exactly nothing is left along the joint.
         relieved = [
             [
                 0.0

@@ -109,11 +109,13 @@ def sweep_inward(
     forces, moments, gathered = [ZERO] * n, [ZERO] * n, [ZERO] * n
     for i in reversed(range(n)):
         frame, state, parent = frames[i], forward.states[i], frames[i].parent
+        # The wrench f that the body's motion requires, with those of the bodies beyond it.
         own_force, own_moment = wrench(forward.motions[i], bodies[i])
         if i in external:
             turn = state.turn if forward.folded[i] else None
             own_force, own_moment = _relieved(own_force, own_moment, external[i], turn)
         force, moment = add(forces[i], own_force), add(moments[i], own_moment)
+        # Each rate takes the component along its axis s: tau = s^T f.
         own = efforts(frame.joint, force, moment)
         if frame.joint.about_z:  # joints of several rates have no drive
             own = (own[0] + drive_inertia[i] * changes[i],)
@@ -123,6 +125,7 @@ def sweep_inward(
             force, moment = add(force, further_force), add(moment, further_moment)
         if parent == BASE:
             continue
+        # All of f goes on to the parent, turned back and about the parent's origin.
         own_turn = None if forward.folded[i] else state.turn
         force = to_previous(frame, inward(own_turn, force))
         if forward.joins[i]:

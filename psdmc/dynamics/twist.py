@@ -63,7 +63,7 @@ def momentum(body: Body, twist: Twist) -> tuple[Vector, Vector]:
         if weight == 0.0:
             continue
         force, moment = (
-            (v if weight == 1.0 else (v[0] * weight, v[1] * weight, v[2] * weight))
+            v if weight == 1.0 else (v[0] * weight, v[1] * weight, v[2] * weight)
             for v in _unit_momentum(body, part)
         )
         found = (force, moment) if found is None else (add(found[0], force), add(found[1], moment))
