@@ -169,10 +169,9 @@ OWN = {
     "backends/render.py": "psdmc's own templates",
     "report/bench_page.py": "psdmc's own templates",
     "robot/new_file.py": "psdmc's own template",
-    "toolchain/cache_entry.py": "the user's own cache, by its size",
+    "toolchain/cache_room.py": "the user's own cache, by its size",
     "toolchain/direct_calls.py": "psdmc's own sources",
-    "toolchain/kept_kernels.py": "the user's own cache, sealed",
-    "toolchain/kept_libraries.py": "the user's own cache, sealed",
+    "toolchain/compile.py": "the user's own cache, sealed",
     "toolchain/stubs.py": "psdmc's own sources",
 }
 """What is read whole and is no input of a user's: file of psdmc, and whose it is."""
