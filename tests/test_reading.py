@@ -155,7 +155,7 @@ READS_ALL = {"read_text", "read_bytes"}
 """Methods that read a file to its end."""
 
 OWN = {
-    "bench/cold.py": "the kernel's figures",
+    "bench/measure.py": "the kernel's figures",
     "bench/callgrind.py": "valgrind's output",
     "bench/contestant.py": "psdmc's own sources",
     "bench/fresh.py": "the kernel's figures",
