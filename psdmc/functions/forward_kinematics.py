@@ -51,11 +51,11 @@ RECIPE = Recipe(
             Quantity(
                 "rotation",
                 ("frames", "3", "3"),
-                means="rotation matrices; their columns are the axes of the named frame",
+                means="rotation matrices; column j is axis j of the named frame, in the base frame",
             ),
         ),
         theta=False,
-        summary="Compute the position and rotation of each named frame in the base frame.",
+        summary="Compute the position of each named frame in the base frame, and the frame's rotation.",
     ),
     "forward kinematics",
     trace,
