@@ -45,7 +45,13 @@ RECIPE = Recipe(
         120,
         "linear then angular acceleration of every named frame at constant qd (dJ/dt qd), base frame",
         (Q, QD),
-        (Quantity("drift", ("frames", "6"), means="linear acceleration (m/s^2), then angular acceleration (rad/s^2)"),),
+        (
+            Quantity(
+                "drift",
+                ("frames", "6"),
+                means="linear acceleration (m/s^2), then angular acceleration (rad/s^2)",
+            ),
+        ),
         theta=False,
         summary="Compute (dJ/dt) qd of each named frame, the frame's acceleration if qdd = 0, along the axes of "
         "the base frame.",

@@ -41,7 +41,9 @@ RECIPE = Recipe(
             Q,
             QD,
             Quantity("qd_r", ("nv",), 3.0, means="reference rates of the controller, rad/s or m/s"),
-            Quantity("qdd_r", ("nv",), 5.0, means="reference accelerations of the controller, rad/s^2 or m/s^2"),
+            Quantity(
+                "qdd_r", ("nv",), 5.0, means="reference accelerations of the controller, rad/s^2 or m/s^2"
+            ),
         ),
         (
             Quantity(

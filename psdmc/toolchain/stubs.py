@@ -61,7 +61,11 @@ def documentation(function: Signature) -> str:
     given = [(q.name, f"{_shape(q)} {q.means}") for q in function.inputs]
     theta = "(l,) base parameters that replace the model's, SI units; optional if the model's are known"
     given += [("theta_b", theta)] if function.theta else []
-    written = "tuple of arrays into which psdmc writes the results" if several else "array into which psdmc writes the result"
+    written = (
+        "tuple of arrays into which psdmc writes the results"
+        if several
+        else "array into which psdmc writes the result"
+    )
     given += [("out", f"{written}; optional")]
     made = [(q.name, f"{_shape(q, lead)} {q.means}") for q in function.outputs]
     axes = {axis for q in (*function.inputs, *function.outputs) for axis in q.axes}
