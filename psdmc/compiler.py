@@ -66,7 +66,7 @@ def derive(
 ) -> DynamicsModel:
     """Derive the model (E, P, theta_b) of a robot file (URDF, xacro, MJCF or DH table), and return it.
 
-    The result is a DynamicsModel. psdmc has compared its torques with those of the Newton-Euler algorithm.
+    The result is a DynamicsModel. psdmc compares the torques of the model with the Newton-Euler algorithm before it returns.
 
     robot          path of the robot file
     base, tip      names of the first and last link, to model only the chain between them; None: the whole robot
@@ -78,17 +78,18 @@ def derive(
                    differ by at most this number; 0: never
     expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
     progress       function that psdmc calls with the name of each stage, such as print
-    frames         links whose frames are named frames of the model; if empty: the tip, or the end of each branch
+    frames         links for whose frames psdmc computes poses, Jacobians, wrenches and loads; if empty: the tip, or the
+                   end of each branch
     tool           x, y, z (m) and roll, pitch, yaw (rad), relative to the tip, of a frame that psdmc adds as 'tool'
     lock           joints that stay at a fixed position: a dictionary of positions (rad or m) by joint name
-    floating       True: the root link moves freely. q begins with its position (m) and quaternion (x, y, z, w), qd with its
-                   linear and angular velocity along its own axes
+    floating       True: the root link moves freely. The first entries of q are the link's position (m) and quaternion
+                   (x, y, z, w). The first entries of qd are the link's linear and angular velocity along the link's axes
     root           name of the robot's first body, for an MJCF in which several bodies of the world move
     xacro_args     values of the arguments of a xacro file, by name
     packages       folders of ROS packages that a xacro file uses, by package name; psdmc also looks for packages in
                    ROS_PACKAGE_PATH and AMENT_PREFIX_PATH
-    unknown        links whose masses and inertias are unknown: a list, one name, or "all". "missing" means the links for
-                   which the file has no inertia; psdmc takes these links as massless if `unknown` does not name them
+    unknown        links whose masses and inertias are unknown: a list, one name, or "all". "missing" means all
+                   links without an inertia in the file. Links without an inertia that are not unknown are massless
 
     Raises InputError if the file or an option is wrong. Raises DerivationError if the file has no mistake but the model
     needs other options, for example `expand=False` because E and P need too much memory.
@@ -155,8 +156,9 @@ def emit_c(
     real       precision, "float64" or "float32"; None: the precision of the target
     trig       how the code computes sines: "inline", "freestanding" (without libm) or "libm"; None: as the target does
     name       name of the robot in C, with which all symbols begin; None: the name of the model
-    force      True: write into a folder with other files, too. psdmc replaces edited files of a package, and keeps any
-               other file that is in the place of a package file as NAME.orig
+    force      True: also write into a folder with files that psdmc did not write, and over edited package files. psdmc
+               deletes no file that it did not write. If such a file has the name of a package file, psdmc renames it to
+               NAME.orig
     progress   function that psdmc calls with the name of each stage, such as print
     payload    True: add the functions that change theta_b for a load
     adapters   programs for which psdmc adds code to the package, such as "casadi"
@@ -164,7 +166,7 @@ def emit_c(
     friction   True: add the function that computes friction torques, for a model that was calibrated from logs
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
 
-    Raises InputError if an option is wrong, or if the model has no friction for `friction`. Raises InputError also if the
+    Raises InputError if an option is wrong, or if `friction` is true and the model has no friction. Raises it also if the
     assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`, or if the mass matrix is not positive
     definite within the joint limits. In this last case, generate only functions that do not solve for accelerations.
     """

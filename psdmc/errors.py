@@ -37,7 +37,7 @@ class PsdmcError(Exception):
 class InputError(PsdmcError):
     """psdmc raises this error if an input file, an option or an argument is wrong.
 
-    The command line then ends with exit status 2.
+    A psdmc command then ends with exit status 2.
     """
 
     exit_status = 2
@@ -47,7 +47,7 @@ class DerivationError(PsdmcError):
     """psdmc raises this error if a robot file has no mistake, but psdmc cannot derive a model with the given options.
 
     For example, E and P of a robot with many joints can need too much memory; the option `expand=False` leaves them out.
-    The command line then ends with exit status 3.
+    A psdmc command then ends with exit status 3.
     """
 
     exit_status = 3
@@ -56,7 +56,7 @@ class DerivationError(PsdmcError):
 class ToolchainError(PsdmcError):
     """psdmc raises this error if a compiler, another program, a disk or a folder of this machine fails.
 
-    The command line then ends with exit status 4.
+    A psdmc command then ends with exit status 4.
     """
 
     exit_status = 4
@@ -65,7 +65,7 @@ class ToolchainError(PsdmcError):
 class InternalError(Exception):
     """psdmc raises this error if psdmc itself has a bug. Please report the error message and your input.
 
-    The command line then ends with exit status 70.
+    A psdmc command then ends with exit status 70.
     """
 
 

@@ -48,7 +48,13 @@ RECIPE = Recipe(
         170,
         "velocity of all links' common centre of mass per unit joint rate, base frame",
         (Q,),
-        (Quantity("J", ("3", "nv"), means="column j is the velocity (m/s) if the joint rate qd[j] is 1"),),
+        (
+            Quantity(
+                "J",
+                ("3", "nv"),
+                means="column j is the velocity (m/s) if qd[j] is 1 and all other rates are 0",
+            ),
+        ),
         theta=False,
         summary="Compute the Jacobian J of the centre of mass of all links: J qd is the centre's velocity "
         "in the base frame.",

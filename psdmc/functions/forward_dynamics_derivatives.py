@@ -90,9 +90,9 @@ RECIPE = Recipe(
                 Quantity(
                     f"dqdd_d{x}",
                     ("nv", "nv"),
-                    means=f"derivatives of qdd by {x}: row i for qdd[i], column j for the joint rate v_names[j]",
+                    means=f"derivatives of qdd by {x}: row i for qdd[i], column j for {entry}",
                 )
-                for x in ("q", "qd", "tau")
+                for x, entry in (("q", "joint rate j"), ("qd", "qd[j]"), ("tau", "tau[j]"))
             ),
         ),
         theta=True,

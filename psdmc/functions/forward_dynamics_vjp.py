@@ -66,7 +66,7 @@ RECIPE = Recipe(
         (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
         theta=True,
         summary="Compute the accelerations qdd of forward dynamics, and the gradients by q, qd and tau "
-        "of the sum of cotangent[i] * qdd[i] over all i.",
+        "of the sum of cotangent[i] * qdd[i].",
         positive=PIVOTS,
     ),
     "gradient of forward dynamics",

@@ -47,7 +47,8 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("frames", "6", "nv"),
-                means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s)",
+                means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
+                "column j for qd[j]",
             ),
         ),
         theta=False,

@@ -57,7 +57,7 @@ RECIPE = Recipe(
                 "dv_dq",
                 ("frames", "6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
-                "column j for the joint rate v_names[j]",
+                "column j for joint rate j",
             ),
         ),
         theta=False,

@@ -55,7 +55,7 @@ RECIPE = Recipe(
             Quantity(
                 "dg_dq",
                 ("nv", "nv"),
-                means="derivatives of g by q: row i for g[i], column j for the joint rate v_names[j]",
+                means="derivatives of g by q: row i for g[i], column j for joint rate j",
             ),
         ),
         theta=True,

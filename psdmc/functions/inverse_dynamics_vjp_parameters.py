@@ -46,7 +46,7 @@ RECIPE = with_parameter_gradient(
     182,
     "tau, and the gradient of cotangent . tau by q, qd, qdd and theta_b",
     "Compute the torques tau of inverse dynamics, and the gradients by q, qd, qdd and theta_b "
-    "of the sum of cotangent[i] * tau[i] over all i.",
+    "of the sum of cotangent[i] * tau[i].",
     trace,
     reference,
     pinocchio,

@@ -68,8 +68,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, WRENCHES),
         (TAU,),
         theta=True,
-        summary="Compute the joint torques of a motion while external wrenches act on the named frames: tau = "
-        "M(q) qdd + h(q, qd) - sum of J^T wrench over the frames, J being a frame's Jacobian.",
+        summary="Compute the joint torques of a motion under external wrenches: M(q) qdd + h(q, qd), minus J^T wrench "
+        "for each named frame.",
     ),
     "inverse dynamics with wrenches",
     trace,

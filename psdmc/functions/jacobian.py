@@ -45,7 +45,8 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("6", "nv"),
-                means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s)",
+                means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
+                "column j for qd[j]",
             ),
         ),
         theta=False,

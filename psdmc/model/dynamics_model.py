@@ -39,8 +39,9 @@ class DynamicsModel(Answers):
 
     `psdmc.derive` makes models. y(state) are the values of p monomials, which are products of powers of q, sin q, cos q, qd
     and qdd. The columns of the matrix E are the exponents of the monomials. A model has n joints and l base parameters
-    theta_b. A model has the same methods as a compiled robot, such as `forward_dynamics`, and computes them in NumPy. q has
-    the shape (..., nq), rates and torques have the shape (..., nv), in SI units; the axes (...) count states.
+    theta_b. A model has the same methods as a compiled robot, such as `forward_dynamics`, and computes them in NumPy. In
+    arguments and results, q has the shape (..., nq), and rates and torques have the shape (..., nv), in SI units. The axes
+    (...) count states.
 
     expansion    the matrices E and P; None if the model was derived with `expand=False`
     theta_b      (l,) base parameters, SI units as in `base_parameters`; None if unknown
@@ -113,7 +114,7 @@ class DynamicsModel(Answers):
 
     @property
     def n(self) -> int:
-        """Return the number of joints. This number counts mimic joints, which follow another joint, too."""
+        """Return the number of joints, with mimic joints, which follow another joint."""
         return len(self.mechanism)
 
     @property
@@ -257,8 +258,8 @@ class DynamicsModel(Answers):
             drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the drive inertias of the model
 
         Pass the result to a function's argument `theta_b`. Raises InputError if a number is not finite or too large for a
-        robot file, if a mass is negative, or if an inertia is not symmetric or belongs to a link without mass. Raises
-        InputError also if a link contradicts an assumption of the model, such as `assume_zero`. Warns if no rigid body can
+        robot file, or if a mass is negative. Raises InputError also if an inertia is not symmetric or belongs to a link
+        without mass, or if a link contradicts an assumption of the model, such as `assume_zero`. Warns if no rigid body can
         have one of the inertias.
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)

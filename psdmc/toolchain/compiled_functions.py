@@ -58,7 +58,7 @@ class RobotFacts:
 
     @property
     def n(self) -> int:
-        """Return the number of joints. This number does not count mimic joints, which follow another joint."""
+        """Return the number of joints, without mimic joints, which follow another joint."""
         return self._interface.n
 
     @property

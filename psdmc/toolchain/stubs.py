@@ -59,7 +59,7 @@ def documentation(function: Signature) -> str:
     several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
     given = [(q.name, f"{_shape(q)} {q.means}") for q in function.inputs]
-    theta = "(l,) base parameters that replace the model's, SI units; optional if the model's are known"
+    theta = "(l,) base parameters to use instead of the model's, SI units; optional if the model's are known"
     given += [("theta_b", theta)] if function.theta else []
     written = (
         "tuple of arrays into which psdmc writes the results"
@@ -77,11 +77,11 @@ def documentation(function: Signature) -> str:
     return "\n\n".join([function.summary, _rows(given), returned, _rows(made), footer])
 
 
-_STATES = "The axes (...) count states: there are none for one state."
+_STATES = "For many states, the axes (...) count the states; for one state, there are no such axes."
 _SIZES = {
     "nq": "nq is the length of q, which is the number of joints if every joint has one coordinate.",
     "nv": "nv is the number of joint rates.",
-    "nx": "nx = 2 nv: derivatives by q have one row or column per joint rate.",
+    "nx": "nx is 2 nv: one row per joint rate for q_next, and one for qd_next.",
     "l": "l is the number of base parameters.",
     "frames": "frames is the number of named frames.",
     "nonzeros": "nonzeros is the number of entries that can differ from zero.",
