@@ -66,16 +66,16 @@ def derive(
 ) -> DynamicsModel:
     """Derive the model (E, P, theta_b) of a robot file (URDF, xacro, MJCF or DH table), and return it.
 
-    The result is a DynamicsModel. psdmc compares the torques of the model with the Newton-Euler algorithm before it returns.
+    The result is a DynamicsModel. psdmc has checked the torques of the model against the Newton-Euler algorithm.
 
     robot          path of the robot file
     base, tip      names of the first and last link, to model only the chain between them; None: the whole robot
     gravity        (3,) m/s^2 along the axes of the file's root frame; None: the gravity in the file, or (0, 0, -9.81)
-    drive_inertia  True: the drive inertias of the joints are parameters of the model; or their values, one per joint,
-                   kg m^2 (kg for a sliding joint)
+    drive_inertia  True: the drive inertias of the joints are parameters of the model; or the values of these
+                   parameters, one per joint, kg m^2 (kg for a sliding joint)
     assume_zero    parameters that psdmc assumes to be zero, such as "link5:mx" or "link5:Ixz@com": a list or one name
-    snap           rad. psdmc replaces a rounded angle of the file, such as 1.5708, by the exact right angle if the two
-                   differ by at most this number; 0: never
+    snap           rad. If a rounded angle of the file, such as 1.5708, differs from the exact right angle by at most this
+                   number, psdmc replaces the rounded angle; 0: never
     expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
     progress       function that psdmc calls with the name of each stage, such as print
     frames         links for whose frames psdmc computes poses, Jacobians, wrenches and loads; if empty: the tip, or the
@@ -84,12 +84,13 @@ def derive(
     lock           joints that stay at a fixed position: a dictionary of positions (rad or m) by joint name
     floating       True: the root link moves freely. The first entries of q are the link's position (m) and quaternion
                    (x, y, z, w). The first entries of qd are the link's linear and angular velocity along the link's axes
-    root           name of the robot's first body, for an MJCF in which several bodies of the world move
+    root           name of the robot's first body, if several bodies move in the world of an MJCF; psdmc leaves out the
+                   other bodies
     xacro_args     values of the arguments of a xacro file, by name
     packages       folders of ROS packages that a xacro file uses, by package name; psdmc also looks for packages in
                    ROS_PACKAGE_PATH and AMENT_PREFIX_PATH
     unknown        links whose masses and inertias are unknown: a list, one name, or "all". "missing" means all
-                   links without an inertia in the file. Links without an inertia that are not unknown are massless
+                   links without an inertia in the file. Without this option, such links are massless
 
     Raises InputError if the file or an option is wrong. Raises DerivationError if the file has no mistake but the model
     needs other options, for example `expand=False` because E and P need too much memory.
@@ -157,8 +158,7 @@ def emit_c(
     trig       how the code computes sines: "inline", "freestanding" (without libm) or "libm"; None: as the target does
     name       name of the robot in C, with which all symbols begin; None: the name of the model
     force      True: also write into a folder with files that psdmc did not write, and over edited package files. psdmc
-               deletes no file that it did not write. If such a file has the name of a package file, psdmc renames it to
-               NAME.orig
+               deletes no file that it did not write. A file with the same name as a package file becomes NAME.orig
     progress   function that psdmc calls with the name of each stage, such as print
     payload    True: add the functions that change theta_b for a load
     adapters   programs for which psdmc adds code to the package, such as "casadi"

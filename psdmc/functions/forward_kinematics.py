@@ -51,11 +51,11 @@ RECIPE = Recipe(
             Quantity(
                 "rotation",
                 ("frames", "3", "3"),
-                means="rotation matrices; column j is axis j of the named frame, in the base frame",
+                means="rotation matrices; column j is the axis j of the named frame",
             ),
         ),
         theta=False,
-        summary="Compute the position of each named frame in the base frame, and the frame's rotation.",
+        summary="Compute the position and rotation of each named frame in the base frame.",
     ),
     "forward kinematics",
     trace,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 COTANGENT = Quantity("cotangent", ("nv",), means="weights cotangent[i] of the sum")
 
 DQ, DQD, DQDD, DTAU = (
-    Quantity(f"d{name}", ("nv",), means=f"direction of the change of {name}")
+    Quantity(f"d{name}", ("nv",), means=f"change of {name} along the direction")
     for name in ("q", "qd", "qdd", "tau")
 )
 """Directions of inputs, and derivatives of outputs along them."""
