@@ -28,12 +28,9 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.motors_of_loads import LoadedLogs, motors_with_load, with_loaded_logs
 from psdmc.calibration.sources import LogNaming, campaign_of, log_sources
-from psdmc.calibration.verdict.four_step_record import four_step_record
-from psdmc.calibration.verdict.judged_record import judged_record
-from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
-from psdmc.calibration.verdict.record import Calibration, with_data
+from psdmc.calibration.verdict.judge import NOT_PHYSICAL, with_verdict_on_campaign, with_verdict_on_logs
+from psdmc.calibration.verdict.record import Calibration, four_step_record, judged_record, with_data
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
-from psdmc.calibration.verdict.verdict_on import with_verdict_on_campaign, with_verdict_on_logs
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress

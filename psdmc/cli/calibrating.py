@@ -123,10 +123,9 @@ def calibrate(
     from psdmc.calibration.calibrate import CalibrateOptions
     from psdmc.calibration.identify.essential import EssentialOptions
     from psdmc.calibration.sources import LogNaming
-    from psdmc.calibration.verdict.record import verdict_of
-    from psdmc.calibration.verdict.record_rows import dropped_links
-    from psdmc.calibration.verdict.said_once import unsaid_warnings
+    from psdmc.calibration.verdict.record import DROPPED_LINKS, dropped_links, verdict_of
     from psdmc.cli.show_checks import print_accuracy, print_torque_constants, print_verdict
+    from psdmc.model.calibrated import code_of
     from psdmc.model.load import load as load_model
     from psdmc.report.calibrate_commands import calibrate_command
 
@@ -134,8 +133,7 @@ def calibrate(
     check_output(output, *read)
     check_report(report, output, *read)
     known = load_model(model)
-    dropped = dropped_links(known)
-    for warning in dropped:
+    for warning in dropped_links(known):
         print(f"warning: {one_line(warning)}", flush=True)
     with steps() as progress:
         record = calibrate_command(
@@ -170,8 +168,8 @@ def calibrate(
         print("note: --physical is the default now and need not be given")
     for note in record.notes:
         print(f"note: {one_line(note)}")
-    for warning in unsaid_warnings(record):
-        if warning not in dropped:
+    for warning in record.unsaid:
+        if code_of(warning) != DROPPED_LINKS:
             print(f"warning: {one_line(warning)}")
     for written, what in ((report, "page"), (actuators, "friction and motors in C")):
         if written is not None and written.exists():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from psdmc.cli.show_calibration import print_calibration, standard_deviations
 from psdmc.cli.tables import TERMS, Table, print_line, print_note, print_table
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
+from psdmc.model.calibrated import Calibrated
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import Summary, summary, term_texts
 from psdmc.program.cost import cost
@@ -20,7 +21,7 @@ from psdmc.robot.tree import listed
 def print_model(model: DynamicsModel) -> None:
     """The model at a glance: robot, joints, sizes, base parameters, certificate, notes."""
     found = summary(model)
-    calibrated = model.provenance.get("calibration")
+    calibrated = model.calibrated
     if calibrated is not None:
         print_calibration(calibrated)
     print_line(f"{found.name}: {found.base} to {found.ends}, {found.convention} frames")
@@ -29,7 +30,7 @@ def print_model(model: DynamicsModel) -> None:
     print()
     print_table(_joints(model.mechanism, joint_errors(model.mechanism, found.certificate)))
     print()
-    print_table(_parameters(found, calibrated or {}))
+    print_table(_parameters(found, calibrated))
     for line in _unknowns(model):
         print_line(line)
     print()
@@ -94,7 +95,7 @@ def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
     return Table(heads, rows)
 
 
-def _parameters(found: Summary, calibrated: Mapping[str, Any]) -> Table:
+def _parameters(found: Summary, calibrated: Calibrated | None) -> Table:
     """theta_b, numbered from 0 as in the generated header and in Python."""
     stds = standard_deviations(calibrated, len(found.base_parameters))
     heads = ("theta_b", "value", *(["+-"] if calibrated else []), "unit", "equation, about the link frames")

@@ -10,6 +10,7 @@ from typing import Any
 from psdmc.cli.show import cost_rows, joint_errors
 from psdmc.cli.show_robot import why_not_derived
 from psdmc.lower.kernels import Lowering
+from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import summary, term_texts
 from psdmc.robot.mechanism import Joint, Mechanism
@@ -48,7 +49,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
         "largest_torque_error": max(found.certificate),
         "snap_torque_change": _numbers(model.provenance.get("snap_torque_change")),
         "notes": list(found.notes),
-        "calibration": _plain(model.provenance.get("calibration")),
+        "calibration": None if model.calibrated is None else document(model.calibrated),
         "source": {"name": found.source_name, "sha256": found.source_sha256},
         "options": _plain(model.provenance.get("options")),
         "model_hash": found.content_hash,

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from psdmc.model.calibrated import viscous_name
 from psdmc.model.dynamics_model import DynamicsModel
-from psdmc.model.linear_friction import viscous_name
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Joint
 
@@ -32,17 +32,17 @@ def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
 
     Of LuGre friction the Coulomb force and the line nearest to the viscous law remain; of a linear fit all but the offset.
     """
-    kept = model.provenance.get("calibration")
-    if not isinstance(kept, Mapping):
+    calibrated = model.calibrated
+    if calibrated is None:
         return {}
     joints = {joint.name: joint for joint in model.mechanism.joints}
     found: dict[str, dict[str, float]] = {}
-    for row in kept.get("friction", []):
-        value = row.get("value")
-        if row.get("joint") in joints and isinstance(value, float | int) and math.isfinite(value):
-            found.setdefault(row["joint"], {})[row["name"]] = float(value)
-    law = kept.get("prediction", {})
-    exponents, coupled = law.get("exponents", ()), _coupled(law.get("coupling", ()), list(model.joint_names))
+    for row in calibrated.friction:
+        if row.joint in joints and math.isfinite(row.value):
+            found.setdefault(row.joint, {})[row.name] = row.value
+    law = calibrated.prediction
+    exponents, matrix = ((), ()) if law is None else (law.exponents, law.coupling)
+    coupled = _coupled(matrix, model.joint_names)
     return {
         name: JointFriction(0.0, 0.0, (COUPLED,)) if name in coupled else _of(values, joints[name], exponents)
         for name, values in found.items()

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.model import bodies, equations, evaluate, glance, payload, recursive, store, symbolic
 from psdmc.model.answers import Answers
+from psdmc.model.calibrated import Calibrated
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
@@ -47,6 +48,7 @@ class DynamicsModel(Answers):
     certificate  (nv,)           largest torque error against Newton-Euler on fresh samples, per rate of the joints,
                                  relative to that rate's largest torque there
     provenance   plain JSON values: source text, its hash and format, options, snapping and its effect, tolerances
+    calibrated   what a calibration found; None: not calibrated
     """
 
     expansion: Expansion | None
@@ -55,6 +57,7 @@ class DynamicsModel(Answers):
     mechanism: Mechanism
     certificate: Array
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    calibrated: Calibrated | None = None
 
     __reduce__ = made_again
 

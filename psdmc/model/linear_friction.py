@@ -4,7 +4,6 @@ fitted, Coulomb friction that differs between the directions and the Stribeck ef
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError
+from psdmc.model.calibrated import Calibrated, Prediction, by_joint, viscous_name
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import frozen_array
@@ -22,8 +22,6 @@ MOST_TERMS = 8
 """Viscous terms of a joint: fits have one or two."""
 LARGEST_EXPONENT = 8.0
 ASYMMETRY = "coulomb_asymmetry"
-STRIBECK = "stribeck_"
-"""Before a Stribeck velocity in the name of a value."""
 LOAD = "load_friction"
 
 
@@ -78,51 +76,29 @@ class LinearFriction:
 def beyond_friction(model: DynamicsModel) -> tuple[str, ...]:
     """What a calibration found that neither rigid bodies nor `linear_friction` have, in words without names; none where
     the model was not calibrated."""
-    kept = model.provenance.get("calibration")
-    if not isinstance(kept, Mapping):
+    found = model.calibrated
+    if found is None:
         return ()
-    springs = len({str(row.get("spring")) for row in kept.get("springs", [])})
-    joints = sum(row.get("name") == LOAD for row in kept.get("friction", []))
+    springs = len({row.joint for row in found.springs})
+    joints = sum(row.name == LOAD for row in found.friction)
     by_load = f"friction that grows with the load, of {joints} joint(s)" if joints else ""
     return tuple(filter(None, (f"{springs} spring(s)" if springs else "", by_load)))
-
-
-def viscous_name(exponent: float) -> str:
-    """The name of the term |v|^exponent: viscous alone is the one that grows with the speed itself."""
-    return "viscous" if exponent == 1.0 else f"viscous^{exponent:g}"
-
-
-def with_names_of_exponents(calibration: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A calibration as model files hold it, its viscous terms called by their exponents. psdmc 0.1 called the first one
-    viscous, whatever its exponent."""
-    exponents, rows = calibration["prediction"].get("exponents", ()), calibration["friction"]
-    if not exponents or viscous_name(exponents[0]) in {row["name"] for row in rows}:
-        return calibration
-    first = float(exponents[0])
-    units = {"Nms/rad": f"Nm (s/rad)^{first:g}", "Ns/m": f"N (s/m)^{first:g}"}
-    renamed = {"viscous": viscous_name(first), "viscous^1": "viscous"}
-    found = [
-        row | {"name": renamed[row["name"]], "unit": units.get(row["unit"], row["unit"])}
-        if row["name"] in renamed
-        else row
-        for row in rows
-    ]
-    return {**calibration, "friction": found}
 
 
 def linear_friction(model: DynamicsModel) -> LinearFriction:
     """The friction that the model's calibration found; InputError where it was not calibrated from plain logs, or what its
     file says of friction is damaged."""
     name = shown(model.mechanism.name)
-    kept = model.provenance.get("calibration")
-    if not isinstance(kept, Mapping):
+    found = model.calibrated
+    if found is None:
         raise InputError(f"{name}: not calibrated: its friction is unknown", "run `psdmc calibrate` first")
-    if kept.get("prediction", {}).get("law") != "linear":
+    law = found.prediction
+    if law is None or law.law != "linear":
         raise InputError(
             f"{name}: calibrated by a campaign: its friction is LuGre's, with a state",
             "`psdmc calibrate --actuators DIR` writes it as C",
         )
-    if kept["prediction"].get("coupling"):
+    if law.coupling:
         raise InputError(
             f"{name}: calibrated with a coupling: its friction is of motors that drive several joints together, which C "
             "does not have",
@@ -131,58 +107,44 @@ def linear_friction(model: DynamicsModel) -> LinearFriction:
     if model.mechanism.has_followers:
         raise InputError(f"{name}: friction is of joints that follow no other", "lock those that do")
     try:
-        return replace(_read(kept, model.joint_names), beyond=beyond_friction(model))
-    except (KeyError, TypeError, ValueError) as error:
+        return replace(_read(found, law, model.joint_names), beyond=beyond_friction(model))
+    except (KeyError, ValueError) as error:
         raise InputError(
             f"{name}: the friction in the model file is damaged: {error}", "calibrate again"
         ) from None
 
 
-def _read(kept: Mapping[str, Any], joints: tuple[str, ...]) -> LinearFriction:
-    values = {(row["joint"], row["name"]): _finite(row["value"], row["name"]) for row in kept["friction"]}
-    law = kept["prediction"]
-    exponents = tuple(_finite(d, "an exponent") for d in law["exponents"])
-    speed = _finite(law["sign_speed"], "sign_speed")
-    if not speed > 0.0 or len(exponents) > MOST_TERMS:
-        raise ValueError(f"sign_speed {speed:g}, {len(exponents)} exponents")
-    if any(not 0.0 <= d <= LARGEST_EXPONENT for d in exponents):
-        raise ValueError(f"exponents {exponents}")
-    names = [viscous_name(d) for d in exponents]
+def _read(found: Calibrated, law: Prediction, joints: tuple[str, ...]) -> LinearFriction:
+    values = by_joint(found.friction)
+    if not all(map(math.isfinite, values.values())):
+        raise ValueError("a value is missing")
+    if not law.sign_speed > 0.0 or len(law.exponents) > MOST_TERMS:
+        raise ValueError(f"sign_speed {law.sign_speed:g}, {len(law.exponents)} exponents")
+    if any(not 0.0 <= d <= LARGEST_EXPONENT for d in law.exponents):
+        raise ValueError(f"exponents {law.exponents}")
+    names = [viscous_name(d) for d in law.exponents]
     return LinearFriction(
         coulomb=np.array([values[joint, "coulomb"] for joint in joints]),
         viscous=np.array([[values[joint, name] for name in names] for joint in joints]).reshape(
             len(joints), -1
         ),
         offset=np.array([values.get((joint, "offset"), 0.0) for joint in joints]),
-        exponents=exponents,
-        sign_speed=speed,
-        **_further(values, joints),
+        exponents=law.exponents,
+        sign_speed=law.sign_speed,
+        **_further(found, joints),
     )
 
 
-def _further(values: Mapping[tuple[str, str], float], joints: tuple[str, ...]) -> dict[str, Any]:
+def _further(found: Calibrated, joints: tuple[str, ...]) -> dict[str, Any]:
     """Asymmetry and the Stribeck effect, which only some joints may have; nothing where none has."""
-    names = {name for _, name in values}
-    found: dict[str, Any] = {}
-    if ASYMMETRY in names:
-        found["asymmetry"] = np.array([values.get((joint, ASYMMETRY), 0.0) for joint in joints])
-    speeds = sorted(_stribeck_speed(name) for name in names if str(name).startswith(STRIBECK))
-    if len(speeds) > MOST_TERMS:
-        raise ValueError(f"{len(speeds)} Stribeck velocities")
-    if speeds:
-        peaks = [[values.get((joint, f"{STRIBECK}{v!r}"), 0.0) for v in speeds] for joint in joints]
-        found |= {"stribeck": np.array(peaks), "stribeck_speeds": tuple(speeds)}
-    return found
-
-
-def _stribeck_speed(name: str) -> float:
-    speed = float(name.removeprefix(STRIBECK))
-    if not 0.0 < speed < math.inf or f"{STRIBECK}{speed!r}" != name:
-        raise ValueError(f"a Stribeck velocity is {shown(name)}")
-    return speed
-
-
-def _finite(value: object, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{what} is {shown(value)}")
-    return float(value)
+    values = by_joint(found.friction)
+    further: dict[str, Any] = {}
+    if any(row.name == ASYMMETRY for row in found.friction):
+        further["asymmetry"] = np.array([values.get((joint, ASYMMETRY), 0.0) for joint in joints])
+    names = {row.parameters["speed"]: row.name for row in found.friction if "speed" in row.parameters}
+    if len(names) > MOST_TERMS:
+        raise ValueError(f"{len(names)} Stribeck velocities")
+    if names:
+        peaks = [[values.get((joint, names[v]), 0.0) for v in sorted(names)] for joint in joints]
+        further |= {"stribeck": np.array(peaks), "stribeck_speeds": tuple(sorted(names))}
+    return further

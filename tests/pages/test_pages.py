@@ -17,12 +17,20 @@ import pytest
 from made_up_bench import made_up_result
 from made_up_denso import denso, made_up_record, plant
 
-from psdmc.calibration.identify.prediction import Prediction
-from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.identify.steps import JointQuality, Sample, StepOptions, StepQuality
+from psdmc.calibration.identify.steps import StepOptions
 from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
-from psdmc.calibration.verdict.verdict import JointFigures, Verdict
+from psdmc.calibration.verdict.record import Calibration
+from psdmc.model.calibrated import (
+    JointFigures,
+    JointQuality,
+    NumberRow,
+    ParameterRow,
+    Prediction,
+    Quality,
+    Sample,
+    StepQuality,
+    Verdict,
+)
 from psdmc.report.bench_page import write_page
 from psdmc.report.calibrate_report import write_report
 from psdmc.report.truth_tables import truth_view

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from psdmc.calibration.verdict.said_once import unsaid_warnings
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.record import Calibration
-from psdmc.calibration.verdict.said_once import unsaid_warnings
 from psdmc.cli.boundary import run
 from psdmc.compiler import derive
 from psdmc.errors import InputError

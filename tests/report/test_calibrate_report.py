@@ -11,13 +11,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from psdmc.calibration.identify.prediction import Prediction
-from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.identify.steps import JointQuality, Sample, StepOptions, StepQuality
+from psdmc.calibration.identify.steps import StepOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
-from psdmc.calibration.verdict.verdict import JointFigures, Verdict
+from psdmc.calibration.verdict.record import Calibration
+from psdmc.model.calibrated import (
+    JointFigures,
+    JointQuality,
+    NumberRow,
+    ParameterRow,
+    Prediction,
+    Quality,
+    Sample,
+    StepQuality,
+    Verdict,
+)
 from psdmc.report.calibrate_report import report_html, write_report
 
 END = SplitOptions(held_out=0.3, blocks=0)

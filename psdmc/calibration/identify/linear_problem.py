@@ -18,7 +18,7 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.model.linear_friction import viscous_name
+from psdmc.model.calibrated import viscous_name
 from psdmc.progress import Step
 from psdmc.robot.mechanism import Mechanism
 

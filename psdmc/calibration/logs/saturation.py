@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.logs.log import Array
+from psdmc.model.grounds import at_level
 
 SAME = 1e-9
 """Share of a column's peak to peak up to which two efforts count as equal."""
@@ -43,7 +44,7 @@ class Saturated:
 
     @property
     def words(self) -> str:
-        return f"{self.joint} at {f'{self.level:.4g} {self.unit}'.rstrip()} in {self.share:.0%}"
+        return at_level(self.joint, self.level, self.unit, self.share)
 
 
 def saturated(

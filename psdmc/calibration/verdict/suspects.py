@@ -1,4 +1,4 @@
-"""Explanations of a bad fit: columns of joints exchanged, signs reversed.
+"""Explanations of a bad fit: columns of joints exchanged, signs reversed, another unit.
 
 Hypotheses on positions (a sign reversed, two columns exchanged) are tried one after the other, the best kept. Under
 each, every effort column is explained by every joint with either sign (`explain`), and an assignment finds which column
@@ -7,7 +7,7 @@ is whose. A change must improve the explanation enough to be named.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -17,7 +17,8 @@ from scipy.optimize import linear_sum_assignment
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import Evidence
 from psdmc.calibration.verdict.explain import Explainer
-from psdmc.calibration.verdict.suspect_words import exchanges, in_words
+from psdmc.calibration.verdict.gains import Gain
+from psdmc.model.grounds import SCALES, Ground, exchanges
 
 ROWS = 500
 """Samples on which hypotheses are tried."""
@@ -68,12 +69,15 @@ class Hypothesis:
         fallen = np.log((left + max(gained, 0.0)) / left) / np.log(FACTOR) if gained > LEAST else 0.0
         return float(max(gained / PRICE, fallen)) - self.changes
 
-    def said(self, names: tuple[str, ...]) -> str:
-        return in_words(names, self.order, self.signs, self.effort_order, self.effort_signs)
+    @property
+    def reading(self) -> dict[str, tuple[int, ...]]:
+        """The hypothesis as a ground has it."""
+        names = ("order", "signs", "effort_order", "effort_signs")
+        return {name: getattr(self, name) for name in names}
 
 
-def suspect(evidence: Evidence, positions: bool = True) -> str | None:
-    """The best explanation, in words, of a log that is not what it says; None where none is much better.
+def suspect(evidence: Evidence, positions: bool = True) -> Ground | None:
+    """The best explanation of a log that is not what it says; None where none is much better.
 
     positions   whether positions are suspected, too, or efforts alone
     """
@@ -86,10 +90,11 @@ def suspect(evidence: Evidence, positions: bool = True) -> str | None:
     least = best.worth(stated) - CLOSE
     alike = [one for one in tried if one.changes == best.changes and one.worth(stated) > least]
     alike.sort(key=lambda one: -one.worth(stated))
-    words = list(dict.fromkeys(one.said(evidence.model.joint_names) for one in alike))
-    named = words if len(words) <= MOST_NAMED else words[:1]
+    readings = list({tuple(one.reading.values()): one.reading for one in alike}.values())
+    named = readings if len(readings) <= MOST_NAMED else readings[:1]
     explained, logged = (max(one.score, 0.0) / evidence.n for one in (best, stated))
-    return f"{', or '.join(named)} (that explains {explained:.0%} of the torque's variation; the log as it is {logged:.0%})"
+    values = {"joints": evidence.model.joint_names, "readings": named}
+    return Ground("columns", {**values, "explained": explained, "logged": logged})
 
 
 def _searched(evidence: Evidence, stated: Hypothesis, rounds: int) -> list[Hypothesis]:
@@ -152,3 +157,28 @@ def _chosen(shares: Array, moving: Array, turning: Array) -> tuple[tuple[int, ..
     sides = turned[joints, columns]
     score = float(shares[joints, columns, sides].sum())
     return tuple(-1 if side else 1 for side in sides), tuple(int(i) for i in columns), score
+
+
+# Units
+
+ABOUT = 2.5
+"""Factor within which two gains count as similar: a file's own masses may be wrong by as much."""
+ALIKE = 12.0
+"""Largest over smallest gain of a log whose joints share one fault: torque constants differ by a few times."""
+MOTOR_SIDE = (1.0 / 300.0, 1.0 / ABOUT)
+"""Gains that amperes, or torque before a gear, would give."""
+
+
+def unit_suspect(gains: Sequence[Gain]) -> Ground | None:
+    """The suspected unit; None where the visible gains are about one, or contradict each other."""
+    seen = np.array([gain.value for gain in gains if gain.visible])
+    if not len(seen) or np.any(seen <= 0) or seen.max() > ALIKE * seen.min():
+        return None
+    middle = float(np.exp(np.mean(np.log(seen))))
+    if 1.0 / ABOUT < middle < ABOUT:
+        return None
+    for unit in SCALES:
+        if unit / ABOUT < middle < unit * ABOUT:
+            return Ground("scaled", {"gain": unit})
+    is_motor_side = MOTOR_SIDE[0] < middle < MOTOR_SIDE[1]
+    return Ground("motor_side" if is_motor_side else "other_unit", {"gain": middle})

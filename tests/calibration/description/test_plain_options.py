@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundled import bundled_model
+from psdmc.calibration.verdict.doubts import acceleration_lost, cutoff_for
 from test_payload_identification import Run, record
 
 from psdmc.calibration.description.description import read_description
@@ -15,7 +16,6 @@ from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.logs.table_files import write_columns
-from psdmc.calibration.verdict.doubts import acceleration_lost, cutoff_for
 from psdmc.cli.boundary import run
 
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from psdmc.calibration.verdict.units import unit_suspect
 
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.plant.spoiled import noise_only, scaled, turned
 from psdmc.calibration.verdict.evidence import Evidence, Motion, evidence_of
 from psdmc.calibration.verdict.gains import Gain, friction_powers, joint_gains
-from psdmc.calibration.verdict.units import unit_suspect
 
 
 def evidence(arm, log, theta_b=None) -> Evidence:

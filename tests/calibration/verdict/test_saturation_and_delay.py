@@ -11,6 +11,7 @@ from typing import cast
 import numpy as np
 import pytest
 from calibration.conftest import smooth_log
+from psdmc.calibration.verdict.doubts import doubts
 from scipy.interpolate import CubicSpline
 from test_verdict import verdict_on
 
@@ -21,9 +22,8 @@ from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.logs.log_survey import surveyed
 from psdmc.calibration.logs.saturation import Saturated
 from psdmc.calibration.plant.spoiled import clipped, late
-from psdmc.calibration.verdict.doubts import doubts
 from psdmc.calibration.verdict.findings import Findings
-from psdmc.calibration.verdict.verdict import Delay
+from psdmc.model.grounds import Delay
 from psdmc.model.store import save
 
 

@@ -10,8 +10,8 @@ from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.plant.spoiled import ALL, MOVED, noise_only, scaled, swapped, turned
 from psdmc.calibration.verdict.evidence import Motion, evidence_of
-from psdmc.calibration.verdict.suspect_words import cycles, exchanges, in_words
 from psdmc.calibration.verdict.suspects import suspect
+from psdmc.model.grounds import cycles, exchanges, in_words
 
 WRONG = {
     "the effort of every joint has the opposite sign": lambda log: scaled(log, -1.0),

@@ -14,7 +14,8 @@ from psdmc.calibration.identify.physical import NotPhysical
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.plant.spoiled import ALL, MOVED, decimated, noise_only, scaled, swapped, turned
-from psdmc.calibration.verdict.verdict import NOT_USABLE_STATUS, Verdict, listed
+from psdmc.model.calibrated import NOT_USABLE_STATUS, Verdict
+from psdmc.model.grounds import listed
 
 CONSTANTS = (12.0, 5.0)
 

@@ -1,0 +1,525 @@
+"""Calibrated as plain JSON values: in model files, of this and of older psdmc, and in documents for users."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, TypeVar
+
+import numpy as np
+
+from psdmc.model import json_values as json
+from psdmc.model.calibrated import (
+    IDENTIFIED,
+    Array,
+    Calibrated,
+    FrictionRunConstants,
+    JointFigures,
+    JointQuality,
+    LoadUsed,
+    LogUsed,
+    NumberRow,
+    ParameterRow,
+    Prediction,
+    Quality,
+    Remark,
+    StepQuality,
+    StepUsed,
+    Verdict,
+    code_of,
+    parameters_of,
+    viscous_name,
+)
+from psdmc.model.grounds import Delay, Ground
+
+Row = TypeVar("Row")
+
+SCHEMA = 1
+"""Of what as_json gives. What psdmc 0.1 and 0.2 wrote has none."""
+MOST = 1_000_000
+"""Largest number of rows of a table; a campaign's friction has seven per joint."""
+LARGEST_COVARIANCE = 4_000
+"""Base parameters of which a file may hold a covariance: 64 MB."""
+LEANING = 1e-9
+"""Share by which a covariance may exceed the product of the standard deviations: rounding."""
+FIGURES = ("r2", "rmse", "gain", "gain_std", "friction_power", "friction_power_std", "noise_ratio", "speed")
+KINDS = {"reasons": "against", "suspects": "suspected", "doubts": "doubted"}
+"""Keys of a verdict's grounds, and its fields."""
+
+
+# Written
+
+
+def as_json(found: Calibrated) -> dict[str, Any]:
+    """Plain values for a model file, which `from_json` reads back; numbers that are not finite become null."""
+    content = {
+        "schema": SCHEMA,
+        "robot": found.robot,
+        "method": found.method,
+        "joints": list(found.joint_names),
+        "verdict": None if found.verdict is None else _verdict(found.verdict),
+        "base_parameters": [
+            asdict(row) | {"visibility": _remark(row.visibility)} for row in found.parameters
+        ],
+        "covariance": None if found.covariance is None else packed(found.covariance),
+        **{name: [_row(row) for row in getattr(found, name)] for name in ("motors", "friction", "springs")},
+        "quality": {
+            step.step: {name: asdict(both) for name, both in step.joints.items()} for step in found.steps
+        },
+        "warnings": [_remark(text) for text in found.warnings],
+        "notes": list(found.notes),
+        "prediction": None if found.prediction is None else _prediction(found.prediction),
+        "logs": [asdict(log) for log in found.logs],
+        "load": None if found.load is None else asdict(found.load),
+        "versions": found.versions,
+        "facts": found.facts,
+    }
+    return {name: plain(value) for name, value in content.items()}
+
+
+def packed(matrix: Array) -> list[float]:
+    """The lower triangle of a symmetric (l, l) matrix, row by row."""
+    return [float(value) for value in matrix[np.tril_indices(len(matrix))]]
+
+
+def plain(value: Any) -> Any:
+    """JSON's own types: lists for tuples and arrays, null for numbers that JSON lacks."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic | np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Remark) else value
+
+
+def _remark(text: str) -> dict[str, str]:
+    return {"code": code_of(text), "text": str(text)}
+
+
+def _row(row: NumberRow) -> dict[str, Any]:
+    return asdict(row) | {"visibility": _remark(row.visibility)}
+
+
+def _prediction(found: Prediction) -> dict[str, Any]:
+    steps = {
+        name: {
+            "filter": {"cutoff": step.cutoff, "order": step.order, "settle": step.settle},
+            "split": {"held_out": step.held_out, "blocks": step.blocks},
+        }
+        for name, step in found.steps.items()
+    }
+    return asdict(found) | {"steps": steps}
+
+
+def _verdict(found: Verdict) -> dict[str, Any]:
+    return {
+        **{
+            key: [{"code": one.code, **one.values} for one in getattr(found, name)]
+            for key, name in KINDS.items()
+        },
+        "samples_per_unknown": found.samples_per_unknown,
+        "delays": [
+            {"log": delay.log, "seconds": delay.value, "std": delay.std, "shown": delay.shown}
+            for delay in found.delays
+        ],
+        "joints": {each.joint: {n: getattr(each, n) for n in (*FIGURES, "visible")} for each in found.joints},
+    }
+
+
+def document(found: Calibrated) -> dict[str, Any]:
+    """What `show --json` and a report's JSON say: `as_json` with sentences in place of codes, and with what follows from
+    the rest."""
+    kept = as_json(found)
+    kept.pop("schema")
+    verdict, grounds = found.verdict, kept.pop("verdict")
+    of_logs = {
+        key: [_log(log) for log in found.logs if (log.use == "with_load") is (key == "with_load")]
+        for key in ("data", "with_load")
+    }
+    load = (
+        {}
+        if found.load is None
+        else {
+            "load": {
+                "mass_kg": found.load.mass,
+                "com_m": list(found.load.com),
+                "inertia_kg_m2": list(found.load.inertia),
+                "frame": found.load.frame,
+            }
+        }
+    )
+    for row, given in zip(kept["base_parameters"], found.parameters, strict=True):
+        row |= {"visibility": str(given.visibility), "relative": plain(given.relative)}
+    for name in ("motors", "friction", "springs"):
+        for row in kept[name]:
+            row["visibility"] = row["visibility"]["text"]
+            if not row["parameters"]:
+                row.pop("parameters")
+    springs = [{"spring": row.pop("joint"), **row} for row in kept.pop("springs")]
+    first = {}
+    if verdict is not None:
+        words = {key: list(getattr(verdict, key)) for key in KINDS}
+        codes = {"codes": {key: [each["code"] for each in grounds[key]] for key in KINDS}}
+        first = {"verdict": {"verdict": verdict.word, "usable": verdict.usable, **grounds, **words, **codes}}
+    facts = kept.pop("facts") | {key: rows for key, rows in of_logs.items() if rows} | load
+    versions = kept.pop("versions")
+    for name in ("logs", "load"):
+        kept.pop(name)
+    return {
+        **first,
+        **({"springs": springs} if springs else {}),
+        **kept,
+        "warnings": [str(text) for text in found.warnings],
+        "facts": facts | {"versions": versions},
+    }
+
+
+def _log(log: LogUsed) -> dict[str, Any]:
+    """A log as a row of a document; `use` if it is not for fitting."""
+    row = {"log": log.log, "rows": log.rows, "seconds": log.seconds, "date": log.date}
+    return row | ({"use": log.use} if log.use == "validate" else {})
+
+
+# Read
+
+
+def from_json(value: object) -> Calibrated:
+    """The reverse of `as_json`, also for what psdmc 0.1 and 0.2 wrote; ValueError says what is wrong."""
+    content = json.record(value, "the calibration")
+    if "schema" in content:
+        json.whole(content["schema"], "the calibration's schema", 1, SCHEMA)
+    else:
+        content = _upgraded(content)
+    parameters = _rows(content, "base_parameters", _parameter)
+    return Calibrated(
+        robot=_text(content, "robot"),
+        method=_text(content, "method"),
+        joint_names=tuple(_texts(content, "joints")),
+        parameters=parameters,
+        motors=_rows(content, "motors", _number),
+        friction=_rows(content, "friction", _number),
+        springs=_rows(content, "springs", _number),
+        steps=tuple(_step(name, rows) for name, rows in _record(content, "quality").items()),
+        warnings=tuple(_remark_of(each) for each in _list(content, "warnings")),
+        notes=tuple(_texts(content, "notes")),
+        facts=plain(_record(content, "facts")),
+        prediction=_maybe(content, "prediction", _prediction_of),
+        verdict=_maybe(content, "verdict", _verdict_of),
+        covariance=_maybe(content, "covariance", lambda kept: _covariance(kept, len(parameters))),
+        logs=_rows(content, "logs", _log_of),
+        load=_maybe(content, "load", _load_of),
+        versions={name: json.text(each, "a version") for name, each in _record(content, "versions").items()},
+    )
+
+
+def _part(of: object, name: str) -> Any:
+    return json.part(of, name, "the calibration")
+
+
+def _text(of: object, name: str) -> str:
+    return json.text(_part(of, name), f"the calibration's {name}")
+
+
+def _flag(of: object, name: str) -> bool:
+    return json.flag(_part(of, name), f"the calibration's {name}")
+
+
+def _finite(of: object, name: str) -> float:
+    return json.number(_part(of, name), f"the calibration's {name}")
+
+
+def _or(of: object, name: str, missing: float) -> float:
+    """A finite number, or what stands for null."""
+    return missing if _part(of, name) is None else _finite(of, name)
+
+
+def _record(of: object, name: str) -> dict[str, Any]:
+    return json.record(_part(of, name), f"the calibration's {name}")
+
+
+def _list(of: object, name: str) -> list[Any]:
+    return json.entries(_part(of, name), f"the calibration's {name}", MOST)
+
+
+def _texts(of: object, name: str) -> list[str]:
+    return [json.text(each, f"an entry of the calibration's {name}") for each in _list(of, name)]
+
+
+def _rows(of: object, name: str, row: Callable[[object], Row]) -> tuple[Row, ...]:
+    return tuple(row(each) for each in _list(of, name))
+
+
+def _maybe(of: object, name: str, part: Callable[[Any], Row]) -> Row | None:
+    value = _part(of, name)
+    return None if value is None else part(value)
+
+
+def _remark_of(value: object) -> Remark:
+    return Remark(_text(value, "text"), _text(value, "code"))
+
+
+def _parameter(row: object) -> ParameterRow:
+    return ParameterRow(
+        name=_text(row, "name"),
+        group=_text(row, "group"),
+        value=_finite(row, "value"),
+        std=_or(row, "std", math.inf),
+        unit=_text(row, "unit"),
+        equation=_text(row, "equation"),
+        identifiable=_flag(row, "identifiable"),
+        visibility=_remark_of(_part(row, "visibility")),
+        file=None if _part(row, "file") is None else _finite(row, "file"),
+    )
+
+
+def _number(row: object) -> NumberRow:
+    name, parameters = _text(row, "name"), _record(row, "parameters")
+    if parameters != parameters_of(name):
+        raise ValueError(f"the calibration's parameters of {name!r} are not those of its name")
+    return NumberRow(
+        joint=_text(row, "joint"),
+        name=name,
+        value=_or(row, "value", math.nan),
+        std=_or(row, "std", math.inf),
+        unit=_text(row, "unit"),
+        seen=_flag(row, "seen"),
+        visibility=_remark_of(_part(row, "visibility")),
+        parameters=parameters,
+    )
+
+
+def _covariance(value: object, l: int) -> Array:
+    """(l, l) from its lower triangle: no variance is negative, no correlation above one."""
+    json.whole(l, "the number of base parameters with a covariance", 0, LARGEST_COVARIANCE)
+    rows, columns = np.tril_indices(l)
+    matrix = np.zeros((l, l))
+    matrix[rows, columns] = json.numbers(value, "the calibration's covariance", len(rows))
+    matrix[columns, rows] = matrix[rows, columns]
+    variance = np.diag(matrix)
+    if (variance < 0.0).any() or (
+        np.abs(matrix) > (1.0 + LEANING) * np.sqrt(np.outer(variance, variance))
+    ).any():
+        raise ValueError("the calibration's covariance is that of no numbers")
+    return matrix
+
+
+def _step(name: str, rows: object) -> StepQuality:
+    joints = json.record(rows, f"the calibration's quality of {name}")
+    return StepQuality(
+        name,
+        {
+            joint: JointQuality(_quality(_part(both, "fit")), _quality(_part(both, "held_out")))
+            for joint, both in joints.items()
+        },
+    )
+
+
+def _quality(value: object) -> Quality:
+    return Quality(_or(value, "rmse", math.nan), _or(value, "r2", math.nan))
+
+
+def _prediction_of(value: object) -> Prediction:
+    law = _text(value, "law")
+    if law not in ("linear", "lugre"):
+        raise ValueError(f"the calibration's law of friction is {law!r}, expected 'linear' or 'lugre'")
+    coupling = _list(value, "coupling")
+    size = len(coupling)
+    matrix = json.numbers(coupling, "the calibration's coupling", *([size, size] if size else [0]))
+    exponents = _list(value, "exponents")
+    return Prediction(
+        law="linear" if law == "linear" else "lugre",
+        steps={name: _used(step) for name, step in _record(value, "steps").items()},
+        sign_speed=_finite(value, "sign_speed"),
+        exponents=tuple(json.number(each, "an exponent") for each in exponents),
+        offset=_flag(value, "offset"),
+        runs={
+            joint: FrictionRunConstants(
+                *(_finite(constants, name) for name in ("inertia", "offset", "delay"))
+            )
+            for joint, constants in _record(value, "runs").items()
+        },
+        coupling=tuple(tuple(row) for row in matrix.tolist()),
+        columns=plain(_record(value, "columns")),
+    )
+
+
+def _used(step: object) -> StepUsed:
+    low_pass, split = _record(step, "filter"), _record(step, "split")
+    order = json.whole(_part(low_pass, "order"), "the order of a filter", 1, 100)
+    blocks = json.whole(_part(split, "blocks"), "the blocks of a split", 0, MOST)
+    return StepUsed(
+        _finite(low_pass, "cutoff"), order, _finite(low_pass, "settle"), _finite(split, "held_out"), blocks
+    )
+
+
+def _verdict_of(value: object) -> Verdict:
+    delays = [
+        Delay(_text(each, "log"), _finite(each, "seconds"), _or(each, "std", math.inf), _flag(each, "shown"))
+        for each in _list(value, "delays")
+    ]
+    return Verdict(
+        **{name: tuple(_ground(each) for each in _list(value, key)) for key, name in KINDS.items()},
+        joints=tuple(
+            JointFigures(
+                joint=joint,
+                visible=_flag(figures, "visible"),
+                **{name: _or(figures, name, math.nan) for name in FIGURES},
+            )
+            for joint, figures in _record(value, "joints").items()
+        ),
+        samples_per_unknown=_or(value, "samples_per_unknown", math.inf),
+        delays=tuple(delays),
+    )
+
+
+def _ground(value: object) -> Ground:
+    """A ground whose sentence can be made of its values."""
+    values = {name: _number_for_null(each) for name, each in json.record(value, "a ground").items()}
+    found = Ground(json.text(values.pop("code", None), "the code of a ground"), values)
+    try:
+        _ = found.words
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise ValueError(f"the verdict's ground {found.code!r} is damaged: {error}") from error
+    return found
+
+
+def _number_for_null(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _number_for_null(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_number_for_null(each) for each in value]
+    return math.nan if value is None else value
+
+
+def _log_of(row: object) -> LogUsed:
+    rows = json.whole(_part(row, "rows"), "the rows of a log", 0, 2**53)
+    return LogUsed(_text(row, "log"), rows, _finite(row, "seconds"), _text(row, "date"), _text(row, "use"))
+
+
+def _load_of(value: object) -> LoadUsed:
+    com, inertia = (
+        json.numbers(_part(value, name), f"the load's {name}", count)
+        for name, count in (("com", 3), ("inertia", 6))
+    )
+    return LoadUsed(
+        _finite(value, "mass"), tuple(com.tolist()), tuple(inertia.tolist()), _text(value, "frame")
+    )
+
+
+# What psdmc 0.1 and 0.2 wrote
+
+CODES = {
+    "identified": "identified",
+    "weakly visible": "weak",
+    "by the stated prior": "stated",
+    "not essential": "dropped",
+    "only in combination": "together",
+    "mostly invisible": "mostly",
+    "not visible": "invisible",
+}
+"""First words of what older psdmc wrote of a number's visibility, and the code that it has now."""
+
+
+def _upgraded(old: Mapping[str, Any]) -> dict[str, Any]:
+    """What psdmc 0.1 or 0.2 wrote, as the first schema has it; ValueError for what is no such thing."""
+    facts = dict(_record({"facts": {}, **old}, "facts"))
+    logs = [
+        {"date": "", "use": use, **json.record(row, "a log"), **({"use": use} if use != "fit" else {})}
+        for name, use in (("data", "fit"), ("with_load", "with_load"))
+        for row in _list({name: facts.pop(name, [])}, name)
+    ]
+    load, verdict, prediction = facts.pop("load", None), old.get("verdict"), old.get("prediction")
+    found = {
+        "robot": "",
+        "method": "unknown",
+        "joints": [],
+        "quality": {},
+        "notes": [],
+        **old,
+        "base_parameters": [
+            _upgraded_row({"group": "all", "file": None, **row}, {"relative", "determined"})
+            for row in _old_rows(old, "base_parameters")
+        ],
+        "covariance": None,
+        "motors": [_upgraded_row(row) for row in _old_rows(old, "motors")],
+        "friction": [_upgraded_row(row) for row in _named_by_exponents(old)],
+        "springs": [
+            _upgraded_row({"joint": row.pop("spring", None), **row}) for row in _old_rows(old, "springs")
+        ],
+        "warnings": [{"code": "", "text": text} for text in _texts({"warnings": [], **old}, "warnings")],
+        "prediction": None if prediction is None else _upgraded_prediction(prediction),
+        "verdict": None if verdict is None else _upgraded_verdict(verdict),
+        "logs": logs,
+        "load": None if load is None else _upgraded_load(load),
+        "versions": facts.pop("versions", {}),
+        "facts": facts,
+    }
+    return found
+
+
+def _old_rows(old: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
+    return [
+        dict(json.record(row, f"a row of the calibration's {name}")) for row in _list({name: [], **old}, name)
+    ]
+
+
+def _upgraded_row(row: dict[str, Any], gone: Iterable[str] = ()) -> dict[str, Any]:
+    text = row.get("visibility", IDENTIFIED if row.get("identifiable") else "")
+    said = json.text(text, "a visibility")
+    code = next((code for words, code in CODES.items() if said.startswith(words)), "")
+    kept = {"std": None, "unit": "", "seen": True, **{k: v for k, v in row.items() if k not in gone}}
+    name = json.text(row.get("name"), "a name of the calibration")
+    return kept | {"visibility": {"code": code, "text": said}, "parameters": parameters_of(name)}
+
+
+def _named_by_exponents(old: Mapping[str, Any]) -> Sequence[dict[str, Any]]:
+    """Rows of friction, viscous terms called by their exponents. psdmc 0.1 called the first one viscous, whatever its
+    exponent."""
+    rows = _old_rows(old, "friction")
+    law = json.record(old.get("prediction") or {}, "the calibration's prediction")
+    exponents = [json.number(each, "an exponent") for each in _list({"exponents": [], **law}, "exponents")]
+    if not exponents or viscous_name(exponents[0]) in {row.get("name") for row in rows}:
+        return rows
+    first = exponents[0]
+    units = {"Nms/rad": f"Nm (s/rad)^{first:g}", "Ns/m": f"N (s/m)^{first:g}"}
+    renamed = {"viscous": viscous_name(first), "viscous^1": "viscous"}
+    return [
+        row | {"name": renamed[row["name"]], "unit": units.get(row.get("unit", ""), row.get("unit", ""))}
+        if row.get("name") in renamed
+        else row
+        for row in rows
+    ]
+
+
+def _upgraded_prediction(value: object) -> dict[str, Any]:
+    nothing = {
+        "steps": {},
+        "sign_speed": 0.0,
+        "exponents": [],
+        "offset": False,
+        "runs": {},
+        "coupling": [],
+        "columns": {},
+    }
+    return {**nothing, **json.record(value, "the calibration's prediction")}
+
+
+def _upgraded_verdict(value: object) -> dict[str, Any]:
+    old = json.record(value, "the verdict")
+    grounds = {
+        key: [{"code": "said", "text": text} for text in _texts({key: [], **old}, key)] for key in KINDS
+    }
+    delays = [
+        {"shown": False, **json.record(each, "a delay")} for each in _list({"delays": [], **old}, "delays")
+    ]
+    return {"samples_per_unknown": None, "joints": {}, **old, **grounds, "delays": delays}
+
+
+def _upgraded_load(value: object) -> dict[str, Any]:
+    old = json.record(value, "the load")
+    names = {"mass_kg": "mass", "com_m": "com", "inertia_kg_m2": "inertia"}
+    return {names.get(name, name): each for name, each in old.items()}
