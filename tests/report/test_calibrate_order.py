@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from psdmc.calibration.verdict.said_once import unsaid_warnings
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.identify.predictor import ChainRegressor
@@ -71,7 +70,7 @@ def test_what_a_doubt_says_no_warning_repeats(record: Calibration):
     )
     assert any("the residual is no noise" in text for text in record.warnings)
 
-    assert not any("the residual is no noise" in text for text in unsaid_warnings(record))
+    assert not any("the residual is no noise" in text for text in record.unsaid)
 
 
 def test_show_says_the_verdict_first_then_logs_accuracy_and_friction(

@@ -92,7 +92,7 @@ def judge(
 ) -> Verdict:
     """The verdict; `evidence` holds the model as it was before, whose theta_b is the file's."""
     found = Findings(record, evidence, tuple(demands), options or VerdictOptions())
-    against, doubted = list(_reasons(found)), list(_doubts(found))
+    against, doubted = list(reasons(found)), list(doubts(found))
     likely = _suspects(found)
     if likely and not against:
         (against if fits_poorly(found) else doubted).append(Ground("contradicted"))
@@ -117,7 +117,7 @@ def _suspects(found: Findings) -> tuple[Ground, ...]:
 # Reasons
 
 
-def _reasons(found: Findings) -> Iterator[Ground]:
+def reasons(found: Findings) -> Iterator[Ground]:
     """Why a calibration is not usable; none where it is."""
     yield from _saturated(found)
     yield from _late(found)
@@ -193,7 +193,7 @@ def _poor(found: Findings) -> Iterator[Ground]:
 # Doubts
 
 
-def _doubts(found: Findings) -> Iterator[Ground]:
+def doubts(found: Findings) -> Iterator[Ground]:
     """All doubts."""
     yield from _perhaps_saturated(found)
     yield from _a_little_late(found)

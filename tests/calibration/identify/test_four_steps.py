@@ -64,7 +64,8 @@ def test_the_calibrated_model_is_a_model_file(arm, noisy, tmp_path: Path):
 
     assert again.theta_b is not None
     assert again.theta_b.tolist() == [row.value for row in noisy[1].parameters]
-    assert again.provenance["calibration"]["method"] == "four steps, physically consistent"
+    assert again.calibrated is not None
+    assert again.calibrated.method == "four steps, physically consistent"
 
 
 @pytest.mark.slow
