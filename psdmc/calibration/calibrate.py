@@ -16,11 +16,7 @@ from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.motor_constants import motors_of_logs
-from psdmc.calibration.identify.physical import (
-    NotPhysical,
-    PhysicalOptions,
-    require_cvxpy,
-)
+from psdmc.calibration.identify.physical import NotPhysical
 from psdmc.calibration.identify.physical_steps import physical_steps
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
@@ -32,6 +28,7 @@ from psdmc.calibration.verdict.judge import NOT_PHYSICAL, with_verdict_on_campai
 from psdmc.calibration.verdict.record import Calibration, four_step_record, judged_record, with_data
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.errors import InputError
+from psdmc.links.link_terms import PhysicalOptions, require_cvxpy
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 from psdmc.robot.derivable import require_axes

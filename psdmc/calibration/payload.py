@@ -14,7 +14,6 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import friction_names
 from psdmc.calibration.identify.load_fit import LOAD, LOAD_NAMES, LoadFit, fit_load
 from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
-from psdmc.calibration.identify.physical import require_cvxpy
 from psdmc.calibration.identify.physical_load import about_centre, nearest_load
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.quality import qualities
@@ -29,6 +28,7 @@ from psdmc.calibration.sources import plain_sources
 from psdmc.calibration.verdict.delivered import beside, delivered
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.errors import InputError
+from psdmc.links.link_terms import require_cvxpy
 from psdmc.model.calibrated import SHOWN, JointFigures, Verdict, code_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.grounds import Ground

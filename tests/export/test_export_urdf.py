@@ -15,10 +15,10 @@ from pinocchio_robots import path_of
 from shared_data import UR10_LOG
 
 import psdmc
-from psdmc.calibration.identify.physical_links import NoSuchLinks
 from psdmc.cli.boundary import run
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
 from psdmc.errors import InputError
+from psdmc.links.physical_links import NoSuchLinks
 from psdmc.model.calibrated import by_joint
 from psdmc.model.calibrated_json import from_json
 from psdmc.model.dynamics_model import DynamicsModel

@@ -146,7 +146,7 @@ def test_blocks_give_what_the_whole_log_gives(arm, log: Log, monkeypatch: pytest
 def test_without_a_solver_the_remedy_is_said(arm, log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     found = importlib.util.find_spec
     monkeypatch.setattr(
-        sys.modules["psdmc.calibration.identify.physical"],
+        sys.modules["psdmc.links.link_terms"],
         "find_spec",
         lambda name: None if name == "clarabel" else found(name),
     )
