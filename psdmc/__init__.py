@@ -75,10 +75,13 @@ _MOVED = {
     "psdmc.calibrate": "psdmc.calibration",
     "psdmc.derivation.functions": "psdmc.derivation.monomials",
     "psdmc.model.check": "psdmc.verification.check",
+    "psdmc.calibration.identify.physical_links": "psdmc.links.physical_links",
+    "psdmc.calibration.identify.prediction": "psdmc.model.calibrated",
+    "psdmc.calibration.verdict.verdict": "psdmc.model.calibrated",
     "psdmc.program.functions": "psdmc.program.signature",
     "psdmc.robot.chain": "psdmc.robot.mechanism",
 }
-"""Packages and modules of psdmc 0.1 that have another name now."""
+"""Packages and modules of psdmc 0.1 and 0.2 that have another name now."""
 
 
 class _Moved:

@@ -254,7 +254,15 @@ def test_the_compiler_never_imports_calibration():
     assert {stage for stage, others in MAY_IMPORT.items() if "calibration" in others} == {"report", "cli"}
 
 
-PICKING = {"load.py", "from_parts.py", "store.py", "calibrated_json.py", "show_json.py", "urdf_words.py", "from_source.py"}
+PICKING = {
+    "load.py",
+    "from_parts.py",
+    "store.py",
+    "calibrated_json.py",
+    "show_json.py",
+    "urdf_words.py",
+    "from_source.py",
+}
 """Files that may name the key `calibration`: model files are read and written there, the others mean another thing."""
 SENTENCES = {"words", "reasons", "doubts", "suspects", "warnings", "notes", "visibility"}
 """Attributes that hold sentences for people."""

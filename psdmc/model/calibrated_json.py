@@ -482,14 +482,14 @@ def _named_by_exponents(old: Mapping[str, Any]) -> Sequence[dict[str, Any]]:
     rows = _old_rows(old, "friction")
     law = json.record(old.get("prediction") or {}, "the calibration's prediction")
     exponents = [json.number(each, "an exponent") for each in _list({"exponents": [], **law}, "exponents")]
-    if not exponents or viscous_name(exponents[0]) in {row.get("name") for row in rows}:
+    if not exponents or viscous_name(exponents[0]) in [row.get("name") for row in rows]:
         return rows
     first = exponents[0]
     units = {"Nms/rad": f"Nm (s/rad)^{first:g}", "Ns/m": f"N (s/m)^{first:g}"}
     renamed = {"viscous": viscous_name(first), "viscous^1": "viscous"}
     return [
-        row | {"name": renamed[row["name"]], "unit": units.get(row.get("unit", ""), row.get("unit", ""))}
-        if row.get("name") in renamed
+        row | {"name": renamed[row["name"]], "unit": units.get(str(row.get("unit", "")), row.get("unit", ""))}
+        if json.text(row.get("name"), "a name of the calibration") in renamed
         else row
         for row in rows
     ]
