@@ -73,7 +73,7 @@ test-targets: $(READY) ## run self-tests for 64-bit Arm, big-endian s390x and Co
 	PSDMC_TARGETS=whole $(RUN)/python -m pytest -q -rsP tests/toolchain/test_target_machines.py -k "compiled_for or first_byte"
 
 LOWEST := .venv-lowest
-LOWEST_TESTS = $(FAST) tests/test_atomic.py tests/emit/test_package.py tests/emit/test_write.py tests/toolchain/test_call.py \
+LOWEST_TESTS = $(FAST) tests/test_atomic.py tests/backends/c/test_package.py tests/backends/c/test_write.py tests/toolchain/test_call.py \
   tests/toolchain/test_cache.py tests/bench/test_results.py tests/calibration/logs/test_log_files.py tests/calibration/identify/test_linear_fit.py \
   tests/derivation/test_same_bytes.py
 
@@ -129,7 +129,7 @@ test-machines: $(READY) ## run the fast tests with the arithmetic of other proce
 	  $(RUN)/python tests/machines.py run $$setting $(RUN)/python -m pytest -n $(JOBS) $(BYTES) || exit 1; done
 
 golden: $(READY) ## rewrite the golden files; review their diff like code
-	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/emit tests/end_to_end/test_reference_robot.py tests/derivation/test_same_bytes.py
+	PSDMC_REWRITE_GOLDEN=1 $(RUN)/python -m pytest tests/lower tests/backends/c tests/end_to_end/test_reference_robot.py tests/derivation/test_same_bytes.py
 	git --no-pager diff --stat -- tests/golden $(GENERATED)
 
 bench: $(READY) ## time the standard robots against other programs, on an idle machine; page and JSON in generated/

@@ -74,6 +74,7 @@ _MOVED = {
     "psdmc.derive": "psdmc.derivation",
     "psdmc.calibrate": "psdmc.calibration",
     "psdmc.derivation.functions": "psdmc.derivation.monomials",
+    "psdmc.emit": "psdmc.backends.c",
     "psdmc.model.check": "psdmc.verification.check",
     "psdmc.calibration.identify.physical_links": "psdmc.links.physical_links",
     "psdmc.calibration.identify.prediction": "psdmc.model.calibrated",

@@ -18,14 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 from weakref import WeakValueDictionary
 
-from psdmc.emit.adapters import chosen, with_needed
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
-from psdmc.emit.package_files import package_files
-from psdmc.emit.reference_load import reference_load
-from psdmc.emit.reference_states import reference_states
-from psdmc.emit.write import Changes, require_own_folder, write_package
+from psdmc.backends.c.adapters import chosen, with_needed
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.c.package_files import package_files
+from psdmc.backends.c.reference_load import reference_load
+from psdmc.backends.c.reference_states import reference_states
+from psdmc.backends.c.write import Changes, require_own_folder, write_package
 from psdmc.errors import InputError
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
@@ -151,7 +151,7 @@ def emit_c(
     progress   called with the name of each step as it begins
     payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
                do not admit every load
-    adapters   names in psdmc.emit.adapters.ADAPTERS, or one name: other programs that the package is also for;
+    adapters   names in psdmc.backends.c.adapters.ADAPTERS, or one name: other programs that the package is also for;
                functions that they need are generated besides `functions`
     target     the machine that the package is for, by its name in psdmc.target.presets
     friction   whether the package has a function of the joints' friction; InputError where the model was not calibrated from

@@ -8,10 +8,10 @@ from functools import cache
 from lowered import lowered
 from random_trees import RandomTree
 
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
 from psdmc.derivation.derive import derive_model
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import trace_dynamics
 from psdmc.lower.limb_frames import possible_groups

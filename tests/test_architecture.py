@@ -25,8 +25,8 @@ MAY_IMPORT = {
     "functions": {"robot", "dynamics", "model", "program", "recipes"},
     "verification": {"robot", "dynamics", "model", "program", "recipes", "functions"},
     "lower": {"robot", "dynamics", "model", "program", "recipes", "functions", "target"},
-    "emit": {"robot", "program", "model", "recipes", "functions", "target"},
-    "toolchain": {"robot", "emit", "program", "functions", "target"},
+    "backends": {"robot", "program", "model", "recipes", "functions", "target"},
+    "toolchain": {"robot", "backends", "program", "functions", "target"},
 }
 MAY_IMPORT["model_functions"] = set(MAY_IMPORT) - {"links", "derivation", "verification"}
 LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
@@ -53,7 +53,7 @@ OUTSIDE = {
     "recipes": {"numpy"},
     "functions": {"numpy", "pinocchio"},
     "lower": {"numpy", "scipy"},
-    "emit": {"jinja2", "numpy"},
+    "backends": {"jinja2", "numpy"},
     "toolchain": {"cffi", "numpy", "dask", "xarray"},
     "bench": {
         "numpy",
@@ -104,6 +104,7 @@ ROOMS = {
         },  # paths that it is given: 0117
     },
     "lower": {"expanded": set()},
+    "backends": {"c": set()},
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
@@ -351,7 +352,7 @@ def test_no_file_but_the_targets_names_machines():
     assert any(machines(path) for path in target.glob("*.py")), "the words are not those that targets use"
 
 
-WEIGHING = ("lower", "program", "emit", "toolchain")
+WEIGHING = ("lower", "program", "backends", "toolchain")
 """Stages that choose by what arithmetic costs, and write or compile C."""
 
 COSTS = re.compile(

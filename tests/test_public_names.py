@@ -40,6 +40,8 @@ MOVED = {
     "psdmc.derive": "psdmc.derivation",
     "psdmc.calibrate.actuators": "psdmc.calibration",
     "psdmc.derivation.functions": "psdmc.derivation.monomials",
+    "psdmc.emit.package": "psdmc.backends.c",
+    "psdmc.emit": "psdmc.backends.c",
     "psdmc.model.check": "psdmc.verification.check",
     "psdmc.program.functions": "psdmc.program.signature",
     "psdmc.robot.chain": "psdmc.robot.mechanism",

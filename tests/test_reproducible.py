@@ -25,7 +25,7 @@ from psdmc.reproducible import (
 )
 
 PACKAGE = Path(psdmc.__file__).parent
-WRITTEN = ("robot", "dynamics", "derivation", "model", "program", "recipes", "functions", "lower", "emit")
+WRITTEN = ("robot", "dynamics", "derivation", "model", "program", "recipes", "functions", "lower", "backends")
 """Folders whose numbers reach model files, C or reference states."""
 
 STRANGE = {"linalg", "einsum", "dot", "matmul", "inner", "tensordot", "vdot"}
@@ -53,7 +53,7 @@ DECISIONS = {
     "lower/reframe.py": "thresholds with margins of decades",
     "lower/common_normals.py": "thresholds with margins of decades",
     "lower/accuracy.py": "errors that are compared with limits",
-    "emit/reference_states.py": "condition numbers, which order states after rounding",
+    "backends/c/reference_states.py": "condition numbers, which order states after rounding",
 }
 """Files that use such functions for decisions with slack, or for another program's side of a comparison."""
 

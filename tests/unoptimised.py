@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from psdmc.emit.package import PackageView
+from psdmc.backends.c.package import PackageView
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 from psdmc.toolchain import compile as toolchain

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from psdmc.backends.c.names import identifier
+from psdmc.backends.c.render import render
 from psdmc.calibration.identify.lugre import PARAMETERS, Lugre, LugreView
-from psdmc.emit.names import identifier
-from psdmc.emit.render import render
 from psdmc.errors import InputError
 from psdmc.model.calibrated import Calibrated, by_joint
 

@@ -293,10 +293,10 @@ def emit_c(
 ) -> None:
     """Write a model's C package: header, sources, build files, self-test."""
     from psdmc import compiler
+    from psdmc.backends.c.adapters import lacking
+    from psdmc.backends.c.names import identifier
+    from psdmc.backends.c.write import require_own_folder
     from psdmc.cli.one_line import one_line
-    from psdmc.emit.adapters import lacking
-    from psdmc.emit.names import identifier
-    from psdmc.emit.write import require_own_folder
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction
@@ -367,7 +367,7 @@ def build(
 
 def _after_building(package: Path) -> str:
     """The command that puts a built package to use: installed for its user; compiled for the board that it is made for."""
-    from psdmc.emit.own_files import target_of
+    from psdmc.backends.c.own_files import target_of
 
     target = PRESETS.get(target_of(package) or "")
     if target is not None and target.tools:

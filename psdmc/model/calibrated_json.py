@@ -300,9 +300,8 @@ def _covariance(value: object, l: int) -> Array:
     matrix[rows, columns] = json.numbers(value, "the calibration's covariance", len(rows))
     matrix[columns, rows] = matrix[rows, columns]
     variance = np.diag(matrix)
-    if (variance < 0.0).any() or (
-        np.abs(matrix) > (1.0 + LEANING) * np.sqrt(np.outer(variance, variance))
-    ).any():
+    std = np.sqrt(np.maximum(variance, 0.0))
+    if (variance < 0.0).any() or (np.abs(matrix) > (1.0 + LEANING) * std * std[:, None]).any():
         raise ValueError("the calibration's covariance is that of no numbers")
     return matrix
 

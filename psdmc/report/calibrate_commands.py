@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from psdmc.atomic import refuse_foreign_folder, write_together, write_whole
+from psdmc.backends.c.names import identifier
+from psdmc.backends.c.own_files import content_of
 from psdmc.calibration.actuators import actuator_files, calibrated_actuators
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.campaign import (
@@ -25,8 +27,6 @@ from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campai
 from psdmc.calibration.sources import LogNaming
 from psdmc.calibration.verdict.record import Calibration, verdict_of
 from psdmc.compiler import compile as compile_model
-from psdmc.emit.names import identifier
-from psdmc.emit.own_files import content_of
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from psdmc.atomic import write_together
+from psdmc.backends.c.render import environment
 from psdmc.calibration.motions.excite import Excitation
-from psdmc.emit.render import environment
 from psdmc.model.calibrated import WEAK, Calibrated, Verdict, code_of
 from psdmc.model.calibrated_json import document
 from psdmc.report.calibrate_plots import excitation_panels, step_panels

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from psdmc.emit.package import PackageView
-from psdmc.emit.package_files import library_files
+from psdmc.backends.c.package import PackageView
+from psdmc.backends.c.package_files import library_files
 from psdmc.toolchain.cache import cache_key, cached
 from psdmc.toolchain.compiler_command import Compiler, find_compiler, run
 

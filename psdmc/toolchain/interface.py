@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from psdmc.emit.package import PackageView
-from psdmc.emit.patterns import patterns
+from psdmc.backends.c.package import PackageView
+from psdmc.backends.c.patterns import patterns
 from psdmc.errors import InternalError
 from psdmc.program.signature import Sizes
 

@@ -7,7 +7,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from psdmc.emit.package import PackageView
+from psdmc.backends.c.package import PackageView
 from psdmc.errors import InternalError
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
@@ -52,7 +52,7 @@ def _emission() -> tuple[str, ...]:
     from importlib.metadata import version  # here: emission, which compiles nothing, does not wait for it
 
     root = resources.files("psdmc")
-    files = digest([root / "emit", root / "toolchain", resources.files("psdmc.templates")])
+    files = digest([root / "backends", root / "toolchain", resources.files("psdmc.templates")])
     return (psdmc_version(), version("jinja2"), files)
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from psdmc import compiler
+from psdmc.backends.c.package_files import package_files
 from psdmc.cli.show import print_model
-from psdmc.emit.package_files import package_files
 from psdmc.model.load import load
 from psdmc.model.store import file_bytes
 from psdmc.progress import silent

@@ -17,10 +17,10 @@ from random_trees import TREES, RandomTree
 from slow_cases import slow_but_for
 
 import psdmc
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
 from psdmc.derivation.derive import derive_model
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of

@@ -17,7 +17,7 @@ from c_warnings import EXTRA, STRICT
 from direct import write_sources
 from stress import RUNTIME, stress_program
 
-from psdmc.emit.package import PackageView
+from psdmc.backends.c.package import PackageView
 
 WARNINGS = [flag for flag in STRICT if flag != "-Werror"] + EXTRA
 UNDEFINED = "-fsanitize=undefined,float-cast-overflow -fno-sanitize-recover=all"

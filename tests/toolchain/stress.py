@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from psdmc.emit.kernel_view import KernelView
-from psdmc.emit.package import PackageView
+from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.package import PackageView
 
 RUNTIME = tuple(Path(__file__).with_name(name) for name in ("stress.h", "stress_threads.h"))
 

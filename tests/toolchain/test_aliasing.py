@@ -11,8 +11,8 @@ from direct import Direct, shared_library, states
 from slow_cases import slow_but_for
 from traced import SIZES, L, N, arm, arm_kernels, arm_package
 
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package_files import package_files
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package_files import package_files
 
 KERNELS = arm_kernels()
 AS_LONG_AS_AN_INPUT = [
@@ -40,11 +40,11 @@ def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     real, build = request.param
     with pytest.MonkeyPatch.context() as patch:
         if build == "parts":
-            patch.setattr("psdmc.emit.parts.LONG", 30)
-            patch.setattr("psdmc.emit.parts.PART", 30)
+            patch.setattr("psdmc.backends.c.parts.LONG", 30)
+            patch.setattr("psdmc.backends.c.parts.PART", 30)
         if build == "clears":
-            patch.setattr("psdmc.emit.cleared.LEAST", 1)
-            patch.setattr("psdmc.emit.cleared.SHORTEST", 2)
+            patch.setattr("psdmc.backends.c.cleared.LEAST", 1)
+            patch.setattr("psdmc.backends.c.cleared.SHORTEST", 2)
         package = arm_package(options=EmitOptions(real=real))
     assert (package.has_parts, package.has_clears) == (build == "parts", build == "clears")
     flags = ["-O1" if request.param == OPTIMISED else "-O0", *BUILDS[build]]

@@ -17,9 +17,9 @@ from random_trees import RandomTree
 from unoptimised import without_optimisation
 
 import psdmc
+from psdmc.backends.c.adapters import lacking
 from psdmc.compiler import emit_c
 from psdmc.derivation.derive import derive_model
-from psdmc.emit.adapters import lacking
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel

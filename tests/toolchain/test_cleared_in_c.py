@@ -8,7 +8,7 @@ from direct import Direct, all_expected, error, shared_library, states
 from slow_cases import slow_but_for
 from traced import L, N, arm_kernels, arm_package
 
-from psdmc.emit.options import EmitOptions
+from psdmc.backends.c.options import EmitOptions
 
 CASES = [("-march=native", "float64"), ("-Dtest_arm_NO_VECTORS", "float64"), ("-march=native", "float32")]
 KERNELS = {name: kernel for name, kernel in arm_kernels().items() if not kernel.theta}
@@ -19,8 +19,8 @@ COUNT = 11
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     build, real = request.param
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("psdmc.emit.cleared.LEAST", 1)
-        patch.setattr("psdmc.emit.cleared.SHORTEST", 2)
+        patch.setattr("psdmc.backends.c.cleared.LEAST", 1)
+        patch.setattr("psdmc.backends.c.cleared.SHORTEST", 2)
         package = arm_package(options=EmitOptions(real=real))
     assert package.has_clears
     flags = ["-O0", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", build]

@@ -11,14 +11,14 @@ import pytest
 from bundled import bundled_model, bundled_robot
 from direct import Direct, shared_library, write_sources
 
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
 from psdmc.calibration.api import calibrate
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.cli.boundary import run
 from psdmc.compiler import emit_c
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
 from psdmc.errors import InputError
 from psdmc.lower.kernels import lower
 from psdmc.model.calibrated import NumberRow, parameters_of

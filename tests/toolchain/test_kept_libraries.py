@@ -15,7 +15,7 @@ from traced import arm_package
 
 import psdmc
 from psdmc import compiler
-from psdmc.emit.package import PackageView
+from psdmc.backends.c.package import PackageView
 from psdmc.errors import InputError, InternalError
 from psdmc.toolchain import kept_kernels, kept_libraries
 from psdmc.toolchain.call import CompiledRobot
@@ -89,7 +89,7 @@ def forget_digests() -> None:
     [
         "psdmc.templates/trig/" + min(TRIG),
         "psdmc.templates/header.h.jinja",
-        "psdmc/emit/reserved/libraries.txt",
+        "psdmc/backends/c/reserved/libraries.txt",
         "psdmc/reproducible.py",
         "psdmc/lower/factored.py",
         "psdmc/toolchain/direct_call.c",

@@ -14,10 +14,10 @@ from direct import Direct, shared_library
 from limbed import FUNCTIONS, forced, kernels, limbed, package_of, shape
 from slow_cases import slow_but_for
 
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
 from psdmc.derivation.derive import derive_model
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower
 from psdmc.model.random_states import states_of
@@ -211,7 +211,7 @@ def test_a_pivot_that_is_not_positive_is_reported_as_by_the_straight_line(tmp_pa
 
 def test_many_pivots_are_looked_at_in_one_loop(tmp_path: Path) -> None:
     """One by one, each would write its own NaN into all accelerations."""
-    from psdmc.emit.package_files import package_files
+    from psdmc.backends.c.package_files import package_files
 
     text = package_files(package_of(LEGS, EmitOptions()))["src/forward_dynamics.c"]
     (line,) = re.findall(r"return fail\(.*", text)
@@ -219,7 +219,7 @@ def test_many_pivots_are_looked_at_in_one_loop(tmp_path: Path) -> None:
 
 
 def test_the_package_says_what_it_has(tmp_path: Path) -> None:
-    from psdmc.emit.package_files import package_files
+    from psdmc.backends.c.package_files import package_files
 
     files = package_files(package_of(LEGS, EmitOptions()))
     assert "src/limbs4.h" in files
@@ -229,7 +229,7 @@ def test_the_package_says_what_it_has(tmp_path: Path) -> None:
 
 
 def test_machines_without_vectors_and_packages_without_limbs_have_no_trace_of_them() -> None:
-    from psdmc.emit.package_files import package_files
+    from psdmc.backends.c.package_files import package_files
 
     for options in (EmitOptions(target=SCALAR),):
         assert not [path for path in package_files(package_of(LEGS, options)) if "limbs" in path]

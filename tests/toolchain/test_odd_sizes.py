@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from direct import Direct, expected, shared_library, states
 
-from psdmc.emit.info import JointInfo, PackageInfo
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import package_view
+from psdmc.backends.c.info import JointInfo, PackageInfo
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import package_view
 from psdmc.functions import SIGNATURES
 from psdmc.model.equations import BaseParameter
 from psdmc.program.kernel import Kernel

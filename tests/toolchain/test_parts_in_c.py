@@ -10,8 +10,8 @@ from direct import Direct, all_expected, error, shared_library, states
 from slow_cases import slow_but_for
 from traced import L, N, arm, arm_kernels, arm_package
 
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package_files import library_files
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package_files import library_files
 
 KERNELS = arm_kernels()
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]
@@ -24,8 +24,8 @@ COUNT = 19
 def compiled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Direct:
     build, real = request.param
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("psdmc.emit.parts.LONG", 30)
-        patch.setattr("psdmc.emit.parts.PART", 40)
+        patch.setattr("psdmc.backends.c.parts.LONG", 30)
+        patch.setattr("psdmc.backends.c.parts.PART", 40)
         package = arm_package(options=EmitOptions(real=real))
     library = shared_library(package, tmp_path_factory.mktemp("parts"), ["-O0", *STRICT, *BUILDS[build]])
     return Direct(package, library)

@@ -11,10 +11,10 @@ import pytest
 from bundled import bundled_model, bundled_robot, robot_path
 from direct import Direct, shared_library, write_sources
 
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
 from psdmc.compiler import derive, emit_c
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
 from psdmc.errors import InputError
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel

@@ -7,16 +7,16 @@ from functools import cache
 
 import numpy as np
 
+from psdmc.backends.c.info import JointInfo, PackageInfo
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.c.reference_states import ReferenceStates
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.frames import Frame, frame_at
 from psdmc.dynamics.kinematics import jacobian
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.regressor import regressor
-from psdmc.emit.info import JointInfo, PackageInfo
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
-from psdmc.emit.reference_states import ReferenceStates
 from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.model.equations import BaseParameter
 from psdmc.program.interpret import interpret

@@ -8,14 +8,14 @@ from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
 
+from psdmc.backends.c.info import package_info
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.c.package_files import library_files
 from psdmc.bench.build import built, cxx, produced
 from psdmc.bench.case import BENCHED, MOST_DIFFERENTIATED, Case
 from psdmc.bench.code_size import code_bytes, code_sizes
 from psdmc.bench.contestant import Contestant, Unavailable, source
-from psdmc.emit.info import package_info
-from psdmc.emit.options import EmitOptions
-from psdmc.emit.package import PackageView, package_view
-from psdmc.emit.package_files import library_files
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel

@@ -10,8 +10,8 @@ from typing import Any
 import cffi
 import numpy as np
 
+from psdmc.backends.c.render import render
 from psdmc.calibration.logs.log import Array
-from psdmc.emit.render import render
 from psdmc.errors import InputError
 from psdmc.toolchain.cache import cache_key, cached
 from psdmc.toolchain.compiler_command import FLAGS, find_compiler, run

@@ -1,0 +1,43 @@
+"""Adapters: files by which other programs call the emitted functions, chosen by `emit-c --with`; one module each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from psdmc.backends.c.adapters import casadi
+from psdmc.backends.c.kernel_view import KernelView
+from psdmc.errors import InputError
+from psdmc.robot.mechanism import Mechanism
+
+ADAPTERS: dict[str, Callable[[str, str, Sequence[KernelView], bool], str]] = {"casadi": casadi.source}
+"""By name, the function that makes an adapter's C file, <name>/<robot>_<name>.c, from the robot's identifier, the
+package's real type, its kernels and whether q is longer than the rates. The file includes the library's sources and
+becomes a shared library of its own, lib<robot>_<name>."""
+
+NEEDS = {"casadi": casadi.needed}
+"""By name, the function that returns which functions an adapter needs in the package besides those asked for."""
+
+LACKS = {"casadi": casadi.lacking}
+"""By name, the function that says what an adapter cannot have of a robot."""
+
+
+def chosen(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, each once, in the order of ADAPTERS; InputError where one is unknown."""
+    for name in names:
+        if name not in ADAPTERS:
+            raise InputError(f"there is no adapter {name!r}", f"choose from {', '.join(ADAPTERS)}")
+    return tuple(name for name in ADAPTERS if name in names)
+
+
+def with_needed(functions: Sequence[str], adapters: Sequence[str], wide: bool) -> list[str]:
+    """The functions, followed by those that the adapters need besides."""
+    found = dict.fromkeys(functions)
+    for adapter in adapters:
+        found |= dict.fromkeys(NEEDS[adapter](functions, wide))
+    return list(found)
+
+
+def lacking(robot: Mechanism, adapters: Sequence[str]) -> tuple[str, ...]:
+    """What these adapters cannot have of a robot, one clause each."""
+    found = (LACKS[adapter](robot) for adapter in chosen(adapters))
+    return tuple(reason for reason in found if reason is not None)

@@ -1,0 +1,75 @@
+"""The function that computes theta_b from all bodies of the robot, as templates print it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.backends.c.bodies import BodiesMap
+from psdmc.backends.c.options import CReal
+from psdmc.backends.c.prototypes import Prototype, bodies_prototype
+from psdmc.backends.c.tables import number
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodiesView:
+    """The map as C text, printed for one real type."""
+
+    robot: str
+    real: CReal
+    map: BodiesMap
+
+    @property
+    def prototype(self) -> Prototype:
+        return bodies_prototype(self.robot, self.real)
+
+    @property
+    def count(self) -> int:
+        return len(self.map.links)
+
+    @property
+    def constant(self) -> str:
+        return self._listed(self.map.constant)
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """{base parameter, factor} of every entry of the map that is not zero, column by column."""
+        return tuple(
+            f"{{{row}, {number(float(column[row]), self.real)}}}"
+            for column in self.map.columns.T
+            for row in np.flatnonzero(column).tolist()
+        )
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """For each body where the entries of each of its ten parameters end."""
+        ends = np.cumsum((self.map.columns != 0.0).sum(axis=0)).reshape(self.count, -1)
+        return tuple(", ".join(map(str, row)) for row in ends.tolist())
+
+    @property
+    def number_type(self) -> str:
+        """C's type of places in the map."""
+        return "unsigned short" if len(self.entries) < 2**16 else "unsigned"
+
+    @property
+    def masses(self) -> str:
+        return self._listed(self.map.masses)
+
+    @property
+    def coms(self) -> tuple[str, ...]:
+        return tuple(map(self._listed, self.map.coms))
+
+    @property
+    def inertias(self) -> tuple[str, ...]:
+        return tuple(map(self._listed, self.map.inertias))
+
+    @property
+    def theta_b(self) -> str:
+        return self._listed(self.map.theta_b)
+
+    def _listed(self, values: Array) -> str:
+        return ", ".join(number(float(value), self.real) for value in values)

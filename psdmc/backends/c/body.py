@@ -1,0 +1,237 @@
+"""The straight-line body of one PROGRAM, line by line, for the body template.
+
+Sines and cosines are taken in groups, as early as their angles are known, so that one state's angles share vectors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from psdmc.backends.c.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
+from psdmc.backends.c.cleared import cleared, without_zeros
+from psdmc.backends.c.lines import (
+    BETWEEN,
+    Angle,
+    Body,
+    Cleared,
+    GroupStore,
+    Line,
+    Load,
+    Section,
+    Step,
+    Store,
+    spread,
+)
+from psdmc.backends.c.products import Entry, Multiplication, multiplication
+from psdmc.backends.c.store_groups import GROUP, StoreGroups
+from psdmc.program.angles import angle_groups, cone
+from psdmc.program.products import Product
+from psdmc.program.program import Op, Program, Slot
+
+_ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SQRT})
+
+
+def make_body(
+    program: Program,
+    inputs: tuple[str, ...],
+    sizes: dict[str, int],
+    suffix: str,
+    stores_early: bool,
+    in_groups: Collection[str] = (),
+    products: Sequence[Product] = (),
+    uniform: Collection[str] = UNIFORM_VECTORS,
+) -> Body:
+    """Lay out a PROGRAM, and products of what it puts out.
+
+    inputs        vectors of the signature that may be read
+    sizes         output vectors and their lengths; entries that the PROGRAM does not store become zero
+    suffix        of constants: '' or 'f'
+    stores_early  store a value as soon as it is known (large outputs) or all at the end (small ones)
+    in_groups     vectors that are also stored in groups of four, as soon as the last of them is known; where there are
+                  others beside them, STORE_BLOCK stores those
+    uniform       vectors that are the same in all lanes
+    """
+    multiplied = tuple(multiplication(program, product, sizes) for product in products)
+    stored = without_products(sizes, multiplied)
+    sections = sections_of(program, stored, suffix, stores_early, in_groups, multiplied, uniform)
+    return Body(sections, unread(program, inputs), multiplied, has_roots(program))
+
+
+def without_products(sizes: Mapping[str, int], products: Sequence[Multiplication]) -> dict[str, int]:
+    """Vectors that a PROGRAM stores, with their lengths, where it also has the products' outputs."""
+    outputs = {product.output for product in products}
+    return {name: size for name, size in sizes.items() if name not in outputs}
+
+
+def unread(program: Program, inputs: Sequence[str]) -> tuple[str, ...]:
+    """Inputs that the PROGRAM never reads, by name."""
+    read = {slot.vector for slot in program.inputs()}
+    return tuple(name for name in inputs if name not in read)
+
+
+def has_roots(program: Program) -> bool:
+    """Whether the PROGRAM takes square roots."""
+    return any(instr.op is Op.SQRT for instr in program)
+
+
+def sections_of(
+    program: Program,
+    sizes: Mapping[str, int],
+    suffix: str,
+    stores_early: bool,
+    in_groups: Collection[str],
+    products: Sequence[Multiplication],
+    uniform: Collection[str],
+    with_zeros: bool = True,
+) -> tuple[Section, ...]:
+    """The sections of a PROGRAM; `with_zeros`: entries of the vectors in `sizes` that it does not store become zero."""
+    groups = StoreGroups({vector: size for vector, size in sizes.items() if vector in in_groups})
+    beside = {slot.vector for slot, _ in program.outputs} | set(sizes) if in_groups else set()
+    apart = frozenset(beside.difference(in_groups))
+    whole = {vector: size for vector, size in sizes.items() if vector not in apart}
+    runs = cleared(program, whole) if with_zeros and not products else ()
+    program = without_zeros(program, runs) if runs else program
+    writer = _Writer(program, suffix, stores_early, groups, apart, products, uniform, runs)
+    return writer.sections(sizes if with_zeros else {})
+
+
+class _Writer:
+    """Texts of a PROGRAM's values, made in the order in which they are printed."""
+
+    def __init__(
+        self,
+        program: Program,
+        suffix: str,
+        stores_early: bool,
+        groups: StoreGroups,
+        beside: frozenset[str],
+        products: Sequence[Multiplication],
+        uniform: Collection[str],
+        runs: Sequence[Cleared],
+    ) -> None:
+        self.program, self.suffix, self.stores_early = program, suffix, stores_early
+        self.groups, self.beside, self.runs = groups, beside, runs
+        self.left = {product.left: product.shape for product in products}
+        self.right = {product.right: product.shape for product in products}
+        self.stored: dict[Slot, Store] = {}
+        self.uniform, self.names = uniform, Names.of(program, uniform)
+        self.stores: dict[int, list[Slot]] = {}
+        for slot, index in program.outputs:
+            self.stores.setdefault(index, []).append(slot)
+        self.done = [False] * len(program)
+        self.taken = {(op, args) for op, args, _, _ in program.body if op in (Op.SIN, Op.COS)}
+
+    def sections(self, sizes: Mapping[str, int]) -> tuple[Section, ...]:
+        sections: list[Section] = []
+        for number, group in enumerate(angle_groups(self.program)):
+            wanted = cone(self.program, group)
+            loads, steps = self._loads(wanted), self._steps(wanted, False)
+            sections.append(Section(loads, steps, tuple(self._angle(a) for a in group), number))
+        everything = range(len(self.program))
+        loads, steps = self._loads(everything), self._steps(everything, self.stores_early)
+        rest = (*steps, *self._late_stores(), *self._zeros(sizes), *self.runs)
+        return (*sections, Section(loads, rest, (), len(sections)))
+
+    def _loads(self, wanted: range | list[int]) -> tuple[Load, ...]:
+        """The inputs among these values that no earlier section has loaded."""
+        slots = {self.program.body[i].slot for i in wanted if not self.done[i]}
+        return tuple(
+            Load(_load_name(slot), slot.vector, slot.index, slot.vector in self.uniform)
+            for slot in self.program.inputs()
+            if slot in slots and slot.vector not in BETWEEN
+        )
+
+    def _steps(self, wanted: range | list[int], with_stores: bool) -> tuple[Line, ...]:
+        lines: list[Line] = []
+        for i in wanted:
+            if not self.done[i] and self._has_own_line(i):
+                lines.append(Step(f"t{i}", self._operation(i).text, self.names.uniform[i]))
+            self.done[i] = True
+            if with_stores and i in self.stores:
+                lines += self._stores_of(i)
+        return tuple(lines)
+
+    def _has_own_line(self, i: int) -> bool:
+        return self.names.named[i] and self.program.body[i].op in _ARITHMETIC
+
+    def _stores_of(self, i: int) -> list[Line]:
+        return [line for slot in self.stores[i] for line in self._store(slot, i)]
+
+    def _late_stores(self) -> list[Line]:
+        if self.stores_early:
+            return []
+        return [line for slot, i in self.program.outputs for line in self._store(slot, i)]
+
+    def _store(self, slot: Slot, i: int) -> list[Line]:
+        text, uniform = self._value(i).text, self.names.uniform[i]
+        if slot.vector in self.right:
+            column, row = divmod(slot.index, self.right[slot.vector].n)
+            kept = column >= self.right[slot.vector].zero
+            return [Entry("KEEP", slot.vector, row, column, spread(text, uniform))] if kept else []
+        stored = self._stored(self._store_of(slot, text, uniform))
+        if slot.vector in self.left:
+            row, column = divmod(slot.index, self.left[slot.vector].n)
+            stored.append(Entry("NAME", slot.vector, row, column, spread(text, uniform)))
+        return stored
+
+    def _store_of(self, slot: Slot, text: str, uniform: bool) -> Store:
+        macro = "STORE_BLOCK" if slot.vector in self.beside else "STORE"
+        return Store(slot.vector, slot.index, text, uniform, macro)
+
+    def _zeros(self, sizes: Mapping[str, int]) -> list[Line]:
+        taken = {slot for slot, _ in self.program.outputs}
+        in_runs = {slot for run in self.runs for slot in run.slots}
+        zero = literal(0.0, self.suffix).text
+        return [
+            line
+            for vector, size in sizes.items()
+            for index in range(size)
+            if (slot := Slot(vector, index)) not in taken
+            for line in self._stored(
+                Store(vector, index, zero, True, "STORE_ZERO")
+                if slot in in_runs
+                else self._store_of(slot, zero, True)
+            )
+        ]
+
+    def _stored(self, store: Store) -> list[Line]:
+        """A store, and the groups that it completes."""
+        slot = Slot(store.vector, store.index)
+        self.stored[slot] = store
+        return [store, *(self._group(first) for first in self.groups.completed_by(slot))]
+
+    def _group(self, first: Slot) -> GroupStore:
+        members = (self.stored[Slot(first.vector, first.index + k)] for k in range(GROUP))
+        texts = tuple(spread(store.text, store.uniform) for store in members)
+        return GroupStore(first.vector, first.index, texts)
+
+    def _angle(self, a: int) -> Angle:
+        sine = f"sin_{a}" if (Op.SIN, (a,)) in self.taken else None
+        cosine = f"cos_{a}" if (Op.COS, (a,)) in self.taken else None
+        return Angle(spread(self._value(a).text, self.names.uniform[a]), sine, cosine)
+
+    def _value(self, i: int) -> Expr:
+        """A value as an operand: its name, or its expression where nothing else uses it."""
+        instr = self.program.body[i]
+        if instr.slot is not None:
+            return Expr(_load_name(instr.slot))
+        if instr.value is not None:
+            return literal(instr.value, self.suffix)
+        if instr.op in (Op.SIN, Op.COS):
+            return Expr(f"{instr.op.value}_{instr.args[0]}")
+        return Expr(f"t{i}") if self.names.named[i] else self._operation(i)
+
+    def _operation(self, i: int) -> Expr:
+        instr = self.program.body[i]
+        operands = [self._value(a) for a in instr.args]
+        if instr.op is Op.SQRT:
+            return Expr(f"SQRT({spread(operands[0].text, self.names.uniform[instr.args[0]])})")
+        return combine(instr.op, operands)
+
+
+def _load_name(slot: Slot) -> str:
+    """The name that an input is loaded into; what lies between parts is read where it is used: loaded before, it would be
+    stored and fetched once more, as registers are few."""
+    if slot.vector in BETWEEN:
+        return str(slot)
+    return f"{slot.vector}_{slot.index}"

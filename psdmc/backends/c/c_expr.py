@@ -1,0 +1,98 @@
+"""PROGRAM -> C expressions: a value that is used once is written at its use, other values get names.
+
+The texts are the same for one state and for one state per lane: a value is `V` (a real, or a vector of them) or uniform
+(the same for all states: constants and what is computed from parameters alone), and C combines scalars with vectors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from psdmc.backends.c.reals import rounded_out
+from psdmc.program.program import Instr, Op, Program
+
+DEEPEST = 4
+"""Deepest nesting of operations in one expression: deeper nesting saves no instruction and is hard to read."""
+
+UNIFORM_VECTORS = frozenset({"theta_b"})
+
+_LOOSE, _TIGHT, _UNARY, _ATOM = range(4)
+_SYMBOL = {Op.ADD: ("+", _LOOSE), Op.SUB: ("-", _LOOSE), Op.MUL: ("*", _TIGHT), Op.DIV: ("/", _TIGHT)}
+
+
+class Expr(NamedTuple):
+    """C text of a value, the binding strength of its outermost operator, and its depth of nesting."""
+
+    text: str
+    binding: int = _ATOM
+    depth: int = 0
+
+    def beside(self, binding: int, is_right: bool) -> str:
+        """The text as an operand: in brackets unless C would parse the same tree without them."""
+        loose = self.binding < binding or (is_right and self.binding in (binding, _UNARY))
+        return f"({self.text})" if loose else self.text
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """Names of a PROGRAM's values in C, decided before any text is made.
+
+    named    values that get a name: outputs, and whatever is used more than once
+    uniform  values that are the same for all states
+    """
+
+    program: Program
+    named: tuple[bool, ...]
+    uniform: tuple[bool, ...]
+
+    @staticmethod
+    def of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> Names:
+        """`shared` are vectors that are the same in all lanes."""
+        uses = program.uses()
+        outputs = {index for _, index in program.outputs}
+        named = [uses[i] > 1 or i in outputs for i in range(len(program))]
+        uniform: list[bool] = []
+        for instr in program:
+            uniform.append(_is_uniform(instr, uniform, shared))
+        _cut_deep_trees(program, named)
+        return Names(program, tuple(named), tuple(uniform))
+
+
+def _is_uniform(instr: Instr, known: list[bool], shared: Collection[str]) -> bool:
+    op, args, slot, _ = instr
+    if slot is not None:
+        return slot.vector in shared
+    if op is Op.SIN or op is Op.COS or op is Op.SQRT:
+        return False
+    return all(known[a] for a in args)
+
+
+def _cut_deep_trees(program: Program, named: list[bool]) -> None:
+    """Also name the values at which an expression would nest deeper than DEEPEST."""
+    depth = [0] * len(program)
+    for i, (op, args, _, _) in enumerate(program):
+        if not args or op is Op.SIN or op is Op.COS or op is Op.SQRT:
+            continue
+        for a in args:
+            if depth[a] == DEEPEST:
+                named[a] = True
+        depth[i] = 1 + max([0 if named[a] else depth[a] for a in args])
+
+
+def literal(value: float, suffix: str) -> Expr:
+    """A constant that reads back as the same number; with suffix 'f' as the nearest float."""
+    value = rounded_out(value, "float" if suffix else "double")
+    return Expr(f"{value!r}{suffix}", _UNARY if str(value).startswith("-") else _ATOM)
+
+
+def combine(op: Op, operands: list[Expr]) -> Expr:
+    """One operation on texts, brackets only where they change the meaning."""
+    if op is Op.NEG:
+        return Expr(f"-{operands[0].beside(_UNARY, is_right=True)}", _UNARY, 1 + operands[0].depth)
+    symbol, binding = _SYMBOL[op]
+    left, right = operands
+    depth = 1 + max(left.depth, right.depth)
+    text = f"{left.beside(binding, is_right=False)} {symbol} {right.beside(binding, is_right=True)}"
+    return Expr(text, binding, depth)

@@ -1,0 +1,49 @@
+"""Outputs that are zero at every state, in runs: code for one state clears a run by vectors.
+
+A matrix of a tree is mostly zeros: of solo12's regressor 1,164 entries of 1,692. Stored one by one, they take a third of the
+function's code. Code for lanes stores them with their neighbours, as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import groupby
+
+from psdmc.backends.c.lines import Cleared
+from psdmc.program.program import Program, Slot
+
+SHORTEST = 4
+"""Entries of a run: a vector with AVX2. solo12's regressor: 819 ns, with runs of eight or more cleared 633, of four 621."""
+
+LEAST = 256
+"""Entries of all runs together: fewer do not show in a call's time. No six- or seven-joint arm has as many."""
+
+
+def cleared(program: Program, sizes: Mapping[str, int]) -> tuple[Cleared, ...]:
+    """The runs of zeros among outputs of these sizes; none where there are few."""
+    zero = zero_outputs(program, sizes)
+    runs = tuple(run for vector in sizes for run in _runs(vector, zero[vector]))
+    return runs if sum(run.count for run in runs) >= LEAST else ()
+
+
+def zero_outputs(program: Program, sizes: Mapping[str, int]) -> dict[str, list[int]]:
+    """For each vector its entries that the PROGRAM does not store, or stores as the constant zero."""
+    values = {slot: program.body[i].value for slot, i in program.outputs}
+    return {
+        vector: [index for index in range(size) if values.get(Slot(vector, index), 0.0) == 0.0]
+        for vector, size in sizes.items()
+    }
+
+
+def without_zeros(program: Program, runs: tuple[Cleared, ...]) -> Program:
+    """The PROGRAM without the outputs in these runs."""
+    gone = {slot for run in runs for slot in run.slots}
+    return Program(program.body, tuple((slot, i) for slot, i in program.outputs if slot not in gone))
+
+
+def _runs(vector: str, entries: list[int]) -> Iterator[Cleared]:
+    """Runs of neighbours: their number less their place in the list is the same for all."""
+    for _, run in groupby(enumerate(entries), key=lambda each: each[1] - each[0]):
+        indices = [index for _, index in run]
+        if len(indices) >= SHORTEST:
+            yield Cleared(vector, indices[0], len(indices))

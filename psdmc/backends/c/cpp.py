@@ -1,0 +1,130 @@
+"""The C++17 class over the C functions: which members it has and how each calls C."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from psdmc.backends.c.function_view import FunctionView
+from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.prototypes import Prototype
+
+
+@dataclass(frozen=True, slots=True)
+class CppMethod:
+    """One member function.
+
+    parameters  on raw pointers
+    call        of the C function, with the class's own theta_b where it takes one
+    """
+
+    name: str
+    returns: str
+    parameters: str
+    call: str
+
+    @property
+    def can_fail(self) -> bool:
+        return self.returns != "void"
+
+
+@dataclass(frozen=True, slots=True)
+class CppArrayMethod:
+    """A member function on std::array.
+
+    output  what is returned, of type result_type; '' where several results, or a result beside a status, are parameters
+    """
+
+    name: str
+    returns: str
+    parameters: str
+    arguments: str
+    result_type: str
+    output: str
+
+
+@dataclass(frozen=True, slots=True)
+class CppClass:
+    """A class: the functions that need no parameters, those with the robot's own, or with a user's.
+
+    theta  whether it holds theta_b
+    """
+
+    name: str
+    theta: bool
+    methods: tuple[CppMethod, ...]
+    array_methods: tuple[CppArrayMethod, ...]
+
+    @property
+    def qualifier(self) -> str:
+        """Qualifier before a member function."""
+        return "" if self.theta else "static "
+
+    @property
+    def suffix(self) -> str:
+        """Text after a member function's parameters."""
+        return " const noexcept" if self.theta else " noexcept"
+
+
+def cpp_classes(functions: Iterable[FunctionView], n: int) -> tuple[CppClass, CppClass, CppClass]:
+    """Description, Robot and RobotWithParameters, in this order."""
+    shown = tuple(functions)
+    free = [f.kernels[0] for f in shown if not f.needs_parameters]
+    own = [k for f in shown if f.needs_parameters for k in f.kernels if not k.theta]
+    given = [k for f in shown if f.needs_parameters for k in f.kernels if k.theta]
+    return (
+        _class("Description", free, n),
+        _class("Robot", own, n),
+        _class("RobotWithParameters", given, n, theta=True),
+    )
+
+
+def _class(name: str, kernels: list[KernelView], n: int, theta: bool = False) -> CppClass:
+    methods = [_method(k, p) for k in kernels for p in k.prototypes.values()]
+    return CppClass(name, theta, tuple(methods), tuple(_array_method(k, n) for k in kernels))
+
+
+def _method(kernel: KernelView, prototype: Prototype) -> CppMethod:
+    words = [argument.rpartition(" ") for argument in prototype.arguments]
+    names = [name.lstrip("*") for _, _, name in words]
+    taken = [
+        f"{_cpp_type(kind)} {name}"
+        for (kind, _, name), bare in zip(words, names, strict=True)
+        if bare != "theta_b"
+    ]
+    passed = ["theta_.data()" if name == "theta_b" else name for name in names]
+    variant = next(key for key, value in kernel.prototypes.items() if value is prototype)
+    suffix = "" if variant == "single" else f"_{variant}"
+    return CppMethod(
+        name=f"{kernel.name.removesuffix('_theta')}{suffix}",
+        returns="std::size_t" if prototype.returns == "size_t" else prototype.returns,
+        parameters=", ".join(taken),
+        call=f"::{prototype.symbol}({', '.join(passed)})",
+    )
+
+
+def _cpp_type(kind: str) -> str:
+    return {"size_t": "std::size_t", "const double": "const Real", "const float": "const Real"}.get(
+        kind, "Real"
+    )
+
+
+def _array_method(kernel: KernelView, n: int) -> CppArrayMethod:
+    """The member function for one state; several results, or one with a status, are written to the last parameters."""
+    inputs = [f"const {_array(vector.size, n)} &{vector.name}" for vector in kernel.inputs]
+    outputs = [f"{_array(output.size)} &{output.name}" for output in kernel.outputs]
+    status = "int" if kernel.positive else "void"
+    returned = kernel.outputs[0] if status == "void" and len(outputs) == 1 else None
+    result = _array(returned.size) if returned else ""
+    return CppArrayMethod(
+        name=kernel.name.removesuffix("_theta"),
+        returns=result or status,
+        parameters=", ".join(inputs if returned else [*inputs, *outputs]),
+        arguments=", ".join(f"{vector.name}.data()" for vector in (*kernel.inputs, *kernel.outputs)),
+        result_type=result,
+        output=returned.name if returned else "",
+    )
+
+
+def _array(size: int, n: int | None = None) -> str:
+    return "Vector" if size == n else f"std::array<Real, {size}>"

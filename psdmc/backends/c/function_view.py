@@ -1,0 +1,91 @@
+"""Functions in the form that templates print: each with its kernels, and its C files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.make_kernel_view import make_kernel_view, sizes_of
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.products import Multiplication
+from psdmc.errors import InternalError
+from psdmc.program.kernel import Kernel
+from psdmc.program.signature import Signature, Sizes, in_order
+from psdmc.robot.mechanism import BASE_FRAME
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionView:
+    """A function with its kernels, baked first.
+
+    shape  of its outputs, and of inputs that are no vectors of all joints, in words
+    """
+
+    name: str
+    meaning: str
+    shape: str
+    signature: Signature
+    kernels: tuple[KernelView, ...]
+
+    @property
+    def has_pivots(self) -> bool:
+        return any(kernel.pivot_order for kernel in self.kernels)
+
+    @property
+    def products(self) -> tuple[Multiplication, ...]:
+        """Those of all kernels."""
+        return tuple(p for kernel in self.kernels for p in kernel.single_body.products)
+
+    @property
+    def limbs(self) -> tuple[int, ...]:
+        """Numbers of limbs in lanes, over all kernels."""
+        return tuple(
+            sorted({count for kernel in self.kernels if kernel.limbs for count in kernel.limbs.counts})
+        )
+
+    @property
+    def units(self) -> tuple[FunctionView, ...]:
+        """One for each C file, which has its name: the whole function, or a kernel each where bodies are in parts."""
+        if not any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels):
+            return (self,)
+        return tuple(replace(self, name=kernel.name, kernels=(kernel,)) for kernel in self.kernels)
+
+    @property
+    def needs_parameters(self) -> bool:
+        return self.signature.theta
+
+
+def function_views(
+    kernels: Mapping[str, Kernel],
+    sizes: Sizes,
+    robot: str,
+    options: EmitOptions,
+    base_frame: str = BASE_FRAME,
+) -> tuple[FunctionView, ...]:
+    """The functions that `kernels` hold, in the order of their signatures, whatever the mapping's order. `base_frame`: what
+    their meanings call it."""
+    wrong = [name for name, kernel in kernels.items() if name != kernel.name]
+    if wrong:
+        raise InternalError(f"kernel {wrong[0]!r} is filed under a name that is not its own")
+    functions = {kernel.function.name: kernel.function for kernel in kernels.values()}
+    views = []
+    for function in in_order(tuple(functions.values())):
+        own = [kernels[name] for name in (function.name, f"{function.name}_theta") if name in kernels]
+        shown = tuple(make_kernel_view(kernel, sizes, robot, options) for kernel in own)
+        shape = _shape(function, sizes_of(own[0], sizes))
+        meaning = function.meaning.replace(BASE_FRAME, base_frame)
+        views.append(FunctionView(function.name, meaning, shape, function, shown))
+    return tuple(views)
+
+
+def _shape(function: Signature, sizes: Sizes) -> str:
+    numbers = [f"{q.name} is a number" for q in function.inputs if not q.axes]
+    told = [q for q in function.inputs if len(q.axes) > 1] + list(function.outputs)
+    return "; ".join([*numbers, *(f"{q.name} is {_lengths(sizes.shape(q.axes))}" for q in told)])
+
+
+def _lengths(shape: tuple[int, ...]) -> str:
+    if not shape:
+        return "1"
+    return str(shape[0]) if len(shape) == 1 else f"{' x '.join(map(str, shape))}, row-major"

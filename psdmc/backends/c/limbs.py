@@ -1,0 +1,275 @@
+"""A kernel whose limbs run in the lanes of a vector, and the vectors that it needs, in the form that templates print."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+from psdmc.backends.c.body import make_body
+from psdmc.backends.c.c_expr import literal
+from psdmc.backends.c.lanes import TransposeStage, transpose_stage
+from psdmc.backends.c.limb_rows import FOUR
+from psdmc.backends.c.limb_stores import StoreView, store_views
+from psdmc.backends.c.lines import Body
+from psdmc.backends.c.options import EmitOptions
+from psdmc.program.cost import Cost, cost
+from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage
+from psdmc.target.vectors import VectorUnit
+
+NARROWEST = 16
+"""Bytes of the narrowest vector."""
+
+
+@dataclass(frozen=True, slots=True)
+class LimbWidth:
+    """`count` limbs in registers of `lanes` reals, the lanes behind the last limb's being filled with the first's."""
+
+    count: int
+    lanes: int
+
+    @property
+    def parts(self) -> int:
+        """Registers."""
+        return -(-self.count // self.lanes)
+
+    @property
+    def filled(self) -> str:
+        """C: initialiser of all parts, from one macro argument per limb."""
+        names = [names_of(self.count)[k if k < self.count else 0] for k in range(self.parts * self.lanes)]
+        parts = (names[k : k + self.lanes] for k in range(0, len(names), self.lanes))
+        return ", ".join(f"{{{', '.join(part)}}}" for part in parts)
+
+    @property
+    def whole(self) -> int:
+        """Parts without a lane to spare."""
+        return self.count // self.lanes
+
+    @property
+    def folds(self) -> tuple[str, ...]:
+        """Lanes in the order in which a whole part is added to itself, half onto half, until two are left."""
+        distances = [self.lanes >> k for k in range(1, self.lanes.bit_length() - 1)]
+        return tuple(", ".join(str(lane ^ distance) for lane in range(self.lanes)) for distance in distances)
+
+    @property
+    def piece(self) -> int:
+        """Neighbours of a limb that a vector of four is made of."""
+        return min(self.lanes, FOUR)
+
+    @property
+    def stages(self) -> tuple[TransposeStage, ...]:
+        """The steps that transpose each square of `piece` vectors and lanes."""
+        return tuple(transpose_stage(self.lanes, distance) for distance in (1, 2) if distance < self.piece)
+
+    @property
+    def beyond(self) -> tuple[int, ...]:
+        """Lanes of the last part that are limbs', where it is not whole."""
+        return tuple(range(self.count % self.lanes))
+
+
+class NamedByCount:
+    """C names of what belongs to a number of limbs."""
+
+    __slots__ = ()
+    count: int
+
+    @property
+    def name(self) -> str:
+        return f"limbs{self.count}"
+
+    @property
+    def macro(self) -> str:
+        return self.name.upper()
+
+
+@dataclass(frozen=True, slots=True)
+class LimbVector(NamedByCount):
+    """The vectors for a number of limbs on every machine of a target.
+
+    widths  possible ones, widest first
+    """
+
+    count: int
+    widths: tuple[LimbWidth, ...]
+    integer: str
+
+    @property
+    def in_fours(self) -> bool:
+        """Whether reals of all limbs fill vectors of four."""
+        return self.count % FOUR == 0
+
+    @property
+    def arguments(self) -> str:
+        return ", ".join(names_of(self.count))
+
+
+def names_of(count: int) -> list[str]:
+    """Names of macro arguments, one per limb."""
+    return [f"limb{k}" for k in range(count)]
+
+
+def limb_vectors(counts: Collection[int], options: EmitOptions) -> tuple[LimbVector, ...]:
+    """Those for groups of these numbers of limbs."""
+    narrowest = NARROWEST // options.real_bytes
+    integer = "long long" if options.real == "float64" else "int"
+    widest = max((unit.bytes // options.real_bytes for unit in options.target.vectors), default=1)
+    found = []
+    for count in sorted(set(counts)):
+        enough = max(narrowest, 1 << (count - 1).bit_length())
+        lanes = [narrowest << k for k in range(8) if narrowest << k <= min(enough, widest)]
+        found.append(LimbVector(count, tuple(LimbWidth(count, each) for each in reversed(lanes)), integer))
+    return tuple(found)
+
+
+def limb_units(vectors: Sequence[LimbVector], options: EmitOptions) -> tuple[VectorUnit, ...]:
+    """Registers that these vectors may be in, beyond those that a target's own code takes."""
+    wanted = {width.lanes * options.real_bytes for vector in vectors for width in vector.widths}
+    halves: list[VectorUnit] = []
+    for unit in options.target.vectors:
+        narrower = unit.half
+        while narrower is not None:
+            halves.append(narrower)
+            narrower = narrower.half
+    return tuple(unit for unit in dict.fromkeys(halves) if unit.bytes in wanted)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """An array with one vector of limbs a row: a name, and rows of C texts, limb by limb."""
+
+    name: str
+    rows: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupView(NamedByCount):
+    """One group of limbs in C.
+
+    inputs    read before anything is computed
+    constants the same at every state; None where there are none
+    arrays    what its stages store: name and number of rows
+    sums      what the core reads of them: its vector, and its length
+    """
+
+    count: int
+    inputs: tuple[Table, ...]
+    constants: Table | None
+    arrays: tuple[tuple[str, int], ...]
+    sums: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StageView:
+    """One stage: its body, then what is done with what it has stored, line by line.
+
+    count  limbs whose lanes compute it; 0: the core
+    """
+
+    count: int
+    body: Body
+    after: tuple[str, ...]
+
+    @property
+    def macro(self) -> str:
+        return f"LIMBS{self.count}"
+
+    @property
+    def header(self) -> str:
+        """What the body's macros mean."""
+        return f"limbs{self.count}.h" if self.count else "one_state.h"
+
+
+@dataclass(frozen=True, slots=True)
+class LimbsView:
+    """A kernel's body for one state with limbs in lanes.
+
+    least   lanes from which on it is taken
+    unused  inputs that it never reads
+    core    reals of the core that other stages read
+    stores  what puts out what limbs have computed, and zeros
+    """
+
+    file: str
+    least: int
+    unused: tuple[str, ...]
+    core: int
+    groups: tuple[GroupView, ...]
+    stages: tuple[StageView, ...]
+    stores: tuple[StoreView, ...]
+    cost: Cost
+
+    @property
+    def core_name(self) -> str:
+        return CORE
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Numbers of limbs of its groups, each once."""
+        return tuple(sorted({group.count for group in self.groups}))
+
+
+def limbs_view(
+    name: str, limbs: LimbProgram, inputs: Sequence[str], sizes: dict[str, int], options: EmitOptions
+) -> LimbsView:
+    """The view of a kernel's limbs; `sizes` are those of its outputs."""
+    suffix = "" if options.real == "float64" else "f"
+    read = {slot.vector for stage in limbs.stages for slot in stage.program.inputs()}
+    read |= {own[0].vector for group in limbs.groups for _, own in group.inputs}
+    groups = {group.number: group for group in limbs.groups}
+    stages = tuple(
+        _stage(stage, None if stage.group is None else groups[stage.group], suffix) for stage in limbs.stages
+    )
+    return LimbsView(
+        file=f"{name}_limbs.inc",
+        least=limbs.least,
+        unused=tuple(each for each in inputs if each not in read),
+        core=_length(limbs.stages, CORE),
+        groups=tuple(_group(group, limbs.stages, suffix) for group in limbs.groups),
+        stages=stages,
+        stores=store_views(limbs, sizes),
+        cost=_whole_cost(limbs),
+    )
+
+
+def _length(stages: Sequence[Stage], vector: str) -> int:
+    return max(
+        (slot.index + 1 for stage in stages for slot, _ in stage.program.outputs if slot.vector == vector),
+        default=0,
+    )
+
+
+def _group(group: LimbGroup, stages: Sequence[Stage], suffix: str) -> GroupView:
+    rows: dict[str, list[str]] = {}
+    for slot, own in group.inputs:
+        rows.setdefault(slot.vector, []).append(", ".join(map(str, own)))
+    numbers = tuple(", ".join(literal(x, suffix).text for x in row) for row in group.constants)
+    arrays = ((vector, _length(stages, vector)) for vector in (group.kept, group.partial, group.output))
+    return GroupView(
+        count=group.count,
+        inputs=tuple(Table(vector, tuple(texts)) for vector, texts in rows.items()),
+        constants=Table(group.constant, numbers) if numbers else None,
+        arrays=tuple((vector, length) for vector, length in arrays if length),
+        sums=tuple((group.sum, length) for length in [_length(stages, group.partial)] if length),
+    )
+
+
+def _stage(stage: Stage, group: LimbGroup | None, suffix: str) -> StageView:
+    if group is None:
+        return StageView(0, make_body(stage.program, (), {}, suffix, stores_early=False), ())
+    own = {group.constant, group.kept} | {slot.vector for slot, _ in group.inputs}
+    shared = frozenset(slot.vector for slot in stage.program.inputs()) - own
+    body = make_body(stage.program, (), {}, suffix, stores_early=True, uniform=shared)
+    return StageView(group.count, body, tuple(_after(stage, group)))
+
+
+def _after(stage: Stage, group: LimbGroup) -> Iterator[str]:
+    for slot, _ in stage.program.outputs:
+        if slot.vector == group.partial:
+            yield f"{group.sum}[{slot.index}] = limbs{group.count}_sum({slot})"
+
+
+def _whole_cost(limbs: LimbProgram) -> Cost:
+    costs = [cost(stage.program) for stage in limbs.stages]
+    mul, add, div, neg, sincos, fused = (
+        sum(getattr(each, name) for each in costs) for name in ("mul", "add", "div", "neg", "sincos", "fused")
+    )
+    return Cost(mul, add, div, neg, sincos, fused)

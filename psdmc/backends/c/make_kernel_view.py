@@ -1,0 +1,160 @@
+"""The KernelView of a kernel: which outputs are written directly, in which files its bodies stand, which forms it has."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from psdmc.backends.c.body import make_body
+from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
+from psdmc.backends.c.limbs import LimbsView, limbs_view
+from psdmc.backends.c.lines import Body
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.parts import body_in_parts, is_long
+from psdmc.backends.c.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
+from psdmc.backends.c.store_groups import GROUP
+from psdmc.errors import InternalError
+from psdmc.program.cost import cost
+from psdmc.program.kernel import Kernel
+from psdmc.program.products import LARGE
+from psdmc.program.program import Program
+from psdmc.program.signature import Quantity, Signature, Sizes
+
+
+def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOptions) -> KernelView:
+    """The kernel as templates print it. InternalError where C takes a quantity's name for something else.
+
+    robot   identifier that the C functions' names start with
+    """
+    function, sizes = _checked(kernel.function), sizes_of(kernel, sizes)
+    has_lanes = options.target.has_batches and not _is_by_state(kernel, sizes)
+    outputs = tuple(
+        OutputView(
+            q.name,
+            sizes.size(q),
+            sizes.shape(q.axes),
+            has_lanes and not function.calls and _is_direct(q, sizes),
+            () if kernel.is_loop_of_calls else _zero(q, kernel.single, sizes),
+        )
+        for q in function.outputs
+    )
+    if function.calls:
+        single_body = lanes_body = Body((), ())
+    else:
+        single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
+    shared = single_body == lanes_body
+    positive = _vector(function.positive.quantity, sizes) if function.positive else None
+    return KernelView(
+        name=kernel.name,
+        function=function,
+        theta=kernel.theta,
+        inputs=tuple(_vector(q, sizes) for q in function.inputs),
+        outputs=outputs,
+        positive=positive,
+        prototypes=_prototypes(function, kernel.theta, robot, options),
+        single_file=f"{kernel.name}.inc",
+        lanes_file=f"{kernel.name}.inc" if shared else f"{kernel.name}_lanes.inc",
+        single_body=single_body,
+        lanes_body=lanes_body,
+        pivot_order=tuple(
+            slot.index for slot, _ in kernel.single.outputs if positive and slot.vector == positive.name
+        ),
+        cost=f"calls of {function.calls}" if kernel.is_loop_of_calls else str(cost(kernel.single)),
+        lowering=kernel.lowering,
+        limbs=_limbs(kernel, sizes, options),
+        places=kernel.places,
+    )
+
+
+def sizes_of(kernel: Kernel, sizes: Sizes) -> Sizes:
+    """The robot's sizes, with the number of entries that this kernel puts out where it packs a matrix."""
+    return replace(sizes, nonzeros=len(kernel.places))
+
+
+def _limbs(kernel: Kernel, sizes: Sizes, options: EmitOptions) -> LimbsView | None:
+    if kernel.limbs is None or not options.target.vectors:
+        return None
+    return limbs_view(kernel.name, kernel.limbs, kernel.inputs, kernel.function.sizes(sizes), options)
+
+
+def _is_by_state(kernel: Kernel, sizes: Sizes) -> bool:
+    return kernel.before is not None and sizes.nv >= LARGE
+
+
+def _bodies(
+    kernel: Kernel, outputs: tuple[OutputView, ...], options: EmitOptions, has_lanes: bool
+) -> tuple[Body, Body]:
+    """For one state and for lanes."""
+    one, lanes = kernel.before or kernel.single, kernel.before or kernel.batch
+    single = _body(kernel, one, outputs, options, has_lanes)
+    if not has_lanes or lanes is one:
+        return single, single
+    return single, _body(kernel, lanes, outputs, options, has_lanes)
+
+
+TAKEN = {
+    *(
+        "V",
+        "LOAD",
+        "STORE",
+        "STORE_GROUP",
+        "STORE_BLOCK",
+        "KEEP",
+        "NAME",
+        "SPLAT",
+        "SINCOS",
+        "SQRT",
+        "LANES",
+        "WIDTH",
+        "real",
+        "lanes",
+        "angles",
+    ),
+    *("DIRECT", "KEEP_DIRECT", "STORE_ZEROS", "PART", "NOT_INLINE", "kept", "kept_reals", "zero"),
+    *("STORE_ZERO", "CLEAR", "cleared"),
+    *("theta_b", "count", "block", "blocks", "lane", "first", "row", "rows", "failed", "bad", "two", "four"),
+}
+"""Names that mean something else in the emitted C where a quantity's name would stand."""
+
+
+def _checked(function: Signature) -> Signature:
+    """The function's signature; InternalError where a quantity's name means something else in the emitted C."""
+    names = [quantity.name for quantity in (*function.inputs, *function.stored)]
+    for name in (*names, *(product.right for product in function.products)):
+        if name in TAKEN:
+            raise InternalError(f"{function.name}: C takes {name!r} for something else")
+    return function
+
+
+def _vector(quantity: Quantity, sizes: Sizes) -> VectorView:
+    return VectorView(quantity.name, sizes.size(quantity), sizes.shape(quantity.axes))
+
+
+def _body(
+    kernel: Kernel, program: Program, outputs: tuple[OutputView, ...], options: EmitOptions, has_lanes: bool
+) -> Body:
+    """The body. Large outputs are stored as they are computed, as keeping them all until the end would spill them."""
+    sizes = {output.name: output.size for output in outputs}
+    suffix = "" if options.real == "float64" else "f"
+    has_matrix = any(output.is_matrix for output in kernel.function.outputs)
+    direct = tuple(output.name for output in outputs if output.direct)
+    products = kernel.function.products if kernel.before else ()
+    in_lines = bool(products) and has_lanes  # lanes' products take values from the lines before them
+    make = body_in_parts if is_long(program, sizes) and not in_lines else make_body
+    return make(program, kernel.inputs, sizes, suffix, has_matrix, direct, products)
+
+
+def _zero(output: Quantity, program: Program, sizes: Sizes) -> tuple[int, ...]:
+    """Entries that the PROGRAM does not store, or stores as the constant zero."""
+    values = {slot.index: program.body[i].value for slot, i in program.outputs if slot.vector == output.name}
+    return tuple(index for index in range(sizes.size(output)) if values.get(index, 0.0) == 0.0)
+
+
+def _is_direct(output: Quantity, sizes: Sizes) -> bool:
+    return output.is_matrix and sizes.size(output) >= GROUP
+
+
+def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:
+    """Prototypes by form, for the forms that the target has."""
+    variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
+    made = (prototype(function, variant, robot, options.c_real) for variant in variants)
+    return dict(zip(options.target.forms, made, strict=False))

@@ -1,0 +1,86 @@
+"""Untrusted text on its way into C: names become identifiers, the rest is escaped.
+
+A robot file may name its robot `a; system("x")`. Nothing of such a name may leave the identifier, the string
+or the comment that it is put into.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from importlib import resources
+
+LONGEST = 63
+"""Characters of an identifier: what C99 lets a compiler limit internal names to."""
+
+LISTS = ("languages", "c_and_posix", "cmake", "libraries", "windows")
+"""Files of reserved/: keywords of C and C++ and what compilers predefine for their platforms; everything that the C and
+POSIX headers declare or define (tests/backends/c/platform_names.py makes and checks it); CMake's targets, variables and find
+modules; libraries that linkers look for by themselves; Windows' devices and windows.h's macros.
+
+A robot's name stands alone as a C++ namespace, a CMake target and package, a folder and lib<name>: there it must not meet
+another's. Everywhere else it is a prefix."""
+
+
+def _listed() -> frozenset[str]:
+    texts = (resources.files("psdmc.backends.c").joinpath(f"reserved/{name}.txt") for name in LISTS)
+    return frozenset(word for text in texts for word in text.read_text(encoding="ascii").split())
+
+
+RESERVED = _listed()
+DEVICE = re.compile(r"con|prn|aux|nul|conin|conout|com\d|lpt\d", re.IGNORECASE)
+"""Windows takes these for devices in any case of letters."""
+
+
+def is_reserved(word: str) -> bool:
+    """Whether a robot of this very name would meet somebody else's."""
+    return word in RESERVED or DEVICE.fullmatch(word) is not None
+
+
+def identifier(name: str) -> str:
+    """A C and C++ identifier for `name`: ASCII letters, digits and single underscores, never a word of RESERVED.
+
+    Names that are free identifiers already stay as they are; a reserved one gets robot_ before it; one that loses all
+    its characters, or is too long, ends with a digest of the original, so that different names stay apart.
+    """
+    cleaned = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
+    if not cleaned:
+        return f"robot_{_digest(name)}"
+    if cleaned[0].isdigit() or is_reserved(cleaned):
+        cleaned = f"robot_{cleaned}"
+    if len(cleaned) > LONGEST:
+        digest = _digest(name)
+        cleaned = f"{cleaned[: LONGEST - len(digest) - 1].rstrip('_')}_{digest}"
+    return cleaned
+
+
+def c_string(text: str) -> str:
+    """A C string literal of `text` as UTF-8: plain ASCII stays readable, everything else is an octal escape.
+
+    Octal escapes end after three digits whatever follows; '?' is escaped too, so that no trigraph can form.
+    """
+    plain = {ord('"'): '\\"', ord("\\"): "\\\\", ord("?"): "\\?"}
+    body = "".join(
+        plain.get(byte) or (chr(byte) if 32 <= byte < 127 else f"\\{byte:03o}") for byte in _utf8(text)
+    )
+    return f'"{body}"'
+
+
+def c_comment(text: str) -> str:
+    """`text` as it may stand inside a C comment: one line of ASCII that neither ends nor nests a comment.
+
+    A '\\' could join lines, '/' beside '*' could open or close, '??' could be a trigraph: each is broken up.
+    """
+    ascii_text = "".join(chr(byte) if 32 <= byte < 127 else f"<{byte:02x}>" for byte in _utf8(text))
+    for dangerous, harmless in (("\\", "<5c>"), ("*/", "* /"), ("/*", "/ *"), ("??", "? ?")):
+        while dangerous in ascii_text:
+            ascii_text = ascii_text.replace(dangerous, harmless)
+    return ascii_text
+
+
+def _utf8(text: str) -> bytes:
+    return text.encode("utf-8", errors="surrogatepass")
+
+
+def _digest(name: str) -> str:
+    return hashlib.sha256(_utf8(name)).hexdigest()[:8]

@@ -1,0 +1,274 @@
+"""The emitted package in the form that templates print, from metadata and kernels."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from psdmc.backends.c.adapters import chosen
+from psdmc.backends.c.bodies_view import BodiesView
+from psdmc.backends.c.cpp import CppClass, cpp_classes
+from psdmc.backends.c.describe import description, uses_frames
+from psdmc.backends.c.friction import FrictionView
+from psdmc.backends.c.function_view import FunctionView, function_views
+from psdmc.backends.c.info import PackageInfo
+from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.names import identifier
+from psdmc.backends.c.options import CReal, EmitOptions
+from psdmc.backends.c.patterns import Pattern, patterns
+from psdmc.backends.c.payload_view import PayloadView
+from psdmc.backends.c.products import Shape
+from psdmc.backends.c.prototypes import Prototype, friction_prototype
+from psdmc.backends.c.reals import check_range
+from psdmc.backends.c.reference_states import ReferenceStates
+from psdmc.backends.c.references import ReferenceView, reference_view
+from psdmc.backends.c.self_test import given_vectors, labels
+from psdmc.backends.c.self_test_view import SelfTestView
+from psdmc.backends.c.tables import Table, tables
+from psdmc.backends.c.vectors_view import VectorsView
+from psdmc.errors import InputError
+from psdmc.functions import RECIPES
+from psdmc.garbage import collecting_rarely
+from psdmc.program.kernel import Kernel
+from psdmc.target.flags import ARITHMETIC, GCC_ONLY
+from psdmc.target.target import Target
+
+ON_MANIFOLD = tuple(name for name, recipe in RECIPES.items() if recipe.default_where_wide)
+"""Functions that lead from one q to another."""
+
+
+@dataclass(frozen=True, slots=True)
+class PackageView:
+    """One package, in the form that templates print.
+
+    robot     identifier that every symbol starts with
+    adapters  names of psdmc.backends.c.adapters
+    """
+
+    robot: str
+    info: PackageInfo
+    options: EmitOptions
+    functions: tuple[FunctionView, ...]
+    references: ReferenceView | None
+    adapters: tuple[str, ...] = ()
+
+    @property
+    def n(self) -> int:
+        return self.info.n
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom: length of rates and torques."""
+        return self.info.nv
+
+    @property
+    def size_macros(self) -> dict[str, int]:
+        """Further sizes of the header: name and value. Of joints, q and rates where they are not equally many; of bodies;
+        of sparse matrices' patterns."""
+        wide = {"JOINTS": self.n, "NQ": self.info.nq, "NV": self.info.nv} if self.info.is_wide else {}
+        wide |= {"BODIES": len(self.info.bodies.links)} if self.info.bodies else {}
+        return wide | {pattern.macro: len(pattern.places) for pattern in self.patterns}
+
+    @property
+    def patterns(self) -> tuple[Pattern, ...]:
+        """Of packed matrices, and of trees' sparse ones: a serial chain's zeros are few."""
+        found = patterns(self.functions)
+        return tuple(each for each in found if each.is_packed or (self.info.is_tree and each.is_sparse))
+
+    @property
+    def l(self) -> int:  # noqa: E743
+        return self.info.l
+
+    @property
+    def real(self) -> CReal:
+        return self.options.c_real
+
+    @property
+    def lanes(self) -> int:
+        return self.options.lanes
+
+    @property
+    def target(self) -> Target:
+        return self.options.target
+
+    @property
+    def arithmetic_flags(self) -> str:
+        """Compiler flags that suit the C on every machine."""
+        return " ".join(ARITHMETIC)
+
+    @property
+    def gcc_flags(self) -> str:
+        """Further flags for GCC alone."""
+        return " ".join(GCC_ONLY)
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of constants and libm functions."""
+        return "" if self.real == "double" else "f"
+
+    @property
+    def vectors(self) -> VectorsView:
+        counts = tuple(count for function in self.functions for count in function.limbs)
+        return VectorsView(self.robot, self.options, counts)
+
+    @property
+    def description(self) -> tuple[str, ...]:
+        return description(self.info, self.options, self.functions, self.uses_frames)
+
+    @property
+    def tables(self) -> tuple[Table, ...]:
+        own = tables(self.info, self.robot, self.real, self.uses_frames, self.target.texts)
+        return (*own, *(pattern.table(self.robot) for pattern in self.patterns))
+
+    @property
+    def table_declarations(self) -> tuple[str, ...]:
+        return tuple(f"extern {table.declaration}" for table in self.tables)
+
+    @property
+    def cpp_classes(self) -> tuple[CppClass, ...]:
+        return cpp_classes(self.functions, self.dof)
+
+    @property
+    def cpp_sizes(self) -> dict[str, int]:
+        """Constants of the C++ classes."""
+        sizes = {"dof": self.dof, "base_parameters": self.l, "lanes": self.lanes}
+        sizes |= {name.lower(): value for name, value in self.size_macros.items()}
+        return sizes | ({"frames": len(self.info.frames)} if self.uses_frames else {})
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """C files of the library, relative to the package."""
+        payload = ("src/payload.c",) if self.info.payload else ()
+        bodies = ("src/bodies.c",) if self.info.bodies else ()
+        friction = ("src/friction.c",) if self.info.friction else ()
+        functions = (f"src/{unit.name}.c" for function in self.functions for unit in function.units)
+        return ("src/tables.c", *functions, *payload, *bodies, *friction)
+
+    @property
+    def friction(self) -> FrictionView | None:
+        """The calibrated friction, where the package has its function."""
+        return FrictionView(self.info.friction, self.real) if self.info.friction else None
+
+    @property
+    def friction_prototype(self) -> Prototype:
+        return friction_prototype(self.robot, self.real)
+
+    @property
+    def payload(self) -> PayloadView | None:
+        """The functions that add a load to theta_b, where the package has them."""
+        return PayloadView(self.robot, self.real, self.info.payload) if self.info.payload else None
+
+    @property
+    def bodies(self) -> BodiesView | None:
+        """The function that computes theta_b from all bodies, where the package has it."""
+        return BodiesView(self.robot, self.real, self.info.bodies) if self.info.bodies else None
+
+    @property
+    def version(self) -> str:
+        """psdmc's version as the three numbers that CMake and pkg-config compare."""
+        found = re.match(r"(\d+)\.(\d+)(?:\.(\d+))?", self.info.psdmc_version)
+        return ".".join(part or "0" for part in found.groups()) if found else "0.0.0"
+
+    @property
+    def pivot_size(self) -> int:
+        """Number of entries that must be positive, where the outputs that become NaN are one vector of that length."""
+        found = (k.positive.size for k in self.kernels if k.positive and k.fails_alone)
+        return next(found, self.n)
+
+    @property
+    def self_test(self) -> SelfTestView:
+        own = self.references
+        known = () if own is None else own.expected
+        loads = 0 if own is None or own.load is None or self.payload is None else len(self.payload.prototypes)
+        beside = loads + bool(self.info.friction) + bool(self.info.bodies)
+        return SelfTestView(self.kernels, self.dof, self.options, known, beside)
+
+    @property
+    def kernels(self) -> tuple[KernelView, ...]:
+        return tuple(kernel for function in self.functions for kernel in function.kernels)
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether some kernel writes one output's rows from registers and another's from a block."""
+        return any(kernel.is_mixed for kernel in self.kernels)
+
+    @property
+    def fails_in_several(self) -> bool:
+        """Whether some kernel that fails sets more than one vector of all joints to NaN."""
+        return any(kernel.positive and not kernel.fails_alone for kernel in self.kernels)
+
+    @property
+    def products(self) -> tuple[Shape, ...]:
+        """Of those that some kernel does behind its PROGRAM, each once."""
+        return tuple(sorted({p.shape for function in self.functions for p in function.products}))
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether some body is several functions."""
+        return any(kernel.single_body.parts or kernel.lanes_body.parts for kernel in self.kernels)
+
+    @property
+    def has_clears(self) -> bool:
+        """Whether some body clears runs of zeros."""
+        return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self.kernels)
+
+    @property
+    def has_roots(self) -> bool:
+        """Whether some kernel takes square roots."""
+        bodies = (body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body))
+        return any(body.has_roots for body in bodies)
+
+    @property
+    def multiplies_lanes(self) -> bool:
+        """Whether such products are made of lanes, too."""
+        own = (kernel for kernel in self.kernels if kernel.single_body.products)
+        return self.target.has_batches and any(not kernel.by_state for kernel in own)
+
+    @property
+    def leads_on(self) -> bool:
+        """Whether q is longer than the rates, and the package has what leads from one q to another."""
+        names = {function.name for function in self.functions}
+        return self.info.is_wide and all(recipe in names for recipe in ON_MANIFOLD)
+
+    @property
+    def failing(self) -> tuple[FunctionView, ...]:
+        """Functions that can fail."""
+        return tuple(function for function in self.functions if function.has_pivots)
+
+    @property
+    def uses_frames(self) -> bool:
+        """Whether some function is about the named frames."""
+        return uses_frames(self.functions) or bool(self.info.payload)
+
+
+@collecting_rarely()
+def package_view(
+    info: PackageInfo,
+    kernels: Mapping[str, Kernel],
+    options: EmitOptions,
+    references: ReferenceStates | None = None,
+    adapters: Sequence[str] = (),
+) -> PackageView:
+    """The package with all decisions made. InputError where there is nothing to emit, or an adapter is not possible."""
+    if not kernels:
+        raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
+    if info.l == 0:
+        raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
+    check_range(info, kernels, options.c_real)
+    if info.friction and options.trig == "freestanding":
+        raise InputError(
+            f"{info.name}: friction needs tanh, which is libm's, and the package is freestanding",
+            "emit it with --trig inline, or leave --friction out",
+        )
+    robot = identifier(info.name)
+    functions = function_views(kernels, info.sizes, robot, options, info.base_frame)
+    package = PackageView(robot, info, options, functions, None, chosen(adapters))
+    if references is None:
+        return package
+    vectors, takes_theta = (
+        given_vectors(package.kernels, package.dof),
+        any(kernel.theta for kernel in package.kernels),
+    )
+    view = reference_view(references, options.c_real, vectors, labels(package.kernels), takes_theta)
+    return replace(package, references=view)

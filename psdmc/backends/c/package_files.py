@@ -1,0 +1,108 @@
+"""The text of every file of the emitted package, from its view. This module writes nothing to disk."""
+
+from __future__ import annotations
+
+from psdmc.backends.c.adapters import ADAPTERS
+from psdmc.backends.c.function_view import FunctionView
+from psdmc.backends.c.manifest import manifest
+from psdmc.backends.c.package import PackageView
+from psdmc.backends.c.render import render
+
+
+def package_files(package: PackageView) -> dict[str, str]:
+    """Path -> text for every file, manifest.json (which hashes the others) last."""
+    files = library_files(package)
+    files |= {path: render(template, package=package) for path, template in _build_files(package)}
+    if package.references is not None:
+        files["test/self_test.c"] = render("self_test.c.jinja", package=package)
+        for name in ("reference", "layouts", "compare"):
+            files[f"test/{name}.h"] = render(f"{name}.h.jinja", package=package)
+    for adapter in package.adapters:
+        files[f"{adapter}/{package.robot}_{adapter}.c"] = ADAPTERS[adapter](
+            package.robot, package.real, package.kernels, package.info.nq > package.info.nv
+        )
+    files = {path: licensed(path, text) for path, text in files.items()}
+    files["manifest.json"] = manifest(package.robot, package.info, package.options, package.functions, files)
+    return files
+
+
+C_SUFFIXES = (".c", ".h", ".hpp", ".inc")
+SPDX = "SPDX-License-Identifier"
+LICENCE = f"/* {SPDX}: 0BSD */\n"
+"""First line of each C file: the code is its user's, without any obligation."""
+
+
+def licensed(path: str, text: str) -> str:
+    """The text of a file with its licence, where it is C."""
+    return LICENCE + text if path.endswith(C_SUFFIXES) else text
+
+
+_FOR_BATCHES = {
+    "src/lane_states.h": "lane_states.h.jinja",
+    "src/rows.h": "rows.h.jinja",
+    "src/lane_rows.h": "lane_rows.h.jinja",
+    "src/groups.h": "groups.h.jinja",
+}
+
+
+def library_files(package: PackageView) -> dict[str, str]:
+    """The library alone: headers and sources."""
+    trig = "sincos_libm.h.jinja" if package.options.trig == "libm" else "sincos_inline.h.jinja"
+    named = {
+        f"include/{package.robot}/{package.robot}.h": "header.h.jinja",
+        f"include/{package.robot}/{package.robot}.hpp": "header.hpp.jinja",
+        "src/tables.c": "tables.c.jinja",
+        "src/internal.h": "internal.h.jinja",
+        "src/vectors.h": "vectors.h.jinja",
+        "src/sincos.h": trig,
+        "src/one_state.h": "one_state.h.jinja",
+        **(_FOR_BATCHES if package.target.has_batches else {}),
+        "src/pivots.h": "pivots.h.jinja",
+    }
+    if package.products:
+        named["src/products.h"] = "products.h.jinja"
+    if package.has_roots:
+        named["src/roots.h"] = "roots.h.jinja"
+    files = {path: render(template, package=package) for path, template in named.items()}
+    for vector in package.vectors.of_limbs:
+        files[f"src/{vector.name}.h"] = render("limbs.h.jinja", package=package, limbs=vector)
+    for function in package.functions:
+        for unit in function.units:
+            files[f"src/{unit.name}.c"] = render(_template(package, unit), package=package, function=unit)
+        for kernel in function.kernels:
+            if kernel.called:
+                continue
+            bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
+            for file, body in bodies.items():
+                files[f"src/{file}"] = render("body.inc.jinja", body=body)
+            parts = {kernel.single_parts: kernel.single_body, kernel.lanes_parts: kernel.lanes_body}
+            for file, body in parts.items():
+                if body.parts:
+                    files[f"src/{file}"] = render("parts.inc.jinja", body=body)
+            if kernel.limbs:
+                files[f"src/{kernel.limbs.file}"] = render("limbs.inc.jinja", limbs=kernel.limbs)
+    if package.info.payload:
+        files["src/payload.c"] = render("payload.c.jinja", package=package)
+    if package.info.bodies:
+        files["src/bodies.c"] = render("bodies.c.jinja", package=package)
+    if package.info.friction:
+        files["src/friction.c"] = render("friction.c.jinja", package=package)
+    return files
+
+
+def _template(package: PackageView, function: FunctionView) -> str:
+    if not function.signature.calls:
+        return "function.c.jinja"
+    return "stages_wide.c.jinja" if package.info.is_wide else "stages.c.jinja"
+
+
+def _build_files(package: PackageView) -> tuple[tuple[str, str], ...]:
+    return (
+        ("CMakeLists.txt", "CMakeLists.txt.jinja"),
+        (f"cmake/{package.robot}Config.cmake.in", "Config.cmake.in.jinja"),
+        (f"{package.robot}.pc.in", "pc.in.jinja"),
+        ("Makefile", "Makefile.jinja"),
+        ("README.md", "README.md.jinja"),
+        ("LICENSE", "LICENSE.jinja"),
+        ("package.xml", "package.xml.jinja"),
+    )

@@ -1,0 +1,36 @@
+"""The functions that add a load to theta_b, as templates print them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.backends.c.options import CReal
+from psdmc.backends.c.prototypes import Prototype, payload_prototypes
+from psdmc.backends.c.tables import number
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PayloadView:
+    """Of one robot, printed for one real type.
+
+    matrices  (l, 10) each: from a load's ten inertial parameters to what it adds to theta_b, at the tip and each frame
+    """
+
+    robot: str
+    real: CReal
+    matrices: tuple[NDArray[np.float64], ...]
+
+    @property
+    def prototypes(self) -> tuple[Prototype, Prototype]:
+        return payload_prototypes(self.robot, self.real)
+
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """Each matrix's rows as C text."""
+        return tuple(
+            tuple(", ".join(number(value, self.real) for value in row) for row in matrix.tolist())
+            for matrix in self.matrices
+        )

@@ -1,0 +1,75 @@
+"""Reference states as C text, for the package's own test."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.backends.c.reference_load import LoadView, load_view
+from psdmc.backends.c.reference_states import ReferenceStates
+from psdmc.backends.c.self_test import GivenVector
+from psdmc.backends.c.tables import number
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceTable:
+    """One constant array: its name, entries per row, and its rows as C text."""
+
+    name: str
+    columns: int
+    rows: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceView:
+    """References as C text.
+
+    tables    the states' vectors, then each output's expected values
+    expected  labels of the outputs that have such a table
+    theta_b   the run-time parameters, one constant each; empty where no kernel takes any
+    load      a load and what it adds to theta_b, where the package has functions that add loads
+    """
+
+    count: int
+    tables: tuple[ReferenceTable, ...]
+    expected: tuple[str, ...]
+    theta_b: tuple[str, ...]
+    load: LoadView | None = None
+
+
+def reference_view(
+    references: ReferenceStates,
+    real: str,
+    vectors: Collection[GivenVector],
+    labels: Collection[str],
+    takes_theta: bool,
+) -> ReferenceView:
+    """The states as C constants: the vectors that the package's kernels take, and the expected outputs (by label).
+
+    ValueError where the states are of another robot.
+    """
+    sizes = {vector.name: vector.size for vector in vectors}
+    given = []
+    for name, array in references.given.items():
+        if name not in sizes:
+            continue
+        if array.shape[1] != sizes[name]:
+            raise ValueError(
+                f"reference states have {array.shape[1]} entries of {name}, expected {sizes[name]}"
+            )
+        given.append(_table(f"{name}_given", array, real))
+    known = tuple(label for label in labels if label in references.expected)
+    expected = [_table(f"{label}_expected", references.expected[label], real) for label in known]
+    theta_b = tuple(number(value, real) for value in references.theta_b.tolist()) if takes_theta else ()
+    load = None if references.load is None else load_view(references.load, real)
+    count = len(next(iter(references.given.values())))
+    return ReferenceView(count, (*given, *expected), known, theta_b, load)
+
+
+def _table(name: str, array: NDArray[np.float64], real: str) -> ReferenceTable:
+    rows: Sequence[Sequence[float]] = np.asarray(array, float).tolist()
+    texts = tuple(", ".join(number(value, real) for value in row) for row in rows)
+    return ReferenceTable(name, array.shape[1], texts)

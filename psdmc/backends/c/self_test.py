@@ -1,0 +1,139 @@
+"""The calls of the package's own test: every function in every layout, compared with the reference states."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.prototypes import Prototype
+from psdmc.program.signature import TAU
+
+TOLERANCES = {"float64": "1e-10", "float32": "1e-3"}
+FORWARD_TOLERANCES = {"float64": "1e-7", "float32": "1e-1"}
+"""Relative to a joint's largest value: large enough for badly conditioned mass matrices, small enough to detect wrong
+code."""
+
+ROWS = ("6", "nv")
+"""First axes of outputs of which each row is compared relative to its own largest value; other outputs are compared
+relative to the largest of all entries."""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenVector:
+    """An input by the reference states' name, `size` reals per state; `of_joints`: one entry per joint."""
+
+    name: str
+    size: int
+    of_joints: bool
+
+    @property
+    def length(self) -> str:
+        """Its size as C text."""
+        return "N" if self.of_joints else str(self.size)
+
+    @property
+    def repeat(self) -> str:
+        """C that fills its rows and lanes."""
+        places = f"{self.name}_rows, {self.name}_lanes"
+        if self.of_joints:
+            return f"repeat({self.name}_given, {places})"
+        return f"repeat_sized({self.size}, {self.name}_given[0], {places})"
+
+
+@dataclass(frozen=True, slots=True)
+class SelfCheck:
+    """One output of a kernel that is called state by state, row by row and, where it has that form, lane by lane.
+
+    rows, columns  of the output per state
+    single         C call for one state, `row` being its number
+    batch, lanes   C calls for `count` states, row by row and lane by lane; '' where there is no such form
+    status         whether the calls return one
+    expected       array of the expected values; '' where no reference state has any
+    """
+
+    kernel: str
+    name: str
+    rows: int
+    columns: int
+    single: str
+    batch: str
+    lanes: str
+    status: bool
+    expected: str
+    tolerance: str
+
+    @property
+    def size(self) -> int:
+        return self.rows * self.columns
+
+
+def self_checks(
+    kernels: Iterable[KernelView], n: int, options: EmitOptions, known: Collection[str]
+) -> tuple[SelfCheck, ...]:
+    """One check per output of each kernel. `known` are the labels of outputs whose values the reference states hold."""
+    return tuple(
+        _check(kernel, k, n, options, known) for kernel in kernels for k in range(len(kernel.outputs))
+    )
+
+
+def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, ...]:
+    """Inputs of all these kernels, by the reference states' names, each once."""
+    return tuple(
+        dict.fromkeys(
+            GivenVector(_given(kernel, v.name), v.size, v.size == n)
+            for kernel in kernels
+            for v in kernel.inputs
+        )
+    )
+
+
+def labels(kernels: Iterable[KernelView]) -> tuple[str, ...]:
+    """Labels of all outputs of these kernels."""
+    return tuple(_label(kernel, k) for kernel in kernels for k in range(len(kernel.outputs)))
+
+
+def _label(kernel: KernelView, k: int) -> str:
+    return kernel.function.label(kernel.function.outputs[k], kernel.theta)
+
+
+def _check(kernel: KernelView, k: int, n: int, options: EmitOptions, known: Collection[str]) -> SelfCheck:
+    """The check of output number k; the kernel's other outputs are written to an array that is not compared."""
+    quantity, output, label = kernel.function.outputs[k], kernel.outputs[k], _label(kernel, k)
+    rows = output.shape[0] if quantity.axes and quantity.axes[0] in ROWS else 1
+    prototypes = kernel.prototypes
+    theta = ["theta_b_given"] if kernel.theta else []
+    names = [_given(kernel, vector.name) for vector in kernel.inputs]
+    each = [f"{given.name}_rows + row * {given.length}" for given in given_vectors([kernel], n)]
+    batch, lanes = (
+        ["count", *(f"{name}_rows" for name in names)],
+        ["count", *(f"{name}_lanes" for name in names)],
+    )
+    tolerances = FORWARD_TOLERANCES if kernel.positive else TOLERANCES
+
+    def found(place: str) -> list[str]:
+        return [place if i == k else f"unseen[{i}]" for i in range(len(kernel.outputs))]
+
+    return SelfCheck(
+        kernel=kernel.name,
+        name=label,
+        rows=rows,
+        columns=output.size // rows,
+        single=_call(prototypes["single"], [*each, *theta, *found(f"found + row * {output.size}")]),
+        batch=_call(prototypes["batch"], [*batch, *theta, *found("found")]) if "batch" in prototypes else "",
+        lanes=_call(prototypes["batch_soa"], [*lanes, *found("blocks")]) if "batch_soa" in prototypes else "",
+        status=kernel.positive is not None,
+        expected=f"{label}_expected" if label in known else "",
+        tolerance=tolerances[options.real],
+    )
+
+
+def _call(prototype: Prototype, arguments: list[str]) -> str:
+    call = f"{prototype.symbol}({', '.join(arguments)})"
+    return call if prototype.returns == "void" else f"status |= {call} != 0"
+
+
+def _given(kernel: KernelView, vector: str) -> str:
+    """The reference states' name of an input: torques have one with the compiled-in parameters and one with theta_b."""
+    return f"{vector}_theta" if kernel.theta and vector == TAU.name else vector

@@ -1,0 +1,63 @@
+"""The package's own test in the form that its templates print: calls, inputs, and the sizes of its buffers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from psdmc.backends.c.kernel_view import KernelView
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.self_test import TOLERANCES, GivenVector, SelfCheck, given_vectors, self_checks
+
+
+@dataclass(frozen=True, slots=True)
+class SelfTestView:
+    """The self-test of one package.
+
+    kernels  of all its functions
+    dof      length of rates and torques
+    known    labels of the outputs whose values the reference states hold
+    beside   number of further C functions that it compares: of loads, bodies and friction
+    """
+
+    kernels: tuple[KernelView, ...]
+    dof: int
+    options: EmitOptions
+    known: tuple[str, ...]
+    beside: int
+
+    @property
+    def checks(self) -> tuple[SelfCheck, ...]:
+        """Every kernel's calls; those without a reference value are marked."""
+        return self_checks(self.kernels, self.dof, self.options, self.known)
+
+    @property
+    def functions(self) -> int:
+        """Number of C functions whose values are compared: kernels, loads, bodies and friction."""
+        return len({check.kernel for check in self.checks if check.expected}) + self.beside
+
+    @property
+    def load_tolerance(self) -> str:
+        """Of the functions that give theta_b."""
+        return TOLERANCES[self.options.real]
+
+    @property
+    def given(self) -> tuple[GivenVector, ...]:
+        """Inputs of all kernels, by the reference states' names."""
+        return given_vectors(self.kernels, self.dof)
+
+    @property
+    def given_otherwise(self) -> bool:
+        """Whether some input is not a vector with one entry per joint."""
+        return not all(vector.of_joints for vector in self.given)
+
+    @property
+    def largest_output(self) -> int:
+        return max(output.size for kernel in self.kernels for output in kernel.outputs)
+
+    @property
+    def has_several_outputs(self) -> bool:
+        return self.most_outputs > 1
+
+    @property
+    def most_outputs(self) -> int:
+        return max(len(kernel.outputs) for kernel in self.kernels)

@@ -1,0 +1,90 @@
+"""Constant tables of the package: joint names and limits, gravity, base parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from psdmc.backends.c.info import PackageInfo
+from psdmc.backends.c.names import c_string
+from psdmc.backends.c.reals import rounded_out
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One constant array in C and, as a constexpr member, in C++.
+
+    name          without the robot's prefix
+    declaration   in C, without `extern`
+    entries       as C text
+    cpp_type      element and length in C++: 'Real, dof'
+    cpp_entries   as C++ text
+    """
+
+    name: str
+    declaration: str
+    entries: tuple[str, ...]
+    cpp_type: str
+    cpp_entries: tuple[str, ...]
+    is_text: bool = False
+
+
+def tables(
+    info: PackageInfo, robot: str, real: str, with_frames: bool = False, with_texts: bool = True
+) -> tuple[Table, ...]:
+    """All tables of a package, in the header's order; texts only where the target has them."""
+    lengths = {"dof": f"{robot}_DOF", "base_parameters": f"{robot}_BASE_PARAMETERS", "3": "3"}
+    lengths |= {"frames": f"{robot}_FRAMES", "joints": f"{robot}_JOINTS"}
+
+    def numbers(name: str, length: str, values: Iterable[float | None]) -> Table:
+        kept = tuple(values)
+        entries = tuple(number(value, real) for value in kept)
+        cpp_entries = tuple(_cpp_number(value, real) for value in kept)
+        declaration = f"const {real} {robot}_{name}[{lengths[length]}]"
+        return Table(name, declaration, entries, f"Real, {length}", cpp_entries)
+
+    def texts(name: str, length: str, values: Iterable[str]) -> Table:
+        entries = tuple(map(c_string, values))
+        declaration = f"const char *const {robot}_{name}[{lengths[length]}]"
+        return Table(name, declaration, entries, f"const char *, {length}", entries, is_text=True)
+
+    joints, parameters = info.joints, info.parameters
+    frames = (texts("frame_names", "frames", info.frames),) if with_frames else ()
+    each = "joints" if info.is_wide else "dof"
+    every = (
+        texts("joint_names", each, (joint.name for joint in joints)),
+        texts("joint_units", each, (joint.unit for joint in joints)),
+        numbers("position_lower", each, (joint.lower for joint in joints)),
+        numbers("position_upper", each, (joint.upper for joint in joints)),
+        numbers("speed_limit", each, (joint.speed for joint in joints)),
+        numbers("acceleration_limit", each, (joint.acceleration for joint in joints)),
+        numbers("effort_limit", each, (joint.effort for joint in joints)),
+        numbers("gravity_acceleration", "3", info.gravity),
+        numbers("theta_b", "base_parameters", (parameter.value for parameter in parameters)),
+        texts("base_parameter_equations", "base_parameters", (p.equation for p in parameters)),
+        texts("base_parameter_units", "base_parameters", (p.unit for p in parameters)),
+        *frames,
+    )
+    return every if with_texts else tuple(table for table in every if not table.is_text)
+
+
+def _cpp_number(value: float | None, real: str) -> str:
+    """A real constant in C++, where C's macros would be old-style casts."""
+    if value is None or math.isnan(value):
+        return "std::numeric_limits<Real>::quiet_NaN()"
+    value = rounded_out(value, real)
+    if math.isinf(value):
+        return f"{'-' if value < 0 else ''}std::numeric_limits<Real>::infinity()"
+    return number(value, real)
+
+
+def number(value: float | None, real: str) -> str:
+    """A real constant. None (unknown) is written as NaN; a number that `real` cannot hold as the infinity or zero it
+    rounds to. tcc takes no minus before INFINITY in a constant, so that minus infinity is a product."""
+    if value is None or math.isnan(value):
+        return f"({real})NAN"
+    value = rounded_out(value, real)
+    if math.isinf(value):
+        return f"({real})INFINITY" if value > 0 else f"({real})(-1e300 * 1e300) /* -INFINITY */"
+    return f"{float(value)!r}{'' if real == 'double' else 'f'}"

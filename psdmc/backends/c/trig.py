@@ -1,0 +1,196 @@
+"""The numbers and names of the inline sincos in the generated C: views for `templates/trig/`.
+
+    q = k pi/2 + r,  k = round(2 q / pi),  |r| <= pi/4        pi/2 in parts whose products with k are exact
+    sin r = r - r^3 P(r^2)        cos r = 1 - r^2/2 + r^4 Q(r^2)
+
+and k mod 4 says which of the two is sine, which cosine, and their signs. docs/trigonometry.md derives the
+error bounds; tests/trig/minimax.py is where the numbers come from, and a test holds them to it.
+
+How a generated C file gets it, `templates/trig/` being rendered with `trig=` one of these views:
+
+    preamble.jinja         trig_preamble(prefix, real, far)       once per C file
+    #if HAS_VECTORS                                               (psdmc/target/vectors.py)
+    types.jinja            vector_trig(prefix, real, unit, far)   unless the file has such types itself
+    sincos_vector.jinja    the same view                          <symbol>(const vec *x, vec *s, vec *c)
+    #else
+    sincos_scalar.jinja    scalar_trig(prefix, real, far)         <symbol>(const real *x, real *s, real *c)
+    #endif
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from psdmc.backends.c.trig_numbers import NUMBERS, Constants, Real, constants, plain_number
+from psdmc.target.vectors import VectorUnit
+
+Far = Literal["libm", "nan"]
+"""The result for an angle beyond the limit: libm's sine and cosine on a rare branch, or NaN (freestanding)."""
+
+SIGNED: dict[Real, str] = {"double": "long long", "float": "int"}
+"""Signed integer as wide as a real, in C's spelling for GCC's builtins."""
+
+
+@dataclass(frozen=True, slots=True)
+class AnySign:
+    """C test whether any lane of `*bits` is negative: `c` where `guard` is defined, else `plain` < 0; no guard: always."""
+
+    guard: str
+    c: str
+    plain: str
+
+
+@dataclass(frozen=True, slots=True)
+class TrigPreamble:
+    """View of preamble.jinja."""
+
+    macro: str
+    real: Real
+    uses_libm: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ScalarTrig:
+    """View of sincos_scalar.jinja: vec is the real type itself, ivec an unsigned integer of its size (vectors: signed).
+
+    rounded  integer that k is converted to
+    """
+
+    macro: str
+    symbol: str
+    about: str
+    real: Real
+    integer: str
+    vec: str
+    ivec: str
+    to_bits: str
+    to_real: str
+    keep: str
+    sign: str
+    limit: str
+    odd: str
+    uses_libm: bool
+    constants: Constants
+    rounded: str
+
+
+@dataclass(frozen=True, slots=True)
+class VectorTrig(ScalarTrig):
+    """View of sincos_vector.jinja and types.jinja: vec is lanes x real, ivec lanes x integer (signed)."""
+
+    near_symbol: str
+    far_symbol: str
+    any_symbol: str
+    about_near: str
+    lanes: int
+    bytes: int
+    any_sign: AnySign
+
+
+def trig_preamble(prefix: str, real: Real, far: Far = "libm") -> TrigPreamble:
+    """View of preamble.jinja; prefix is the robot's identifier, as in every view here."""
+    return TrigPreamble(_macro(prefix), real, far == "libm")
+
+
+def scalar_trig(prefix: str, real: Real, far: Far = "libm", short: bool = False) -> ScalarTrig:
+    """View of sincos_scalar.jinja: <prefix>_sincos_f64 or _f32, angle and results behind pointers.
+
+    short  convert k to int, which it fits, for machines on which wider ones take a call
+    """
+    suffix = _suffix(real)
+    return ScalarTrig(
+        macro=_macro(prefix),
+        symbol=f"{prefix}_sincos_{suffix}",
+        about=_about(real, far),
+        real=real,
+        integer=SIGNED[real],
+        vec=real,
+        ivec=f"unsigned {SIGNED[real]}",
+        to_bits=f"{prefix}_bits_of_{suffix}",
+        to_real=f"{prefix}_{suffix}_of_bits",
+        keep=f"{_macro(prefix)}_KEEP_SCALAR",
+        sign=f"{prefix}_bits_of_{suffix}({plain_number(-0.0, real)})",
+        limit=f"{prefix}_bits_of_{suffix}({plain_number(NUMBERS[real].limit, real)})",
+        odd="0 - (index & 1)",
+        uses_libm=far == "libm",
+        constants=constants(real),
+        rounded="int" if short else SIGNED[real],
+    )
+
+
+def vector_trig(
+    prefix: str,
+    real: Real,
+    unit: VectorUnit,
+    far: Far = "libm",
+    vec: str | None = None,
+    ivec: str | None = None,
+) -> VectorTrig:
+    """View of sincos_vector.jinja: <prefix>_sincos_f64x8 and so on, for vectors of one of a target's units.
+
+    vec and ivec name types that the C file has; by default types.jinja's <prefix>_f64x8, <prefix>_i64x8.
+    """
+    bits = NUMBERS[real].bits
+    lanes = unit.bytes * 8 // bits
+    suffix = f"{_suffix(real)}x{lanes}"
+    vec = vec or f"{prefix}_{suffix}"
+    ivec = ivec or f"{prefix}_i{bits}x{lanes}"
+    return VectorTrig(
+        macro=_macro(prefix),
+        symbol=f"{prefix}_sincos_{suffix}",
+        near_symbol=f"{prefix}_sincos_near_{suffix}",
+        far_symbol=f"{prefix}_sincos_far_{suffix}",
+        any_symbol=f"{prefix}_any_sign_{suffix}",
+        about=_about(real, far),
+        about_near=f"{_accuracy(real)}; beyond, the sign bit of far. Needs round-to-nearest.",
+        real=real,
+        integer=SIGNED[real],
+        vec=vec,
+        ivec=ivec,
+        to_bits=f"({ivec})",
+        to_real=f"({vec})",
+        keep=f"{_macro(prefix)}_KEEP_{unit.bytes}",
+        sign=f"({ivec})({vec}){_filled(-0.0, real, lanes)}",
+        limit=f"({ivec})({vec}){_filled(NUMBERS[real].limit, real, lanes)}",
+        odd=f"(index << {bits - 1}) >> {bits - 1}",
+        uses_libm=far == "libm",
+        constants=constants(real),
+        rounded=SIGNED[real],
+        lanes=lanes,
+        bytes=unit.bytes,
+        any_sign=_any_sign(real, unit, lanes, vec, ivec),
+    )
+
+
+def _any_sign(real: Real, unit: VectorUnit, lanes: int, vec: str, ivec: str) -> AnySign:
+    """The unit's instruction for it where there is one; else all lanes or-ed together."""
+    plain, mask = " | ".join(f"(*bits)[{lane}]" for lane in range(lanes)), unit.sign_mask
+    if mask is None:
+        return AnySign("", "", plain)
+    cast = vec if mask.operand == "real" else ivec
+    builtin = mask.float64 if real == "double" else mask.float32
+    return AnySign(mask.macro, f"{builtin}(({cast})*bits) != 0", plain)
+
+
+def _macro(prefix: str) -> str:
+    return f"{prefix.upper()}_TRIG"
+
+
+def _suffix(real: Real) -> str:
+    return f"f{NUMBERS[real].bits}"
+
+
+def _filled(value: float, real: Real, lanes: int) -> str:
+    """Initialiser of a vector with that value in every lane."""
+    return "{" + ", ".join([plain_number(value, real)] * lanes) + "}"
+
+
+def _about(real: Real, far: Far) -> str:
+    beyond = "libm's sine and cosine" if far == "libm" else "NaN"
+    return f"{_accuracy(real)}; beyond, {beyond}. Needs round-to-nearest."
+
+
+def _accuracy(real: Real) -> str:
+    limit = plain_number(NUMBERS[real].limit, "double")
+    return f"Sine and cosine, error below 1 ulp for |x| <= {limit} rad"

@@ -1,0 +1,76 @@
+"""A package's vectors and the sines taken on them, in the form that templates print."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from psdmc.backends.c.lanes import VectorWidth, vector_widths
+from psdmc.backends.c.limbs import LimbVector, limb_units, limb_vectors
+from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.trig import (
+    ScalarTrig,
+    TrigPreamble,
+    VectorTrig,
+    scalar_trig,
+    trig_preamble,
+    vector_trig,
+)
+from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES
+
+
+@dataclass(frozen=True, slots=True)
+class VectorsView:
+    """The vectors that the C computes with, and its inline sine and cosine.
+
+    robot   identifier that every symbol starts with
+    counts  numbers of limbs that share a vector, over all kernels
+    """
+
+    robot: str
+    options: EmitOptions
+    counts: tuple[int, ...]
+
+    @property
+    def condition(self) -> str:
+        """Preprocessor condition: the compiler has GCC's vector extension, and rounds as the sincos needs."""
+        is_double = self.options.c_real == "double"
+        return HAS_VECTORS if is_double else f"{HAS_VECTORS} && {FLOATS_STAY}"
+
+    @property
+    def widths(self) -> tuple[VectorWidth, ...]:
+        """Sizes that vectors.h chooses from, widest first."""
+        return vector_widths(self.options)
+
+    @property
+    def block_bytes(self) -> int:
+        """Bytes of one variable in a block of lanes."""
+        return LANE_BLOCK_BYTES
+
+    @property
+    def of_limbs(self) -> tuple[LimbVector, ...]:
+        """Vectors with one real per limb."""
+        return limb_vectors(self.counts, self.options)
+
+    @property
+    def preamble(self) -> TrigPreamble:
+        """What the inline sines of all widths share."""
+        return trig_preamble(self.robot, self.options.c_real, self.options.far)
+
+    @property
+    def sines(self) -> tuple[VectorTrig, ...]:
+        """The inline sincos for each vector width that vectors.h may choose, for lanes or for one state's angles."""
+        units = dict.fromkeys(width.unit for width in self.widths)
+        units |= dict.fromkeys(width.angles.unit for width in self.widths)
+        units |= dict.fromkeys(limb_units(self.of_limbs, self.options))
+        return tuple(vector_trig(self.robot, self.options.c_real, unit, self.options.far) for unit in units)
+
+    @property
+    def scalar_sine(self) -> ScalarTrig:
+        """The inline sincos of one angle."""
+        return scalar_trig(self.robot, self.options.c_real, self.options.far, short=not self.widths)
+
+    @property
+    def sincos_types(self) -> tuple[tuple[str, str], ...]:
+        """Vectors whose sines are taken: the macro of their width, and the type."""
+        limbs = ((f"{vector.macro}_WIDTH", vector.name) for vector in self.of_limbs)
+        return (("WIDTH", "lanes"), ("ANGLE_WIDTH", "angles"), *limbs)
