@@ -10,10 +10,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.model.grounds import Delay, Ground
+from psdmc.model.grounds import Delay, Ground, OrInf
 from psdmc.robot.mechanism import frozen_array
 
 Array = NDArray[np.float64]
+OrNaN = float
+"""A number that may not exist: NaN, null in files."""
 Law = Literal["linear", "lugre"]
 Matrix = tuple[tuple[float, ...], ...]
 """C of q_joint = C q_motor; empty: every motor drives its own joint."""
@@ -61,7 +63,7 @@ class ParameterRow:
     name: str
     group: str
     value: float
-    std: float
+    std: OrInf
     unit: str
     equation: str
     identifiable: bool
@@ -84,8 +86,8 @@ class NumberRow:
 
     joint: str
     name: str
-    value: float
-    std: float
+    value: OrNaN
+    std: OrInf
     unit: str
     seen: bool = True
     visibility: str = ""
@@ -96,8 +98,8 @@ class NumberRow:
 class Quality:
     """RMSE (target's unit) and R^2 of one joint in one step; R^2 is NaN where the target does not vary."""
 
-    rmse: float
-    r2: float
+    rmse: OrNaN
+    r2: OrNaN
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,15 +190,15 @@ class JointFigures:
     """
 
     joint: str
-    r2: float
-    rmse: float
-    gain: float
-    gain_std: float
+    r2: OrNaN
+    rmse: OrNaN
+    gain: OrNaN
+    gain_std: OrNaN
     visible: bool
-    friction_power: float
-    friction_power_std: float
-    noise_ratio: float
-    speed: float
+    friction_power: OrNaN
+    friction_power_std: OrNaN
+    noise_ratio: OrNaN
+    speed: OrNaN
 
 
 @dataclass(frozen=True, slots=True)

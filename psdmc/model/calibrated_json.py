@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
-from typing import Any, TypeVar
+from dataclasses import asdict, fields
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -41,6 +41,8 @@ MOST = 1_000_000
 """Largest number of rows of a table; a campaign's friction has seven per joint."""
 LARGEST_COVARIANCE = 4_000
 """Base parameters of which a file may hold a covariance: 64 MB."""
+LARGEST_COUNT = 2**53
+"""Rows of a log: what a double counts."""
 LEANING = 1e-9
 """Share by which a covariance may exceed the product of the standard deviations: rounding."""
 FIGURES = ("r2", "rmse", "gain", "gain_std", "friction_power", "friction_power_std", "noise_ratio", "speed")
@@ -210,7 +212,7 @@ def from_json(value: object) -> Calibrated:
         prediction=_maybe(content, "prediction", _prediction_of),
         verdict=_maybe(content, "verdict", _verdict_of),
         covariance=_maybe(content, "covariance", lambda kept: _covariance(kept, len(parameters))),
-        logs=_rows(content, "logs", _log_of),
+        logs=_rows(content, "logs", lambda row: _of(LogUsed, row)),
         load=_maybe(content, "load", _load_of),
         versions={name: json.text(each, "a version") for name, each in _record(content, "versions").items()},
     )
@@ -224,17 +226,8 @@ def _text(of: object, name: str) -> str:
     return json.text(_part(of, name), f"the calibration's {name}")
 
 
-def _flag(of: object, name: str) -> bool:
-    return json.flag(_part(of, name), f"the calibration's {name}")
-
-
 def _finite(of: object, name: str) -> float:
     return json.number(_part(of, name), f"the calibration's {name}")
-
-
-def _or(of: object, name: str, missing: float) -> float:
-    """A finite number, or what stands for null."""
-    return missing if _part(of, name) is None else _finite(of, name)
 
 
 def _record(of: object, name: str) -> dict[str, Any]:
@@ -262,34 +255,38 @@ def _remark_of(value: object) -> Remark:
     return Remark(_text(value, "text"), _text(value, "code"))
 
 
+READ: Mapping[str, Callable[[object, str], Any]] = {
+    "str": json.text,
+    "bool": json.flag,
+    "int": lambda value, what: json.whole(value, what, 0, LARGEST_COUNT),
+    "float": json.number,
+    "float | None": lambda value, what: None if value is None else json.number(value, what),
+    "OrNaN": lambda value, what: math.nan if value is None else json.number(value, what),
+    "OrInf": lambda value, what: math.inf if value is None else json.number(value, what),
+}
+"""What reads a field, by the field's type as its class states it."""
+
+
+def _of(kind: Callable[..., Row], value: object, **given: Any) -> Row:
+    """A row of that dataclass: the given fields as they are, the others read by their types."""
+    names = [each for each in fields(cast("Any", kind)) if each.name not in given]
+    read = {
+        each.name: READ[str(each.type)](_part(value, each.name), f"the calibration's {each.name}")
+        for each in names
+    }
+    return kind(**read, **given)
+
+
 def _parameter(row: object) -> ParameterRow:
-    return ParameterRow(
-        name=_text(row, "name"),
-        group=_text(row, "group"),
-        value=_finite(row, "value"),
-        std=_or(row, "std", math.inf),
-        unit=_text(row, "unit"),
-        equation=_text(row, "equation"),
-        identifiable=_flag(row, "identifiable"),
-        visibility=_remark_of(_part(row, "visibility")),
-        file=None if _part(row, "file") is None else _finite(row, "file"),
-    )
+    return _of(ParameterRow, row, visibility=_remark_of(_part(row, "visibility")))
 
 
 def _number(row: object) -> NumberRow:
     name, parameters = _text(row, "name"), _record(row, "parameters")
     if parameters != parameters_of(name):
         raise ValueError(f"the calibration's parameters of {name!r} are not those of its name")
-    return NumberRow(
-        joint=_text(row, "joint"),
-        name=name,
-        value=_or(row, "value", math.nan),
-        std=_or(row, "std", math.inf),
-        unit=_text(row, "unit"),
-        seen=_flag(row, "seen"),
-        visibility=_remark_of(_part(row, "visibility")),
-        parameters=parameters,
-    )
+    seen = _remark_of(_part(row, "visibility"))
+    return _of(NumberRow, row, visibility=seen, parameters=parameters)
 
 
 def _covariance(value: object, l: int) -> Array:
@@ -311,14 +308,10 @@ def _step(name: str, rows: object) -> StepQuality:
     return StepQuality(
         name,
         {
-            joint: JointQuality(_quality(_part(both, "fit")), _quality(_part(both, "held_out")))
+            joint: JointQuality(*(_of(Quality, _part(both, part)) for part in ("fit", "held_out")))
             for joint, both in joints.items()
         },
     )
-
-
-def _quality(value: object) -> Quality:
-    return Quality(_or(value, "rmse", math.nan), _or(value, "r2", math.nan))
 
 
 def _prediction_of(value: object) -> Prediction:
@@ -334,13 +327,8 @@ def _prediction_of(value: object) -> Prediction:
         steps={name: _used(step) for name, step in _record(value, "steps").items()},
         sign_speed=_finite(value, "sign_speed"),
         exponents=tuple(json.number(each, "an exponent") for each in exponents),
-        offset=_flag(value, "offset"),
-        runs={
-            joint: FrictionRunConstants(
-                *(_finite(constants, name) for name in ("inertia", "offset", "delay"))
-            )
-            for joint, constants in _record(value, "runs").items()
-        },
+        offset=json.flag(_part(value, "offset"), "the calibration's offset"),
+        runs={joint: _of(FrictionRunConstants, each) for joint, each in _record(value, "runs").items()},
         coupling=tuple(tuple(row) for row in matrix.tolist()),
         columns=plain(_record(value, "columns")),
     )
@@ -357,20 +345,15 @@ def _used(step: object) -> StepUsed:
 
 def _verdict_of(value: object) -> Verdict:
     delays = [
-        Delay(_text(each, "log"), _finite(each, "seconds"), _or(each, "std", math.inf), _flag(each, "shown"))
+        _of(Delay, {**json.record(each, "a delay"), "value": _part(each, "seconds")})
         for each in _list(value, "delays")
     ]
     return Verdict(
         **{name: tuple(_ground(each) for each in _list(value, key)) for key, name in KINDS.items()},
         joints=tuple(
-            JointFigures(
-                joint=joint,
-                visible=_flag(figures, "visible"),
-                **{name: _or(figures, name, math.nan) for name in FIGURES},
-            )
-            for joint, figures in _record(value, "joints").items()
+            _of(JointFigures, figures, joint=joint) for joint, figures in _record(value, "joints").items()
         ),
-        samples_per_unknown=_or(value, "samples_per_unknown", math.inf),
+        samples_per_unknown=READ["OrInf"](_part(value, "samples_per_unknown"), "samples_per_unknown"),
         delays=tuple(delays),
     )
 
@@ -392,11 +375,6 @@ def _number_for_null(value: Any) -> Any:
     if isinstance(value, list):
         return [_number_for_null(each) for each in value]
     return math.nan if value is None else value
-
-
-def _log_of(row: object) -> LogUsed:
-    rows = json.whole(_part(row, "rows"), "the rows of a log", 0, 2**53)
-    return LogUsed(_text(row, "log"), rows, _finite(row, "seconds"), _text(row, "date"), _text(row, "use"))
 
 
 def _load_of(value: object) -> LoadUsed:

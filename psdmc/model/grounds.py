@@ -11,6 +11,8 @@ MOST_LISTED = 4
 """Base parameters that a sentence names; the others are counted."""
 
 Values = Mapping[str, Any]
+OrInf = float
+"""A standard deviation that the data may not give: infinite, null in files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,7 @@ class Delay:
 
     log: str
     value: float
-    std: float
+    std: OrInf
     shown: bool
 
     @property

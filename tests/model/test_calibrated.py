@@ -17,7 +17,7 @@ import pytest
 from psdmc.cli import main
 from psdmc.model.calibrated import Calibrated, Remark, Verdict, parameters_of
 from psdmc.model.calibrated_json import as_json, document, from_json, packed
-from psdmc.model.grounds import WORDS, Ground
+from psdmc.model.grounds import WORDS, Delay, Ground
 from psdmc.model.linear_friction import linear_friction
 from psdmc.model.load import load
 from psdmc.model.store import save
@@ -49,7 +49,10 @@ def judged() -> Calibrated:
         "columns", {"joints": ("a", "b"), "readings": [columns], "explained": 0.9, "logged": 0.1}
     )
     assert found.verdict is not None
-    verdict = replace(found.verdict, against=grounds, doubted=(Ground("unchecked"),), suspected=(suspect,))
+    delays = (Delay("a.csv", 0.5, math.inf, True),)
+    verdict = replace(
+        found.verdict, delays=delays, against=grounds, doubted=(Ground("unchecked"),), suspected=(suspect,)
+    )
     warnings = (*found.warnings, Remark("J1 stands still", "standing"))
     return replace(found, covariance=factor @ factor.T, verdict=verdict, warnings=warnings)
 
@@ -147,6 +150,7 @@ def test_what_is_written_is_read_back() -> None:
     assert again.verdict is not None
     assert found.verdict is not None
     assert again.verdict.lines() == found.verdict.lines()
+    assert again.verdict.delays == found.verdict.delays
     assert np.array_equal(again.covariance, found.covariance)
     assert [row.parameters for row in again.friction] == [row.parameters for row in found.friction]
     assert again.unsaid == found.unsaid
