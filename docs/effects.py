@@ -76,15 +76,15 @@ def choices(robot: str) -> Iterator[Row]:
     compound, fold = Choices(compound=True), Choices(compound=True, fold=True)
     yield "the file's frames, every parameter", [operations(in_file_frames(chain))]
     yield (
-        "frames re-framed to modified DH",
+        "frames of modified DH",
         [operations(in_frames(chain, plain.frames, plain.base_acceleration, plain))],
     )
-    yield "parameters on sparse carriers", [best(iter([first]))]
-    yield "compound turns of parallel axes", [best(iter([replace(first, choices=compound)]))]
-    yield "last body seen from before its turn", [best(iter([replace(first, choices=fold)]))]
-    yield "the better of all recursions", [best(search.starts((PREVIOUS,) * len(chain)))]
+    yield "as few parameters as possible (carriers)", [best(iter([first]))]
+    yield "compound angles of parallel axes", [best(iter([replace(first, choices=compound)]))]
+    yield "last body folded", [best(iter([replace(first, choices=fold)]))]
+    yield "the best of all variants", [best(search.starts((PREVIOUS,) * len(chain)))]
     yield (
-        "where frames sit on their axes",
+        "best place of each frame on its axis",
         [best(one for feet in all_feet(chain) for one in search.starts(feet))],
     )
     found = search.best(INVERSE, SINGLE)

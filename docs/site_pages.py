@@ -67,6 +67,7 @@ MENU = {
         "shipping",
         "reference/c",
         "notation",
+        "robot_files",
         "files",
         "log_description",
         "calibration",

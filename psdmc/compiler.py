@@ -65,28 +65,34 @@ def derive(
     packages: Mapping[str, str | Path] | None = None,
     unknown: Sequence[str] | str = (),
 ) -> DynamicsModel:
-    """The certified model (E, P, theta_b) of a robot file: URDF, or DH table in TOML.
+    """Derive the model (E, P, theta_b) of a robot file (URDF, xacro, MJCF or DH table) and check it.
 
-    base, tip      links that a chain starts and ends at; None: the whole tree
+    The result is a DynamicsModel. Its torques were compared with Newton-Euler recursions before it is returned.
+
+    base, tip      first and last link of a chain; None: the whole robot
     gravity        m/s^2 in the file's root frame; None: the file's own, or (0, 0, -9.81)
-    drive_inertia  the joints' drive inertias are parameters: True, or one value a joint, kg m^2 (kg)
-    assume_zero    parameters assumed zero, such as "link5:mx" or "link5:Ixz@com", or a single one
-    snap           rad; constant rotations this near to one with exact zeros become it; 0 turns it off
-    expand         False leaves E and P out, for robots with too many monomials; None: for robots that branch
-    progress       called with the name of each step as it begins
-    frames         links that kinematic functions are about, in this order, or a single one; none: the tip, or all
-                   ends of a tree
-    tool           x y z (m), roll pitch yaw (rad) of one more frame, 'tool', in the tip's
-    lock           joints that are held: their positions by name, rad or m
-    floating       True for a floating base: q is position, quaternion (x, y, z, w), then the joints. Rates are the base's
-                   linear and angular velocity along its axes, then the joints'
-    root           the body under the world of an MJCF that the robot begins with, where several move
+    drive_inertia  True: the joints' drive inertias are parameters; or one value per joint, kg m^2 (kg)
+    assume_zero    parameters to be taken as zero, such as "link5:mx" or "link5:Ixz@com"; a list or a single name
+    snap           rad; constant rotations that differ by less from right angles become exact; 0 changes none
+    expand         False leaves out E and P, for robots with many joints; None leaves them out for branched robots
+    progress       psdmc calls it with the name of each stage
+    frames         links for poses, Jacobians, wrenches and loads; none: the tip, or the end of each branch
+    tool           x, y, z (m), roll, pitch, yaw (rad) of one more frame, 'tool', relative to the tip
+    lock           positions (rad or m) of joints that stay fixed, by name
+    floating       True: a floating base. q is position (m), quaternion (x, y, z, w), then the joints. Rates are the
+                   base's linear and angular velocity along the base's axes, then the joints'
+    root           first body of the robot, if several bodies of an MJCF move
     xacro_args     values of a xacro file's arguments, by name
-    packages       folders of ROS packages, by name, which a xacro file finds; also by ROS_PACKAGE_PATH, AMENT_PREFIX_PATH
-    unknown        links of a URDF or MJCF whose inertia is unknown, whatever the file says, or a single one. "all" means
-                   all links, "missing" those without inertia in the file, which are massless otherwise
+    packages       folders of the ROS packages that a xacro file names; ROS_PACKAGE_PATH and AMENT_PREFIX_PATH add more
+    unknown        links whose inertia is unknown: a list, a single name, or "all". "missing" means all links without an
+                   inertia in the file. Otherwise such links are massless
 
-    Raises InputError for a wrong file or option, DerivationError where the model does not fit into memory or time.
+    Raises InputError for a wrong file or option. Raises DerivationError if the model needs too much memory or time.
+
+    Source: Lloyd, Irani and Ahmadi, Mech. Mach. Theory 156 (2021) 104149.
+
+    >>> derive("examples/robots/scara.toml").joint_names  # doctest: +SKIP
+    ('J1', 'J2', 'J3', 'J4')
     """
     # Imported here: Pinocchio and SciPy load slowly, and emission needs neither.
     from psdmc.derivation.derive import derive_model
@@ -135,29 +141,27 @@ def emit_c(
     friction: bool = False,
     bodies: bool = False,
 ) -> Changes:
-    """Write the model's C package; returns the paths of the files that changed, as a list that says more about them.
+    """Write the C package of a model into a folder; returns the list of files that changed.
 
-    model      or the path of a model file
-    lowering   which arithmetic: "auto" takes the cheaper per function
-    functions  names of functions to generate, or one name; None: psdmc.functions.default_of the robot. InputError where
-               theta_b is known and the mass matrix is not positive definite within the joint limits, unless
-               forward_dynamics is left out
-    real       precision of the package, "float64" or "float32"; None: the target's
-    trig       sine and cosine "inline", for all joints at once; "freestanding", without libm; or all from "libm"; None: the
-               target's
-    name       the robot's name in C; None: the robot's own
-    force      True: also write into a folder of other files, and over edited files of the package. Other files are never
-               deleted: a file of the same name is kept as NAME.orig
-    progress   called with the name of each step as it begins
-    payload    whether the package has functions that add a load to theta_b; InputError where the model's assumptions
-               do not admit every load
-    adapters   names in psdmc.backends.c.adapters.ADAPTERS, or one name: other programs that the package is also for;
-               functions that they need are generated besides `functions`
-    target     the machine that the package is for, by its name in psdmc.target.presets
-    friction   whether the package has a function of the joints' friction; InputError where the model was not calibrated from
-               plain logs
-    bodies     whether the package has a function that computes theta_b from all bodies; InputError where the model's
-               assumptions exclude some body's parameter
+    model      a model, or the path of a model file
+    directory  folder to write: missing, empty, or written by psdmc before
+    lowering   "expanded", "factored", or "auto": the cheaper form for each function
+    functions  names of functions, or one name; None: the default functions
+    real       precision, "float64" or "float32"; None: the target's
+    trig       sine and cosine: "inline", "freestanding" (without libm) or "libm"; None: the target's
+    name       name of the robot in C, the prefix of all symbols; None: the model's
+    force      True: write into a folder with other files, and replace edited files of the package. Foreign
+               files are never deleted; one of the same name is kept as NAME.orig
+    progress   psdmc calls it with the name of each stage
+    payload    True: add functions that add a load to theta_b
+    adapters   other programs to write code for, such as "casadi", with the functions that they need
+    target     processor to generate for, by its name in psdmc.target.presets
+    friction   True: add the friction torques of a model that was calibrated from logs
+    bodies     True: add a function that computes theta_b from the masses and inertias of all links
+
+    Raises InputError for a wrong option. Raises it also if the mass matrix is not positive definite within the joint
+    limits; leave out forward_dynamics then. With `payload`, `bodies` or `friction` it is raised if the model's
+    assumptions exclude a load or a body, or if the model has no friction.
     """
     require_own_folder(directory, force)
     model = model_of(model)
@@ -220,14 +224,20 @@ def compile(
     progress: Progress = silent,
     target: str | Target = NATIVE,
 ) -> CompiledRobot[Any]:
-    """The model's functions, compiled for this machine and callable on NumPy arrays; cached by content.
+    """Compile the functions of a model for this machine; returns a robot whose methods take NumPy arrays.
 
-    model      or the path of a model file
-    functions  by name, and no others, a text being one name; None: the default set at once, any other when it is first
-               called
+    The library is kept in a cache, so a second call for the same model and options is fast.
 
-    Other options as of `emit_c`. Raises InputError for a target without functions for many states, which Python calls;
-    ToolchainError for a target that the compiler does not know or this machine's CPU cannot run.
+    model      a model, or the path of a model file
+    functions  names of functions, or one name: only these exist. None: the default functions are compiled at once, and
+               each other function when you call it for the first time
+
+    The other options are those of `emit_c`. Raises InputError for a target that computes one state per call only. Raises
+    ToolchainError if the compiler or the CPU does not support the target.
+
+    >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP
+    >>> robot.gravity([0.0, 0.0, 0.0, 0.0]).dtype  # doctest: +SKIP
+    dtype('float32')
     """
     found = model_of(model)
     names = (functions,) if isinstance(functions, str) else functions

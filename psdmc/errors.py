@@ -33,25 +33,25 @@ class PsdmcError(Exception):
 
 
 class InputError(PsdmcError):
-    """A file, an option or an argument is wrong: change the input."""
+    """Raised if a file, an option or an argument is wrong: change the input. Exit status 2."""
 
     exit_status = 2
 
 
 class DerivationError(PsdmcError):
-    """The robot is fine but this model of it cannot be derived: change the options."""
+    """Raised if the input is right but psdmc cannot derive the model: change the options. Exit status 3."""
 
     exit_status = 3
 
 
 class ToolchainError(PsdmcError):
-    """A compiler or a folder failed: change the machine."""
+    """Raised if a compiler, a program or a folder fails: change the machine. Exit status 4."""
 
     exit_status = 4
 
 
 class InternalError(Exception):
-    """A broken invariant inside psdmc; never the input's fault."""
+    """Raised if psdmc has a fault; the input is not the cause."""
 
 
 def exit_status_of(action: Callable[[], int | None]) -> int:

@@ -23,20 +23,19 @@ def calibrate(
     loaded: str | Path | Sequence[str | Path] = (),
     load: str | Path | Sequence[float] | None = None,
 ) -> Calibration:
-    """The calibrated model, the identified values, and the verdict on them, from a campaign's folder, a log
-    description (log.toml) or logs.
+    """Fit a model to logs; returns the calibrated model, the identified values and the verdict.
 
-    The result's `verdict.word` is "usable", "usable, with doubts" or "not usable"; `verdict.reasons`, `.suspects` and
-    `.doubts` say why, `.model` is the calibrated model whatever the verdict.
+    The result's `verdict.word` is "usable", "usable, with doubts" or "not usable". `verdict.reasons`, `.suspects` and
+    `.doubts` explain it. `.model` is the calibrated model, for every verdict.
 
-    model              or the path of a model file
-    torque_constants   N m/A by joint name, for plain logs that hold currents, and for joints that no load reaches
-    validation         plain logs that are held out as a whole; the others are then fitted whole
+    model              a model, or the path of a model file
+    torque_constants   N m/A by joint name, for logs of currents, and for joints that do not feel the load
+    validation         logs that are used for the test only; all other logs are then used for the fit only
 
-    loaded             further logs of currents, recorded with a known load on the robot: they show the torque constants
-    load               that load: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load's file
+    loaded             more logs of currents, recorded with a known load on the robot, to find torque constants
+    load               the known load: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load file
 
-    Raises InputError where a file is missing or a log cannot be read.
+    Raises InputError if a file is missing or a log cannot be used.
     """
     from psdmc.calibration.calibrate import calibrate as run
     from psdmc.calibration.given_load import given_load

@@ -145,7 +145,7 @@ def _require_plain(
         are = "is" if len(given) == 1 else "are"
         raise InputError(
             f"{', '.join(given)} {are} for plain logs, {campaign} is a campaign",
-            "leave it out: a campaign's steps have cut-offs, splits and friction of their own",
+            "leave it out: each step of a campaign has its cut-off, split and friction",
         )
 
 

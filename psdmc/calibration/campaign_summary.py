@@ -28,7 +28,7 @@ def summary(plan: Plan, folder: str | Path) -> tuple[str, ...]:
         *(f"mount: {_load(load, plan)} for the runs {_which(plan, load)}" for load in _loads(plan)),
         _found(plan),
         *plan.looked,
-        "not planned: the ways from the end of a run to the start of the next; your controller drives them",
+        "not planned: the paths from the end of a run to the start of the next; your controller drives them",
     )
 
 

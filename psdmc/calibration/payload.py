@@ -50,15 +50,15 @@ def identify_payload(
     regressor: Regressor | None = None,
     progress: Progress = silent,
 ) -> PayloadFound:
-    """Mass, centre of mass and inertia of a rigid load that logs were recorded with, and the verdict on them.
+    """Find the mass, centre of mass and inertia of a rigid load from logs; returns them with the verdict.
 
-    model             without the load; calibrated, or with all inertias and its joints' friction unknown
-    frame             in which the load's numbers are given: the tip's (None) or another of the model's frames
-    logs              plain ones, or a log description
-    options           of the fit; None: filter and friction law of the model's calibration; a description's are before both
-    torque_constants  N m/A by joint name, for logs that hold currents; None: the model's
+    model             model of the robot without the load: calibrated, or with all inertias and unknown friction
+    frame             frame of the results: None: the tip, or the name of another frame of the model
+    logs              logs that were recorded with the load, or a log description
+    options           filter and friction law of the fit; None: those of the log description, or of the model's calibration
+    torque_constants  N m/A by joint name, for logs of currents; None: the model's
 
-    Raises InputError where a log cannot be used, nothing moves, or the model's theta_b is unknown.
+    Raises InputError if a log cannot be used, nothing moves, or the model's theta_b is unknown.
     """
     require_axes(model.mechanism, "payload identification")
     if model.mechanism.has_followers:
@@ -131,7 +131,7 @@ def _beside(model: DynamicsModel) -> Callable[[States, NDArray[np.intp]], Array]
     found = delivered(model)
     if found.columns.by_load:
         raise InputError(
-            f"{model.mechanism.name}: friction that grows with the load: a load is not told apart from it",
+            f"{model.mechanism.name}: it has load-dependent friction, which the log cannot separate from a load",
             "calibrate the robot without `load` in [friction]",
         )
     return beside(found, np.ones(len(found.columns), dtype=bool))

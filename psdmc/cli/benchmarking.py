@@ -18,10 +18,14 @@ WRONG_STATUS = 5
 
 def bench(
     models: Annotated[list[Path], typer.Argument(metavar="MODEL...", help="model files")],
-    report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="write a page")] = None,
-    json: Annotated[Path | None, typer.Option(metavar="FILE.json", help="write every figure")] = None,
-    rounds: Annotated[int, typer.Option(min=1, help="trials that count")] = ROUNDS,
-    counts: Annotated[bool, typer.Option("--counts", help="count instructions too (valgrind)")] = False,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="write the results as a page")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE.json", help="write all numbers")] = None,
+    rounds: Annotated[int, typer.Option(min=1, help="number of timed trials")] = ROUNDS,
+    counts: Annotated[
+        bool, typer.Option("--counts", help="also count instructions (needs valgrind)")
+    ] = False,
 ) -> None:
     """Time generated code against Pinocchio, CasADi and MuJoCo in the same run."""
     from psdmc.atomic import write_whole

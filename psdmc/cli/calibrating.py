@@ -25,72 +25,81 @@ def calibrate(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="MODEL.npz", help="calibrated model; with --describe the description"
+            "-o",
+            "--output",
+            metavar="MODEL.npz",
+            help="file to write: the calibrated model, or with --describe the description",
         ),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(metavar="FILE.html", help="write a page, with JSON beside it")
+        Path | None,
+        typer.Option(metavar="FILE.html", help="write a report, and FILE.json with the same numbers"),
     ] = None,
     actuators: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="write friction and motors as C there")
+        Path | None, typer.Option(metavar="DIR", help="write C code of friction and motors into this folder")
     ] = None,
     physical: Annotated[
         bool | None,
         typer.Option(
             "--physical/--no-physical",
-            help="only what a robot can have: bodies of mass, friction not negative (the default); or the bare fit",
+            help="accept only physical bodies and friction (the default), or the plain fit",
         ),
     ] = None,
     torque_constants: Annotated[
         list[str] | None,
-        typer.Option(metavar="JOINT=KT,...", help="N m/A, for plain logs that hold currents"),
+        typer.Option(metavar="JOINT=KT,...", help="torque constants in N m/A, for logs of currents"),
     ] = None,
     loaded: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="LOG", help="log of currents with a known load on the tip: shows torque constants"
+            metavar="LOG", help="log of currents with a known load on the tip, to find torque constants"
         ),
     ] = None,
     load: Annotated[
         str | None,
         typer.Option(
-            metavar="MASS,X,Y,Z", help="that load: kg, m in the tip's frame; or a load's file (.toml)"
+            metavar="MASS,X,Y,Z", help="the known load: kg, and m in the tip's frame; or a load file (.toml)"
         ),
     ] = None,
     cutoff: Annotated[
-        float | None, typer.Option(metavar="HZ", help="of the filter of plain logs; 8, or less for slow logs")
+        float | None, typer.Option(metavar="HZ", help="cut-off of the filter; default: 8 Hz")
     ] = None,
     essential: Annotated[
-        bool, typer.Option("--essential", help="leave out parameters that the data do not need (F-test)")
+        bool, typer.Option("--essential", help="drop parameters that the data do not need (F-test)")
     ] = False,
     prior_confidence: Annotated[
         float | None,
-        typer.Option(metavar="SHARE", help="standard deviation of the file's masses and inertias, 0.1: 10 %"),
+        typer.Option(
+            metavar="SHARE", help="relative standard deviation of the file's masses and inertias, such as 0.1"
+        ),
     ] = None,
     keep: Annotated[
-        bool, typer.Option("--keep", help="write the model file even where the verdict is: not usable")
+        bool, typer.Option("--keep", help="write the model even if the verdict is: not usable")
     ] = False,
     validate: Annotated[
-        list[Path] | None, typer.Option(metavar="LOG", help="a plain log that is held out as a whole")
+        list[Path] | None, typer.Option(metavar="LOG", help="log that is used for the test only")
     ] = None,
     split: Annotated[
         str | None,
-        typer.Option(metavar="SHARE[,BLOCKS]", help="held out of plain logs: 0.3, the last part; 0.15,40"),
+        typer.Option(
+            metavar="SHARE[,BLOCKS]",
+            help="share of each log that is used for the test: 0.3, the last part; or 0.15,40",
+        ),
     ] = None,
     friction: Annotated[
         list[str] | None,
-        typer.Option(metavar="TERM,...", help="of plain logs: coulomb,viscous,viscous^2,offset"),
+        typer.Option(metavar="TERM,...", help="friction terms: coulomb,viscous,viscous^2,offset"),
     ] = None,
     topic: Annotated[
-        str | None, typer.Option(metavar="TOPIC", help="of joint states, of bags with several")
+        str | None, typer.Option(metavar="TOPIC", help="topic of joint states, if a bag has several")
     ] = None,
     joint_map: Annotated[
         list[str] | None,
-        typer.Option(metavar="LOGGED=JOINT,...", help="plain logs' joint names, and the model's"),
+        typer.Option(metavar="LOGGED=JOINT,...", help="joint names of the log and of the model"),
     ] = None,
     describe: Annotated[
         bool,
-        typer.Option("--describe", help="draft a description of [MODEL] LOG...: log.toml, or -o"),
+        typer.Option("--describe", help="draft a description of LOG..., log.toml or -o, instead"),
     ] = False,
 ) -> None:
     """Identify base parameters, friction and motor constants from logs; the verdict comes first, exit 6: not usable."""
@@ -163,9 +172,9 @@ def calibrate(
     if verdict.usable or keep:
         print(f"{output}: calibrated model")
     else:
-        print(f"{output}: not written; --keep writes it all the same")
+        print(f"{output}: not written; add --keep to write it anyway")
     if physical:
-        print("note: --physical is the default now and need not be given")
+        print("note: --physical is the default; you can leave it out")
     for note in record.notes:
         print(f"note: {one_line(note)}")
     for warning in record.unsaid:

@@ -26,74 +26,80 @@ USUAL_LOAD = "3.5,0.08,0,0.06"
 
 def excite(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder of the campaign")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder to write")],
     one_log: Annotated[
-        bool, typer.Option("--one-log", help="the exciting motion alone, for one linear fit of everything")
+        bool, typer.Option("--one-log", help="plan one motion and one log instead of four steps")
     ] = False,
     load: Annotated[
         str | None,
         typer.Option(
             metavar="MASS,X,Y,Z",
-            help=f"kg and m in the tip's frame, of the motor runs; or none; default: {USUAL_LOAD}",
+            help=f"load of the motor runs: kg, and m in the tip's frame; or none; default: {USUAL_LOAD}",
         ),
     ] = None,
     rate: Annotated[
-        float, typer.Option(min=1.0, max=20_000.0, help="Hz, rows a second of trajectories")
+        float, typer.Option(min=1.0, max=20_000.0, help="rows per second of the trajectories")
     ] = 1000.0,
     duration: Annotated[
-        float, typer.Option(min=0.1, max=LONGEST_DURATION, help="s, period of the exciting motion")
+        float, typer.Option(min=0.1, max=LONGEST_DURATION, help="period of the exciting motion, s")
     ] = 10.0,
-    repeats: Annotated[int, typer.Option(min=1, max=100, help="periods of the exciting motion")] = 6,
-    harmonics: Annotated[int, typer.Option(min=1, max=MOST_HARMONICS, help="sines per joint")] = len(
-        ExciteOptions().harmonics
-    ),
+    repeats: Annotated[
+        int, typer.Option(min=1, max=100, help="number of periods of the exciting motion")
+    ] = 6,
+    harmonics: Annotated[
+        int, typer.Option(min=1, max=MOST_HARMONICS, help="number of sines per joint")
+    ] = len(ExciteOptions().harmonics),
     margin: Annotated[
         float,
         typer.Option(
-            min=SMALLEST_MARGIN, max=LARGEST_MARGIN, help="share of position, speed and acceleration limits"
+            min=SMALLEST_MARGIN,
+            max=LARGEST_MARGIN,
+            help="share of the limits of position, speed and acceleration that is used",
         ),
     ] = ExciteOptions().margin,
     torque_margin: Annotated[
-        float, typer.Option(min=SMALLEST_MARGIN, max=1.0, help="share of torque limits, by theta_b")
+        float, typer.Option(min=SMALLEST_MARGIN, max=1.0, help="share of the torque limits that is used")
     ] = ExciteOptions().torque_margin,
     ranges: Annotated[
         list[str] | None,
-        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="rad (m), narrower than the file's"),
+        typer.Option("--range", metavar="JOINT=LOW:HIGH", help="narrower range of a joint, rad or m"),
     ] = None,
     speed: Annotated[
-        list[str] | None, typer.Option(metavar="JOINT=V,...", help="rad/s (m/s), below the file's limits")
+        list[str] | None,
+        typer.Option(metavar="JOINT=V,...", help="lower speed limit of a joint, rad/s or m/s"),
     ] = None,
     acceleration: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="A or JOINT=A,...", help="rad/s^2 (m/s^2); one number: for joints without a limit"
+            metavar="A or JOINT=A,...",
+            help="acceleration limit, rad/s^2 or m/s^2; one number: for all joints without one",
         ),
     ] = None,
     effort: Annotated[
-        list[str] | None, typer.Option(metavar="JOINT=NM,...", help="N m (N), torque limits of joints")
+        list[str] | None, typer.Option(metavar="JOINT=NM,...", help="torque limit of a joint, N m or N")
     ] = None,
     floor: Annotated[
-        float | None, typer.Option(metavar="HEIGHT", help="m, of a floor above the base's origin")
+        float | None, typer.Option(metavar="HEIGHT", help="height of a floor above the base's origin, m")
     ] = None,
     meshes: Annotated[
-        list[Path] | None, typer.Option(metavar="DIR", help="where the meshes of collision shapes are")
+        list[Path] | None, typer.Option(metavar="DIR", help="folder of the meshes of collision shapes")
     ] = None,
     collisions: Annotated[
-        bool, typer.Option("--collisions/--no-collisions", help="whether self-collision is looked at")
+        bool, typer.Option("--collisions/--no-collisions", help="check self-collision, or not")
     ] = True,
     seconds: Annotated[
         float,
-        typer.Option(min=1.0, help="s of CPU in all; the search ends by its count where that is sooner"),
+        typer.Option(min=1.0, help="most CPU time of the search, s"),
     ] = ExciteOptions().seconds,
     condition: Annotated[
-        bool, typer.Option("--condition", help="smallest condition number alone, however slow the motion")
+        bool, typer.Option("--condition", help="minimise the condition number only; the motion may be slow")
     ] = False,
     log_det: Annotated[
-        bool, typer.Option("--log-det", help="largest log det instead of the smallest standard deviations")
+        bool, typer.Option("--log-det", help="maximise log det instead of minimising standard deviations")
     ] = False,
-    seed: Annotated[int, typer.Option(min=1, help="of the search")] = 1,
+    seed: Annotated[int, typer.Option(min=1, help="seed of the random search")] = 1,
     force: Annotated[
-        bool, typer.Option("--force", help="replace the campaign that is in DIR; its logs stay")
+        bool, typer.Option("--force", help="replace the campaign in DIR, but not its logs")
     ] = False,
 ) -> None:
     """Plan a calibration campaign: gravity sweeps, friction sines, and an exciting motion within the limits."""
@@ -106,11 +112,9 @@ def excite(
     from psdmc.report.calibrate_commands import excite_command
 
     if one_log and (load or "none").strip() != "none":
-        raise InputError("--load is of the motor runs, which --one-log leaves out", "leave one of them out")
+        raise InputError("--load is for motor runs, and --one-log has none", "leave one of them out")
     if meshes and not collisions:
-        raise InputError(
-            "--meshes, and --no-collisions, with which no shape is read", "leave one of them out"
-        )
+        raise InputError("--meshes has no effect with --no-collisions", "leave one of them out")
     search = ExciteOptions(
         duration=duration,
         harmonics=tuple(range(1, harmonics + 1)),
@@ -156,13 +160,13 @@ def excite(
 
 def simulate(
     plant: Annotated[Path, typer.Argument(metavar="PLANT", help="virtual robot (.toml)")],
-    campaign: Annotated[Path, typer.Argument(metavar="DIR", help="campaign made by excite")],
-    ideal: Annotated[bool, typer.Option("--ideal", help="ideal sensors")] = False,
+    campaign: Annotated[Path, typer.Argument(metavar="DIR", help="campaign that excite wrote")],
+    ideal: Annotated[bool, typer.Option("--ideal", help="simulate sensors without noise")] = False,
     harness: Annotated[
-        bool, typer.Option("--harness", help="with a cable harness, which no model has")
+        bool, typer.Option("--harness", help="add a cable harness, an effect that models lack")
     ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="of the sensors' noise")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the sensor noise")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
 ) -> None:
     """Write a campaign's logs from a virtual robot that shares no code with what is calibrated."""
     from psdmc.calibration.simulate_campaign import SimulateOptions

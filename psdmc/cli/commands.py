@@ -21,7 +21,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help: no boxes in a pipe, and rich need not be loaded
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="A compiler for robot dynamics: a robot in; small, fast, verified C out.",
+    help="Turn a robot description into small, fast C code for its dynamics, and calibrate the robot from logs.",
 )
 
 
@@ -33,29 +33,29 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
-    debug: Annotated[bool, typer.Option("--debug", help="show tracebacks")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="print a traceback after an error")] = False,
     version: Annotated[
-        bool, typer.Option("--version", help="print it", callback=_print_version, is_eager=True)
+        bool, typer.Option("--version", help="print the version", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
     """Options before the command."""
 
 
 COMMANDS = (
-    (new, "write a robot file to begin with"),
+    (new, "write a robot file to start from"),
     (derive, "derive a robot's model and save it"),
-    (show, "print a model, or what a robot file holds"),
-    (check, "check a model against other readers of its source"),
+    (show, "print a model or a robot file"),
+    (check, "compare a model with Pinocchio and MuJoCo"),
     (emit_c, "write a model's C package"),
     (build, "build a package and run its self-test"),
-    (bench, "time a model's code against its rivals"),
-    (excite, "plan a calibration campaign"),
+    (bench, "measure the speed of a model's code and of other programs"),
+    (excite, "plan the motions of a calibration"),
     (simulate, "write a campaign's logs from a virtual robot"),
     (calibrate, "identify a model's parameters from logs"),
-    (payload, "identify a load from logs with it"),
+    (payload, "identify the mass of a load from logs"),
     (export_urdf, "write a model as a robot file"),
     (cache, "show or clear the compile cache"),
-    (doctor, "say what is installed, and what for"),
+    (doctor, "list the programs and packages that psdmc can use"),
 )
 """Each command with its line in the help."""
 

@@ -1,4 +1,4 @@
-"""What `psdmc doctor` finds: packages, programs and folders, what each is needed for, and how to get what is missing."""
+"""The command `psdmc doctor`: packages, programs and folders, their purpose, and how to get missing ones."""
 
 from __future__ import annotations
 

@@ -26,8 +26,8 @@ def export_urdf(
         bool | None,
         typer.Option(
             "--mjcf/--no-mjcf",
-            help="write an MJCF beside it, ROBOT.xml, with drive inertia as armature",
-            show_default="where there is drive inertia",
+            help="also write ROBOT.xml, an MJCF with drive inertia as armature",
+            show_default="if the model has drive inertia",
         ),
     ] = None,
 ) -> None:

@@ -56,7 +56,7 @@ def load_numbers(given: str | None) -> tuple[float, tuple[float, float, float]] 
     if not SMALLEST_LOAD <= mass <= LARGEST_LOAD:
         raise InputError(f"--load: {mass:g} kg, expected {SMALLEST_LOAD:g} to {LARGEST_LOAD:g}", hint)
     if not all(abs(value) <= LARGEST_ARM for value in com):
-        raise InputError(f"--load: its centre of mass is beyond {LARGEST_ARM:g} m", hint)
+        raise InputError(f"--load: its centre of mass is more than {LARGEST_ARM:g} m away", hint)
     return mass, (com[0], com[1], com[2])
 
 

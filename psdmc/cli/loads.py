@@ -15,29 +15,32 @@ from psdmc.cli.torque_constants import parsed_torque_constants
 
 def payload(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="model file without the load, calibrated best")
+        Path,
+        typer.Argument(metavar="MODEL", help="model of the robot without the load, best a calibrated one"),
     ],
     logs: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="LOG...", help="logs that were recorded with the load, or their log description"
-        ),
+        typer.Argument(metavar="LOG...", help="logs recorded with the load, or a log description"),
     ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="LOAD.toml", help="write the load")
+        Path | None, typer.Option("-o", "--output", metavar="LOAD.toml", help="write the load to this file")
     ] = None,
     loaded: Annotated[
-        Path | None, typer.Option("--loaded", metavar="MODEL.npz", help="write the model with the load on it")
+        Path | None,
+        typer.Option("--loaded", metavar="MODEL.npz", help="write the model with the load to this file"),
     ] = None,
     frame: Annotated[
-        str | None, typer.Option(metavar="NAME", help="frame of the load's numbers; default: the tip's")
+        str | None, typer.Option(metavar="NAME", help="frame in which the load is given; default: the tip's")
     ] = None,
     torque_constants: Annotated[
         list[str] | None,
-        typer.Option(metavar="JOINT=KT,...", help="N m/A, for logs that hold currents; default: the model's"),
+        typer.Option(
+            metavar="JOINT=KT,...",
+            help="torque constants in N m/A, for logs of currents; default: the model's",
+        ),
     ] = None,
     keep: Annotated[
-        bool, typer.Option("--keep", help="write the files even where the verdict is: not usable")
+        bool, typer.Option("--keep", help="write the files even if the verdict is: not usable")
     ] = False,
 ) -> None:
     """Identify a load's mass, centre of mass and inertia from logs with it; the verdict comes first, exit 6: not usable."""

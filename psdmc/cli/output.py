@@ -28,7 +28,7 @@ def check_report(report: Path | None, *others: Path) -> None:
     numbers = report.with_suffix(".json")
     if _is_same(report, numbers):
         raise InputError(
-            f"{report}: the report's numbers go there, beside the page", "call the page FILE.html"
+            f"{report}: psdmc writes the report's numbers to this file", "call the page FILE.html"
         )
     for path in (report, numbers):
         if path.parent.exists():

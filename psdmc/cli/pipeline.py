@@ -31,20 +31,21 @@ RobotFile = Annotated[
 ]
 RootBody = Annotated[
     str | None,
-    typer.Option(
-        "--root", metavar="BODY", help="body of an MJCF that the robot begins with, where several move"
-    ),
+    typer.Option("--root", metavar="BODY", help="first body of the robot, if several bodies of an MJCF move"),
 ]
 XacroArguments = Annotated[
     list[str] | None,
     typer.Argument(metavar="[NAME:=VALUE]...", help="arguments of a xacro file", show_default=False),
 ]
 XacroOption = Annotated[
-    list[str] | None, typer.Option("--xacro-arg", metavar="NAME:=VALUE", help="the same as an option")
+    list[str] | None,
+    typer.Option("--xacro-arg", metavar="NAME:=VALUE", help="an argument of a xacro file, as an option"),
 ]
 Packages = Annotated[
     list[str] | None,
-    typer.Option("--package", metavar="NAME=DIR", help="where a xacro file's $(find NAME) leads to"),
+    typer.Option(
+        "--package", metavar="NAME=DIR", help="folder of the package that a xacro file calls $(find NAME)"
+    ),
 ]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="model file made by psdmc derive (.npz)")]
 
@@ -54,53 +55,56 @@ def derive(
     arguments: XacroArguments = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="MODEL.npz")] = None,
     base: Annotated[
-        str | None, typer.Option(metavar="LINK", help="link that a chain starts at; default: the whole tree")
+        str | None, typer.Option(metavar="LINK", help="first link of the chain; default: the whole robot")
     ] = None,
-    tip: Annotated[str | None, typer.Option(metavar="LINK", help="link that it ends at")] = None,
+    tip: Annotated[str | None, typer.Option(metavar="LINK", help="last link of the chain")] = None,
     gravity: Annotated[
         list[str] | None,
-        typer.Option(metavar="GX,GY,GZ", help="m/s^2 in the file's root frame; or GX GY GZ"),
+        typer.Option(metavar="GX,GY,GZ", help="gravity in the root frame of the file, m/s^2"),
     ] = None,
     drive_inertia: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="I1,I2,...", help="joints' drive inertias as parameters, kg m^2; 'all': values zero"
+            metavar="I1,I2,...", help="drive inertia of each joint, kg m^2; all: unknown, starting from zero"
         ),
     ] = None,
     assume_zero: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME,...", help="parameters assumed zero, such as link5:mx,link5:Ixz@com"),
+        typer.Option(metavar="NAME,...", help="assume that these parameters are zero, such as link5:mx"),
     ] = None,
     snap: Annotated[
-        float, typer.Option(metavar="RAD", help="make rotations exact that are this near to exact; 0: off")
+        float,
+        typer.Option(metavar="RAD", help="make nearly right angles exact, up to this error in rad; 0: never"),
     ] = DEFAULT_SNAP,
     expand: Annotated[
         bool | None,
         typer.Option(
-            "--expand/--no-expand", help="derive E and P beside theta_b", show_default="for serial chains"
+            "--expand/--no-expand",
+            help="also compute E and P, the expanded form",
+            show_default="for serial chains",
         ),
     ] = None,
     frames: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="LINK,...", help="links that kinematic functions are about; default: the tip, or all ends"
+            metavar="LINK,...",
+            help="frames of poses, Jacobians and loads; default: the tip, or each branch's end",
         ),
     ] = None,
     tool: Annotated[
         list[str] | None,
         typer.Option(
             metavar="X,Y,Z,R,P,Y",
-            help="one more such frame, 'tool', in the tip's: m, rad as in URDF; or X Y Z R P Y",
+            help="add the frame 'tool', given in the tip's frame: m, and rad as in URDF",
         ),
     ] = None,
     lock: Annotated[
-        list[str] | None, typer.Option(metavar="JOINT=VALUE,...", help="hold joints there, rad or m")
+        list[str] | None,
+        typer.Option(metavar="JOINT=VALUE,...", help="fix joints at these positions, rad or m"),
     ] = None,
     floating: Annotated[
         bool,
-        typer.Option(
-            "--floating", help="put the root link on a free joint, as of a robot that walks or flies"
-        ),
+        typer.Option("--floating", help="let the base move freely, for a robot that walks or flies"),
     ] = False,
     root: RootBody = None,
     xacro_arg: XacroOption = None,
@@ -109,7 +113,7 @@ def derive(
         list[str] | None,
         typer.Option(
             metavar="LINK,...",
-            help="links of unknown inertia; 'all', or 'missing': those that the file has none of",
+            help="links whose inertia is unknown; all: every link; missing: links without <inertial>",
         ),
     ] = None,
 ) -> None:
@@ -204,7 +208,7 @@ def check(
     arguments: XacroArguments = None,
     robot: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="robot file to check against instead of the embedded source"),
+        typer.Option(metavar="FILE", help="robot file to compare with; default: the source in the model"),
     ] = None,
     xacro_arg: XacroOption = None,
     package: Packages = None,
@@ -220,7 +224,7 @@ def check(
     found = load(model)
     given, folders, source = xacro_arguments(arguments, xacro_arg), package_folders(package), None
     if robot is None and (given or folders):
-        raise InputError("arguments and packages of a xacro file without the file", "add --robot FILE.xacro")
+        raise InputError("xacro arguments or packages are given, but no xacro file", "add --robot FILE.xacro")
     if robot is not None:
         options = dict(found.provenance.get("options", {}))
         kept = options.pop("xacro_args", {})
@@ -241,52 +245,61 @@ def check(
 def emit_c(
     model: ModelFile,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: the model's name")
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="folder to write; default: the model's name"),
     ] = None,
     lowering: Annotated[
         str,
         typer.Option(
-            help="auto, expanded or factored", autocompletion=lambda: ["auto", "expanded", "factored"]
+            help="form of the code: auto, expanded or factored",
+            autocompletion=lambda: ["auto", "expanded", "factored"],
         ),
     ] = "auto",
     functions: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME,...", help="generate these functions; 'default', 'all'"),
+        typer.Option(metavar="NAME,...", help="functions to generate; also default, all"),
     ] = None,
     real: Annotated[
         str | None,
         typer.Option(
-            help="float64 or float32; default: the target's", autocompletion=lambda: ["float64", "float32"]
+            help="precision: float64 or float32; default: the target's",
+            autocompletion=lambda: ["float64", "float32"],
         ),
     ] = None,
     trig: Annotated[
         str | None,
         typer.Option(
-            help="inline, freestanding (no libm, NaN beyond 1e5 rad) or libm; default: the target's",
+            help="sine and cosine: inline, freestanding (no libm, NaN above 1e5 rad) or libm; default: the target's",
             autocompletion=lambda: ["inline", "freestanding", "libm"],
         ),
     ] = None,
-    name: Annotated[str | None, typer.Option(help="the robot's name in C")] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(help="name of the robot in C, the prefix of all symbols; default: the model's"),
+    ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="write beside other files, and over edited ones of the package")
+        bool, typer.Option("--force", help="write into a folder with other files, and replace edited files")
     ] = False,
-    payload: Annotated[bool, typer.Option("--payload", help="also R_add_payload: loads at run time")] = False,
+    payload: Annotated[
+        bool, typer.Option("--payload", help="also write R_add_payload, for loads at run time")
+    ] = False,
     bodies: Annotated[
-        bool, typer.Option("--bodies", help="also R_theta_from_bodies: theta_b from masses and inertias")
+        bool,
+        typer.Option("--bodies", help="also write R_theta_from_bodies: theta_b from masses and inertias"),
     ] = False,
     friction: Annotated[
         bool,
-        typer.Option("--friction", help="also R_friction: of a model that was calibrated from plain logs"),
+        typer.Option("--friction", help="also write R_friction, for a model calibrated from logs"),
     ] = False,
     adapters: Annotated[
         list[str] | None,
-        typer.Option("--with", metavar="NAME,...", help="also a library for another program: casadi"),
+        typer.Option("--with", metavar="NAME,...", help="also write a library for another program: casadi"),
     ] = None,
     target: Annotated[
         str,
         typer.Option(
             metavar="MACHINE",
-            help=f"{', '.join(PRESETS)}: which machine, see docs/shipping.md",
+            help=f"{', '.join(PRESETS)}: processor to generate for",
             autocompletion=lambda: list(PRESETS),
         ),
     ] = NATIVE.name,
@@ -326,18 +339,18 @@ def emit_c(
     written = len(changed) - len(changed.removed)
     print(f"{folder}: {written} files written" if changed else f"{folder}: nothing changed")
     if changed.removed:
-        print(f"{folder}: removed, as the package has them no more: {', '.join(changed.removed)}")
+        print(f"{folder}: removed, because the package no longer has them: {', '.join(changed.removed)}")
     for path, name_now in changed.kept.items():
-        print(f"note: {path} was not psdmc's and is kept as {name_now}")
+        print(f"note: {path} was not written by psdmc; the old file is now {name_now}")
     for before, now in changed.renamed:
-        print(f"note: renamed since the package that was there: {before} is now {now}")
+        print(f"note: {before} of the old package is now called {now}")
     asked = name or found.mechanism.name
     in_c = identifier(asked)
     print(f"{folder / 'include' / in_c / in_c}.h: the header, #include <{in_c}/{in_c}.h>")
     if in_c != asked:
-        print(f"note: in C '{one_line(asked)}' is {in_c}")
+        print(f"note: the C name of '{one_line(asked)}' is {in_c}")
     elif output is None and asked != folder.name:
-        print(f"note: in C it is {asked}; --name gives it another name")
+        print(f"note: the prefix of C names is {asked}; --name changes it")
     for reason in lacking(found.mechanism, names(adapters)):
         work = ", ".join(kernels.wanted(wanted, found.mechanism))
         print(f"note: {reason} (the C code is not affected); CasADi can call, without derivatives: {work}")
@@ -351,7 +364,7 @@ def emit_c(
 def build(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="folder made by emit-c")],
     edited: Annotated[
-        bool, typer.Option("--edited", help="build although files are not as emit-c wrote them")
+        bool, typer.Option("--edited", help="build even if files of the package were edited")
     ] = False,
 ) -> None:
     """Build an emitted package through its own build files and run its self-test."""

@@ -1,4 +1,4 @@
-"""What `psdmc show` prints of a model."""
+"""The command `psdmc show` for a model."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def joint_errors(robot: Mechanism, certificate: Sequence[float]) -> list[float |
 
 
 def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
-    """What each joint is; of a tree also the link that it hangs on, and where joints follow others what their q is."""
+    """Print the joints. For a tree it adds the link that carries each, and for joints that follow others their q."""
     heads = (
         *("joint", "link"),
         *(() if robot.is_serial else ("hangs on",)),
@@ -138,7 +138,7 @@ def position_range(lower: float, upper: float, unit: str) -> str:
 
 
 def followed(found: Mechanism, i: int) -> str:
-    """What a joint's q is: its own, that of the joint it follows, or a number."""
+    """Describe a joint's q: its coordinate, that of the joint it follows, or a number."""
     coordinate = found.coordinates[i]
     if coordinate.leader is None:
         return f"{coordinate.offset:g}"

@@ -1,4 +1,4 @@
-"""What `psdmc show` says of a calibrated model before anything else: its verdict, its data, and how well it follows them."""
+"""First part of `psdmc show` for a calibrated model: its verdict, its data, and how well it follows them."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _number(value: float, form: str) -> str:
 
 
 def standard_deviations(found: Calibrated | None, count: int) -> Sequence[str]:
-    """Of the base parameters, in words; empty where the model was not calibrated."""
+    """Describe the standard deviations of the base parameters; empty if the model was not calibrated."""
     if found is None or len(found.parameters) != count:
         return [""] * count
     return [f"{std:.2g}" if math.isfinite(std) else "" for std in found.std]

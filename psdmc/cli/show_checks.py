@@ -1,4 +1,4 @@
-"""What `check` and `calibrate` print: comparisons, the mass matrix, the verdict, the accuracy."""
+"""Output of `check` and `calibrate`: comparisons, the mass matrix, the verdict, the accuracy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `psdmc show --json` prints: one JSON document, all numbers with all digits, null where nothing is known."""
+"""Output of `psdmc show --json`: one JSON document, all numbers with all digits, null for unknown values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `psdmc show` prints of a robot file."""
+"""The command `psdmc show` for a robot file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from psdmc.robot.mechanism import Mechanism
 
 
 def print_mechanism(found: Mechanism) -> None:
-    """What a robot file holds: its bodies, what each hangs on and follows, and whether psdmc derives it."""
+    """Print a robot file's bodies, what each hangs on and follows, and whether psdmc derives it."""
     count, own = len(found), len(leaders(found.coordinates))
     shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
     print_line(f"{found.name}: {shape} of {count} joints with {own} coordinates, from {found.base_name}")

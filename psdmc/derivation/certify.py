@@ -131,7 +131,7 @@ def _too_fine(found: Measured, known: Array) -> DerivationError:
     if found.last_digit[worst] > PROMISED:
         return DerivationError(
             f"{whose}: the last digit of the robot's numbers changes it by {known[worst]:.1e} of itself, {expected}",
-            f"check the units of masses, inertias and lengths of '{joint.name}' and what hangs on it; where they are "
+            f"check the units of masses, inertias and lengths of '{joint.name}' and what hangs on it. If they are "
             "right, make this joint fixed, or end the chain before it with --tip",
         )
     without = np.maximum(found.plain, found.last_digit).max()

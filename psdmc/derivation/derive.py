@@ -1,4 +1,4 @@
-"""From a robot to its MODEL: the derivation from top to bottom."""
+"""Derivation of a MODEL from a robot, from top to bottom."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def orthonormal(rotation: NDArray[np.float64]) -> Long:
 
 
 def extended(robot: Scaled) -> Scaled:
-    """The same robot with frames, link frames and the vertical in extended precision."""
+    """Return the robot with frames, link frames and the vertical in extended precision."""
     up = np.array(robot.up, dtype=np.longdouble)
     strength = np.sqrt(times(up, up))
     return replace(
@@ -93,8 +93,8 @@ def has_small_entries(robot: Scaled) -> bool:
 
 
 def is_of_many_scales(robot: Scaled) -> bool:
-    """Whether the lengths from some joint outward are all small but not all zero (a finger of millimetres on an arm of
-    metres), or all lengths are small beside the metres that a joint slides."""
+    """Check if all lengths outward of some joint are small but not all zero, or all lengths are small compared with
+    sliding joints. An example is a finger of millimetres on an arm of metres."""
     if robot.unit < MANY_SCALES and any(joint.length_order for joint in robot.types):
         return True
     reach = [_length(place.translation) for place in robot.link_frames]

@@ -53,8 +53,8 @@ class Numbers(NamedTuple):
 
 
 def last_digit_effect(chain: Mechanism, x: Array, states: States) -> Array:
-    """(n,) largest change of each joint's torque where all of the robot's numbers change by LAST, up or down at random,
-    relative to that joint's largest torque; absolute where that is zero."""
+    """Largest change (n,) of each joint's torque if all numbers of the robot change by LAST, up or down at random. It
+    is relative to that joint's largest torque, or absolute if that is zero."""
     rng = np.random.default_rng(SEED)
     numbers = _numbers(chain, x, _as_it_is, np.dtype(np.float64))
     torques = _torques(chain, numbers, states)

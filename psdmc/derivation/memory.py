@@ -107,8 +107,8 @@ def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
 
 
 def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None:
-    """DerivationError where an expansion of n joints would take more than about a minute: too many velocity terms, or, while
-    these are unknown (0), too large a grid on one of the ways to the robot's ends."""
+    """Raise DerivationError if an expansion of n joints would take more than about a minute. It has too many velocity
+    terms or, while their number is unknown (0), too large a grid towards one of the robot's ends."""
     grid = max(int(np.prod(quadratic_sizes(way[1:]), dtype=float)) for way in ways)
     if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:
         return

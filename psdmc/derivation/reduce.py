@@ -42,7 +42,7 @@ _BLOCK_ROWS = 8192
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduction:
-    """Which columns are base parameters, and what they stand for.
+    """Columns that are base parameters, and the combinations that they represent.
 
     pivots    (l,)     column indices, ascending
     echelon   (l, k)   base parameters = echelon @ columns' parameters; a unit vector at each pivot

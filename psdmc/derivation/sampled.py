@@ -49,7 +49,7 @@ def is_plain(scaled: Scaled) -> bool:
 
 
 def sampled_reduction(scaled: Scaled) -> Reduction:
-    """The same base parameters as the expanded path finds, within the span's columns."""
+    """Find the base parameters of the expanded path from samples, within the span's columns."""
     n = len(scaled.types)
     rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
     return reduced((sparse.csr_array(scaled.span.T) @ rows.T).T)

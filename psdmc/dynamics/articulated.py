@@ -18,7 +18,7 @@ _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Articulated(NamedTuple):
-    """What a body asks for where its frame accelerates: force = linear a + mixed alpha, moment = mixed^T a + angular alpha.
+    """Articulated inertia of a frame: force = linear a + mixed alpha, moment = mixed^T a + angular alpha.
 
     linear   kg, symmetric
     mixed    kg m
@@ -67,14 +67,15 @@ def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
 
 
 def handed(frame: Frame, inertia: Articulated) -> Articulated:
-    """What a frame's parent gets, about the parent's frame: the sum over all limbs that the frame stands for."""
+    """Return what a frame passes to its parent, about the parent's frame: the sum over all limbs that the frame
+    represents."""
     rows = tuple(handed_vector(frame, row) for row in inertia.mixed)
     linear, angular = (tuple(handed_on(frame, part)) for part in (inertia.linear, inertia.angular))
     return Articulated(linear, rows, angular)  # type: ignore[arg-type]
 
 
 def along_parent(frame: Frame, inertia: Articulated) -> Articulated:
-    """From before a joint's turn to the axes of the frame that it sits in."""
+    """Rotate from the axes before a joint's motion to the axes of the frame that carries the joint."""
     return inertia if frame.is_parallel else rotated(inertia, frame.rotation)
 
 
@@ -113,7 +114,7 @@ def rows_of(inertia: Articulated) -> list[list[Scalar]]:
 
 
 def from_rows(rows: Sequence[Sequence[Scalar]]) -> Articulated:
-    """From 6 x 6, of whose symmetric blocks the upper triangles are read."""
+    """Build from a 6 x 6 matrix; of its symmetric blocks only the upper triangles are read."""
     linear = tuple(rows[i][j] for i, j in _PLACES)
     mixed = tuple((row[3], row[4], row[5]) for row in rows[:3])
     angular = tuple(rows[i + 3][j + 3] for i, j in _PLACES)
@@ -139,7 +140,7 @@ def _turned(six: Six, turn: Turn) -> Six:
 
 
 def _turned_mixed(rows: Matrix, turn: Turn) -> Matrix:
-    """The same of a matrix that is not symmetric."""
+    """Rotate a matrix that is not symmetric."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rows
     slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
     moved, crossed = turn.sine * slope, turn.cosine * slope

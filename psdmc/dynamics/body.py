@@ -57,8 +57,8 @@ def turned(body: Body, turn: Turn | Rotation | None, double: Turn | None = None)
 
 
 def spun(body: Body, turn: Turn | None) -> Body:
-    """The same as `turned`, with nested products: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes c t - xy.
-    Four operations fewer, in a longer dependency chain."""
+    """Compute `turned` with nested products: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes c t - xy. Four
+    operations fewer, in a longer dependency chain."""
     if turn is None:
         return body
     xx, yy, zz, xy, xz, yz = body.second
@@ -96,7 +96,8 @@ def _rotated(body: Body, rows: Matrix) -> Body:
 
 
 def shifted(body: Body, offset: Vector) -> Body:
-    """A body about a point that lies at `offset`, about the origin instead: h + m p, S + h p^T + p h^T + m p p^T."""
+    """Move the reference point of a body from `offset` to the origin. Its moments become h + m p and S + h p^T + p h^T
+    + m p p^T."""
     px, py, pz = offset
     hx, hy, hz = body.moment
     xx, yy, zz, xy, xz, yz = body.second
@@ -119,6 +120,7 @@ def joined(a: Body, b: Body) -> Body:
 
 
 def handed_body(frame: Frame, body: Body) -> Body:
-    """What a frame's parent gets of a body about the parent's frame: the sum over all limbs that the frame stands for."""
+    """Return the body that a frame passes to its parent, about the parent's frame: the sum over all limbs that it
+    represents."""
     (mass,), moment = handed_on(frame, [body.mass]), handed_vector(frame, body.moment)
     return Body(mass, moment, tuple(handed_on(frame, body.second)))

@@ -51,8 +51,9 @@ Rows = tuple[tuple[Scalar, ...], ...]
 
 
 class Derivatives(NamedTuple):
-    """n x n each: entry [i][j] = d tau_i / d q_j, d tau_i / d qd_j, d tau_i / d qdd_j = M_ij; and the n torques of
-    gravity, C . (minus gravity), which the recursion also gives."""
+    """Derivatives of torques, n x n each, with entry [i][j] of output i by input j. They are d tau_i / d q_j, d tau_i /
+    d qd_j and d tau_i / d qdd_j = M_ij. The recursion also gives the n torques of gravity, C . (minus gravity). (minus
+    gravity), which the recursion also gives."""
 
     by_q: Rows
     by_qd: Rows
@@ -61,7 +62,7 @@ class Derivatives(NamedTuple):
 
 
 def _summed(frames: Sequence[Frame], found: Derivatives) -> Derivatives:
-    """Of the robot's coordinates."""
+    """Sum derivatives by joints to those by the robot's coordinates."""
     by_q, by_qd, by_qdd = (both_summed(frames, rows) for rows in (found.by_q, found.by_qd, found.by_qdd))
     return Derivatives(by_q, by_qd, by_qdd, summed(frames, found.gravity))
 

@@ -78,7 +78,7 @@ def _on_joints(frames: Sequence[Frame], values: Sequence[Scalar], are_positions:
 
 
 def summed(frames: Sequence[Frame], values: Sequence[Scalar]) -> tuple[Scalar, ...]:
-    """Of each coordinate, from one value per joint's rate."""
+    """Sum one value per joint's rate to one value per coordinate."""
     found: dict[int, list[Scalar]] = {}
     rest = list(values)
     followers: list[tuple[tuple[int, Scalar, Scalar], Scalar]] = []

@@ -64,7 +64,7 @@ def forward_dynamics(
 
 @dataclass(frozen=True, slots=True)
 class _Held:
-    """What a joint's acceleration follows from: that which `own` gives, less what its frame's costs.
+    """Terms from which a joint's acceleration follows: that of `own`, minus the part of its frame's acceleration.
 
     own      nv accelerations if the frame before it did not accelerate besides
     loads    nv of six: the joint's own acceleration per unit of the frame's
@@ -96,8 +96,8 @@ class _Inward:
         return [self.found[i] for i in range(len(self.frames))]
 
     def yielded(self, i: int, needed: Sequence[Scalar]) -> Wrench:
-        """What joint i lets through of what its torques are too much or too little for; `needed`: the torques that hold all
-        joints at constant rates."""
+        """Force that joint i passes on because its torques differ from `needed`, the torques that keep all rates
+        constant."""
         frame, whole = self.frames[i], rigid(self.bodies[i])
         if i in self.beyond:
             whole = both(whole, self.beyond[i])
@@ -171,7 +171,7 @@ def _accelerated(
 
 
 def _along(frame: Frame) -> int | None:
-    """Which of a frame's six accelerations is a joint's own; None where it is no single one."""
+    """Index of the frame's acceleration that is the joint's; None if it is not a single one."""
     if not frame.joint.about_z:
         return None
     ((linear, angular),) = frame.joint.twists

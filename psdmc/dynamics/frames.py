@@ -119,11 +119,11 @@ class Rotation(NamedTuple):
     rows: Matrix
 
     def outward(self, v: Vector) -> Vector:
-        """From the frame before the turn into the frame after it."""
+        """Rotate a vector from the frame before the joint's rotation into the frame after it."""
         return transform(transpose(self.rows), v)
 
     def inward(self, v: Vector) -> Vector:
-        """From the frame after the turn into the frame before it."""
+        """Rotate a vector from the frame after the joint's rotation into the frame before it."""
         return transform(self.rows, v)
 
 
@@ -220,7 +220,7 @@ def joint_turn(frame: Frame, q: Scalar) -> Turn | Rotation | None:
 
 
 def about_z(turn: Turn | Rotation | None) -> Turn | None:
-    """The same turn; ValueError where it is about another axis."""
+    """Return the same rotation about z; ValueError if it is about another axis."""
     if isinstance(turn, Rotation):
         raise ValueError("a joint of several coordinates, where one that turns about z was expected")
     return turn
@@ -249,12 +249,12 @@ def joint_offset(frame: Frame, q: Scalar) -> Vector:
 
 
 def handed_on(frame: Frame, values: Iterable[Scalar]) -> Iterator[Scalar]:
-    """What a frame's parent gets, from what the frame gives: the same, or the sums over all limbs that it stands for."""
+    """Return what a frame passes to its parent: the value itself, or the sums over all limbs that it represents."""
     return iter(values) if frame.limbs is None else map(frame.limbs, values)
 
 
 def handed_vector(frame: Frame, v: Vector) -> Vector:
-    """The same of a vector."""
+    """Return a vector as `handed_on` does."""
     x, y, z = handed_on(frame, v)
     return (x, y, z)
 

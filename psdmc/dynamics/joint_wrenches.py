@@ -97,8 +97,8 @@ def _scaled(wrench: Wrench, factor: float) -> Wrench:
 
 
 def _turned_wrench(axis: Axis, composite: Composite) -> Wrench:
-    """Wrench that accelerations a + U r + 2 w x r' + r'' require, differentiated as the composite turns about z: z x h
-    takes the place of h, and so on."""
+    """Differentiate the wrench of a + U r + 2 w x r' + r'' as the composite rotates about z: z x h takes the place of
+    h."""
     (_, (hx, hy, _), (xx, yy, _, xy, xz, yz)), (second, first), (force, moment) = composite
     (pxx, pxy, pxz), (pyx, pyy, pyz), (pzx, pzy, _) = second
     (wx, wy, wz), (u, differences) = axis.w, axis.spin

@@ -76,7 +76,7 @@ def moved_to(composite: Composite, offset: Vector) -> Composite:
 
 
 def along_parent(frame: Frame, composite: Composite) -> Composite:
-    """From the orientation before a joint's turn to the axes of the link before it."""
+    """Rotate from the axes before a joint's motion to the axes of the link before it."""
     if frame.is_parallel:
         return composite
     second, first = composite.momenta
@@ -121,8 +121,8 @@ def driven(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> C
 
 
 def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
-    """The same of a joint of several coordinates, whose rates u and s are along the moved axes: r' gets s x r + u, r'' gets
-    du/dt + s x u + U r + 2 s x r', U of s and ds/dt."""
+    """Drive a joint of several coordinates, whose rates u and s are along the moved axes. r' gets s x r + u, and r''
+    gets du/dt + s x u + U r + 2 s x r', with U of s and ds/dt."""
     (u, s), (u_change, s_change) = (
         combined(joint, own_rates(joint, qd)),
         combined(joint, own_rates(joint, qdd)),

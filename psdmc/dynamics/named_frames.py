@@ -121,8 +121,8 @@ def _running(parts: Sequence[Vector]) -> list[Vector]:
 def link_wrenches(
     named: Sequence[NamedFrame], wrenches: Sequence[Sequence[Scalar]], unit: float = 1.0
 ) -> dict[int, tuple[Vector, Vector]]:
-    """Force and moment about a joint frame's origin along its axes, by joint, from a force and a moment per named frame
-    along that frame's own axes about its origin.
+    """Move wrenches from named frames to joint frames: force and moment about each joint frame's origin, along its
+    axes. The given force and moment of a named frame are along that frame's axes, about its origin.
 
     unit   m, unit of length of the algorithm that uses them: a force of one there is `unit` times as many N
     """

@@ -1,5 +1,5 @@
-"""Rows and wrenches of joints of several coordinates, in the recursion of derivatives: each of their rates is along or
-about one of the moved frame's own axes, which takes the place of z.
+"""Rows and wrenches of joints with several coordinates, in the recursion of derivatives. Each of their rates is along
+or about one of the moved frame's axes, which takes the place of z.
 
 All is in the orientation after the joint's turn. One term is added to those of a single axis: a rate of the joint turns
 the directions of its other rates, V x E with the joint's own twist V.
@@ -25,7 +25,7 @@ def unit_twists(joint: JointType) -> list[tuple[int, bool]]:
 
 
 def to_z(v: Vector, axis: int) -> Vector:
-    """The same vector where x, y, z are exchanged in turn, so that the axis becomes z."""
+    """Permute x, y, z cyclically so that the axis becomes z."""
     return (v[(axis + 1) % 3], v[(axis + 2) % 3], v[axis])
 
 

@@ -1,4 +1,4 @@
-"""Which entries of q, and of the rates, belong to which joint."""
+"""Slices of q, and of the rates, that belong to each joint."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ def normalized(frames: Sequence[Frame], q: NDArray[Any]) -> NDArray[Any]:
 
 
 def joints_of_rates(frames: Sequence[Frame]) -> tuple[int, ...]:
-    """Of each rate the joint that it is of."""
+    """Return the joint of each rate."""
     return tuple(i for i, f in enumerate(frames) if f.follows is None for _ in range(f.joint.nv))
 
 
 def flat(values: Iterable[Sequence[Scalar]]) -> list[Scalar]:
-    """What joints have several of, in a row."""
+    """Flatten values that joints have several of."""
     return [x for own in values for x in own]
 
 
 def leading(frames: Sequence[Frame]) -> list[Frame]:
-    """Those whose joints have coordinates of their own; algorithms see no others (following.py)."""
+    """Return the joints that have coordinates; algorithms see no others (following.py)."""
     return [frame for frame in frames if frame.follows is None]
 
 

@@ -20,7 +20,7 @@ class Spin(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Of one frame, along its own axes: angular velocity, derivative of the reference angular velocity, and that
+    """Rates of one frame along its axes: angular velocity, derivative of the reference angular velocity, and that
     velocity.
 
     w_r   None: there is one velocity, w
@@ -61,7 +61,8 @@ def spin_of(rates: Rates) -> Spin:
 
 
 def spin_before_turn(frame: Frame, previous: Spin, before: Rates, turning: JointRates | None) -> Spin:
-    """The spin of a leaf in the frame before its turn: its parent's plus ([qd w_r + qd_r w + qd qd_r z] + qdd_r)[z]."""
+    """Compute the spin of a leaf in the frame before its rotation. It is the parent's plus ([qd w_r + qd_r w + qd qd_r
+    z] + qdd_r)[z]."""
     (u, d) = _turned_field(frame, previous)
     if turning is None:
         return Spin(u, d)
@@ -107,6 +108,7 @@ def _permuted_differences(rotation: Matrix, spin: Spin, field: Matrix) -> Vector
 
 
 def _axis(direction: Vector) -> int:
-    """Which axis a direction is, either way; -1 where it is none. Beside a cosine that is 1.0, a sine may be 1e-9."""
+    """Return the number of the axis that a direction is along, in either sense; -1 if it is along none. Beside a cosine
+    that is 1.0, a sine may be 1e-9."""
     sizes = tuple(map(abs, direction))
     return IDENTITY.index(sizes) if sizes in IDENTITY else -1

@@ -1,4 +1,4 @@
-"""Which entries of a robot's matrices can differ from zero, by its joints' tree and their axes: no state is looked at.
+"""Places of matrix entries that can differ from zero, found from the robot's tree and axes without any state.
 
 The algorithms run on scalars of which nothing is known but that they may be other than zero. An entry that comes out as
 the number zero is zero at every state, whatever the inertias.
@@ -60,7 +60,7 @@ SOMETHING = Something()
 
 
 def mass_matrix_places(chain: Mechanism, lift: Array) -> Places:
-    """Of the mass matrix's lower triangle, diagonal included.
+    """Return the places in the mass matrix's lower triangle, diagonal included.
 
     lift  (11 n, l) base parameters to standard parameters about the link frames
     """
@@ -72,7 +72,7 @@ def mass_matrix_places(chain: Mechanism, lift: Array) -> Places:
 
 
 def regressor_places(chain: Mechanism, lift: Array) -> Places:
-    """Of the torques' regressor in base parameters, (nv, l); `lift` as of `mass_matrix_places`."""
+    """Return the places in the torques' regressor in base parameters, (nv, l); `lift` as in `mass_matrix_places`."""
     needed = frozenset(np.flatnonzero(lift.any(axis=1)).tolist())
     placed = [joint.link_frame for joint in chain.joints]
     q, rates = [SOMETHING] * chain.nq, [SOMETHING] * chain.nv
@@ -88,7 +88,7 @@ def _in_base_parameters(rows: tuple[dict[int, Scalar], ...], lift: Array) -> Ite
 
 
 def _body(chain: Mechanism, i: int, needed: NDArray[np.bool_]) -> Body:
-    """Of a link some of whose standard parameters are not zero, about its joint frame."""
+    """Return the body of a link about its joint frame, if some of its standard parameters are not zero."""
     moved = np.abs(joint_frame_map(chain.joints[i].link_frame)) @ needed
     return body_from_parameters(_unknown(moved))
 

@@ -81,7 +81,7 @@ def _of_rates(joint: JointType, own: Matrix, mixed: Matrix) -> Rows:
 
 
 def _coefficients(squared: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """Of an angle t, from its square:
+    """Compute the coefficients of an angle t from its square:
 
         b = (1 - cos t) / t^2,  c = (t - sin t) / t^3,  d = (1/2 - b) / t^2,  e = (3 c - b) / (2 t^2).
 

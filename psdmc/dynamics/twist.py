@@ -27,7 +27,7 @@ def axis_twist(joint: JointType) -> Twist:
 
 
 def efforts(joint: JointType, force: Vector, moment: Vector) -> tuple[Scalar, ...]:
-    """What a force and a moment about the joint frame's origin do along each of the joint's rates."""
+    """Project a force and a moment about the joint frame's origin onto each of the joint's rates."""
     values = (*force, *moment)
     return tuple(weighted((*linear, *angular), values) for linear, angular in joint.twists)
 

@@ -53,7 +53,7 @@ class Exported:
 def export_urdf(
     model: DynamicsModel, path: str | Path, mjcf: bool | None = None, progress: Progress = silent
 ) -> Exported:
-    """Write the model as a URDF whose links have its theta_b, and are the physical ones nearest to those of its file.
+    """Write the model as a URDF whose links have the model's theta_b and are the physical ones nearest to the file's.
 
     If the model holds a URDF, names, limits and shapes are from that file. Otherwise links, joints and limits are
     from the model. Friction of a calibrated model is in <dynamics>.
@@ -71,7 +71,7 @@ def export_urdf(
     drives = links.parameters[:, DRIVE]
     wanted = bool(drives.any()) if mjcf is None else mjcf
     if wanted and beside == target:
-        raise InputError(f"{target}: the MJCF goes there, beside the URDF", "call the URDF NAME.urdf")
+        raise InputError(f"{target}: psdmc writes the MJCF to this file", "call the URDF NAME.urdf")
     what, text, notes = _urdf(model, links)
     progress("reading it back")
     readings = read_urdf_back(model, text, drives, what.gravity)

@@ -45,7 +45,7 @@ def trace(g: Ingredients) -> Outputs:
 
 
 def multiplied(g: Ingredients) -> Outputs:
-    """What the function puts out, for functions that go on with it."""
+    """Return the function's outputs, for functions that continue with them."""
     found = trace(g)
     by_tau = found["dqdd_dtau"]
     blocks = {

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 def trace(g: Ingredients) -> Outputs:
-    """At rest: d g / d q is symmetric, the second derivatives of potential energy, so that the lower triangle is enough
-    where joints have one coordinate each. Tangents of turns do not commute: there both are needed."""
+    """Trace derivatives at rest: d g / d q is symmetric, so the lower triangle is enough if joints have one coordinate
+    each. Tangents of turns do not commute: there both are needed."""
     still = g.still
     found = inverse_dynamics_derivatives(
         g.frames, g.bodies, g.drives, g.inputs["q"], still, still, g.base_acceleration, g.choices

@@ -89,7 +89,7 @@ def _on_arrays(
     rates: Callable[[Array, Array], tuple[Array, Array]],
     unit: Callable[[Array], Array],
 ) -> Arrays:
-    """The same step on vectors of joints, (k, nq) and (k, nv), in place of lists of numbers."""
+    """Take the step on arrays of joints, (k, nq) and (k, nv), instead of lists of numbers."""
     dt = step_on_arrays(given)
     q, qd = given["q"], given["qd"]
     first = rates(q, qd)

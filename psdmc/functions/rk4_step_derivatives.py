@@ -144,8 +144,8 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 def _on_arrays(
     given: Mapping[str, Array], maps: CoordinateMaps, at: Callable[[Array, Array], Stage]
 ) -> Arrays:
-    """The same step on (k, nq) and (k, n) arrays: the stages as one matrix each, of the derivatives of the coordinates' and
-    the rates' slopes by (q, qd, tau)."""
+    """Take the step on (k, nq) and (k, n) arrays. Each stage is one matrix: derivatives of the coordinates' and the
+    rates' slopes by (q, qd, tau)."""
     dt, q0, n = step_on_arrays(given), given["q"], given["qd"].shape[-1]
     count, step = len(q0), dt[..., None]
     unit = np.broadcast_to(np.eye(2 * n, 3 * n), (count, 2 * n, 3 * n))

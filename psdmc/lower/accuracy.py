@@ -46,16 +46,17 @@ class Accuracy:
         self._states = dict(zip(("q", "qd", "qdd"), vectors, strict=True))
 
     def error(self, arrangement: Arrangement, recipe: Recipe = inverse_dynamics.RECIPE) -> float:
-        """That of a function in an arrangement: of the mass matrix by itself, whose entries may be small beside the torques
-        that gravity asks for; of others by inverse dynamics."""
+        """Return the error of a function in an arrangement: the mass matrix is compared by itself, others by inverse
+        dynamics. Entries of the mass matrix may be small compared with gravity torques."""
         if recipe.polynomials is not Polynomials.MASS:
             recipe = inverse_dynamics.RECIPE
         return self.error_of(recipe, trace_dynamics(recipe, arrangement, self.robot))
 
     def error_of(self, recipe: Recipe, program: Program) -> float:
-        """Largest difference of a function that is a part of the torques from Newton-Euler and composite bodies about the
-        file's link frames, as a torque (accelerations times the mass matrix) relative to the joint's largest one, of the
-        mass matrix relative to its row's largest entry; absolute where that is zero."""
+        """Return the largest difference from Newton-Euler of a function that is a part of the torques. Newton-Euler and
+        composite bodies are about the file's link frames. The difference is a torque (accelerations times the mass
+        matrix) relative to the joint's largest one, or one of the mass matrix relative to its row's largest entry;
+        absolute if that is zero."""
         signature, part = recipe.signature, recipe.polynomials
         given = self._states | {"tau": self._torques, "theta_b": self.theta_b}
         with np.errstate(all="ignore"):  # accelerations of a mass matrix that has no inverse

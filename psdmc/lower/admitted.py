@@ -1,4 +1,4 @@
-"""Which functions a model can have. Some need a positive definite mass matrix, or links whose parameters are all known;
+"""Functions that a model can have. Some need a positive definite mass matrix, or links whose parameters are all known;
 baked code needs a known theta_b."""
 
 from __future__ import annotations

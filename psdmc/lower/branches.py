@@ -1,4 +1,4 @@
-"""What an exchange of carriers saves, estimated from the branches of a tree that it changes.
+"""Estimate of the operations that an exchange of carriers saves, from the branches of a tree that it changes.
 
 The cost of a function of a tree is nearly a sum over its branches; the bodies that carry them add what branches share. The
 search of a large robot therefore traces the changed branches with these bodies alone, before and after the exchange, and
@@ -69,7 +69,7 @@ class Branches:
 
 
 def around(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, ...]:
-    """Of each of these joints the limb that it is in, and all that carry it, ascending. Of a body that carries several
+    """Return the limb of each of these joints, and all joints that carry it, ascending. Of a body that carries several
     limbs the first one: what limbs take from it is needed anyway."""
     children: dict[int, list[int]] = {i: [] for i in range(BASE, len(frames))}
     for i, frame in enumerate(frames):

@@ -70,8 +70,8 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
 
 
 def every_parameter(reframed: Reframed, representative: Array) -> tuple[tuple[int, ...], Array]:
-    """All link parameters that theta_b has a part in, and (count, l) theta_b to their values: more than carriers would be,
-    but none of them stands for another, whatever its size."""
+    """Return all link parameters that theta_b contains, and the (count, l) matrix from theta_b to their values. These
+    are more than the carriers, but none of them stands for another, whatever its size."""
     lift = _lifted(reframed, representative).astype(np.float64)
     reached = np.flatnonzero(lift.any(axis=1))
     return tuple(reached.tolist()), lift[reached]
@@ -161,8 +161,8 @@ def _units(reframed: Reframed, representative: Array) -> tuple[Array, Array]:
 
 
 def _torque_rows(reframed: Reframed) -> Long:
-    """(r, 11 n) rows that the torques depend on, in pseudo-inertia form, in extended precision: nothing but rank, where
-    samples of all joints have thousands of rows."""
+    """Compute (r, 11 n) rows that the torques depend on, in pseudo-inertia form, in extended precision. They only serve
+    the rank; samples of all joints have thousands of rows."""
     here = [Placement.identity()] * len(reframed.frames)
     rows = torque_rows(reframed.frames, here, reframed.base_acceleration)
     back = np.round(np.linalg.inv(pseudo_map()))  # zeros and ones

@@ -60,7 +60,7 @@ class Careful(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CarrierSpace:
-    """Which sets of link parameters can carry a model, and the values that theta_b gives them.
+    """Sets of link parameters that can carry a model, and the values that theta_b gives them.
 
     r, the rank of all columns; l, the model's base parameters
 
@@ -98,8 +98,8 @@ class CarrierSpace:
         return chosen if len(chosen) == len(self.tableau.basis) else self.tableau.basis
 
     def exchanges(self, carriers: Sequence[int]) -> list[tuple[int, int]]:
-        """Pairs (out, in) whose exchange leaves a basis: in the old basis, the parameter that comes in has a fair share
-        of the one that goes out."""
+        """Return pairs (out, in) whose exchange leaves a basis: the parameter that enters has a fair share of the one
+        that leaves."""
         others = [j for j in range(self.count) if j not in carriers and self.lengths[j]]
         share = np.abs(self._coordinates(carriers, others)) * self.lengths[list(carriers), None]
         fair = np.argwhere((share > FAIR_SHARE * self.lengths[others]).T)

@@ -118,7 +118,7 @@ def traced(
     unit: float,
     by_theta: Callable[[], ByTheta],
 ) -> Recorded:
-    """What a recipe records on these frames, bodies and symbols: every entry of its outputs with its slot."""
+    """Record a recipe on these frames, bodies and symbols: every entry of its outputs with its slot."""
     ingredients = Ingredients(
         frames=reframed.frames,
         base_acceleration=reframed.base_acceleration,

@@ -25,7 +25,7 @@ class Geometry:
 
     @cached_property
     def feet(self) -> tuple[tuple[Foot, ...], ...]:
-        """Those of `all_feet` that give different frames: parallel and crossing axes have the same foot either way."""
+        """Return those of `all_feet` that give different frames: parallel and crossing axes have one foot."""
         seen: dict[tuple[Foot, ...], Reframed] = {}
         for feet in all_feet(self.chain):
             reframed = self.reframed(feet)

@@ -1,4 +1,4 @@
-"""From a model to the kernels that emission prints: each function by its cheapest lowering."""
+"""Lowering of a model to the kernels that emission prints: each function in its cheapest form."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ class _Lowered:
         return self._kernels[key]
 
     def _packed(self, recipe: Recipe, packing: Packing, theta: bool) -> Kernel:
-        """Of a function that packs a matrix, from that matrix's own function."""
+        """Pack a matrix function's kernel from the function of the whole matrix."""
         dense, sizes = RECIPES[packing.function], self._search(theta).robot.sizes
         _, columns = sizes.shape(dense.signature.outputs[0].axes)
         places = packing.places(self.model.mechanism, self.model.representative)
@@ -187,7 +187,7 @@ class _Lowered:
         return Kernel(function, theta, one, lanes, lowering)
 
     def _shortened(self, program: Program) -> Program:
-        """By the passes: once for a PROGRAM that is scored so first and taken then."""
+        """Run the passes, once for a PROGRAM that is scored first and used then."""
         found = next((short for known, short in self._short if known is program), None)
         if found is None:
             found = shortened(program)
@@ -195,7 +195,7 @@ class _Lowered:
         return found
 
     def _in_limbs(self, recipe: Recipe, kernel: Kernel) -> Kernel:
-        """With limbs of equal structure in lanes, where that is worth while."""
+        """Put limbs of equal structure into lanes, if that is cheaper."""
         if self.model.mechanism.is_serial or self.lowering == "expanded":
             return kernel
         shared = RECIPES[recipe.shares] if recipe.shares else recipe
@@ -216,8 +216,8 @@ class _Lowered:
         return LimbSearch(self._search(False), recipe, self.costs)
 
     def _expanded(self, recipe: Recipe, theta: bool) -> Program | None:
-        """By the expanded lowering, with fewer coefficients left out or made one where that loses digits; None where they
-        are lost all the same."""
+        """Lower in expanded form, with fewer coefficients left out or made one if that loses digits; None if they are
+        lost anyway."""
         accuracy = self._search(theta).accuracy
         for noise in COEFFICIENT_NOISES:
             program = lower_expanded(self.model, recipe, theta, self.costs, noise)
@@ -234,8 +234,8 @@ class _Lowered:
         return min(self._candidates(recipe, theta), key=scoring.score)
 
     def _serves_both(self, single: Program, batch: Program) -> bool:
-        """Whether one state takes the lanes' arithmetic: sums of angles by the addition theorems save lanes a sincos each
-        and cost one state of a long function next to nothing."""
+        """Check if code for one state can use the arithmetic of the lanes. Sums of angles by the addition theorems save
+        lanes a sincos each and cost one state of a long function next to nothing."""
         own, costs = self.single.score(single), self.costs
         if not costs.has_vectors or own < costs.shared_from:
             return False
@@ -262,7 +262,7 @@ class _Lowered:
         yield from traced
 
     def _cheapest(self, programs: Sequence[Program]) -> set[int]:
-        """Which of them code for one state and code for lanes take."""
+        """Choose the cheapest programs, for one state and for lanes."""
         scores = [[scoring.score(each) for each in programs] for scoring in (self.single, self.batch)]
         return {each.index(min(each)) for each in scores}
 

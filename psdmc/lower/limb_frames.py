@@ -53,7 +53,7 @@ def _type_of(frame: Frame) -> Hashable:
 
 
 def _pattern_of(frame: Frame) -> Hashable:
-    """What decides which operations a frame costs. Those on the base turn constants alone."""
+    """Return the pattern that decides which operations a frame costs. Those on the base turn constants alone."""
     if frame.parent == BASE:
         return frame.joint.word, frame.follows is None, frame.quarters
     zeros = tuple(x == 0.0 for row in (*frame.rotation, frame.translation) for x in row)
@@ -86,7 +86,7 @@ class Place:
 
 
 def places(count: int, groups: Sequence[Limbs]) -> tuple[Place, ...]:
-    """Those of a robot of `count` joints, in the order of their first joints."""
+    """Return the places of a robot of `count` joints, in the order of their first joints."""
     found = [
         Place(joints, number, k == 0)
         for number, limbs in enumerate(groups)
@@ -113,7 +113,7 @@ def one_limb(frames: Sequence[Frame], among: Sequence[Place]) -> tuple[Frame, ..
 def _followed(
     frames: Sequence[Frame], place: Place, new: Mapping[int, int]
 ) -> tuple[int, Scalar, Scalar] | None:
-    """What the joint of a place follows: a place, with a constant per limb where ratios or offsets differ."""
+    """Return the place that the joint of a place follows, with a constant per limb if ratios or offsets differ."""
     follows = [frame.follows for frame in frames if frame.follows is not None]
     if not follows:
         return None

@@ -59,7 +59,7 @@ def weight(limbs: LimbProgram, lanes: int, costs: Costs) -> float:
 def weight_of_stages(
     groups: Sequence[LimbGroup], stages: Iterable[StageCost], lanes: int, costs: Costs
 ) -> float:
-    """The same of groups and the costs of their stages."""
+    """Return the weight of groups and the costs of their stages."""
     one, each = for_one_state(costs), for_lanes(costs)
     parts_of = {group.number: -(-group.count // lanes) for group in groups}
     total = 0.0
@@ -187,7 +187,7 @@ class LimbSearch:
         )
 
     def _admissible(self, start: Arrangement, groups: Sequence[Limbs]) -> Arrangement:
-        """By articulated bodies where limbs hang on a body: elimination in a mass matrix does not say what it sums."""
+        """Choose articulated bodies if limbs hang on a body: elimination in a mass matrix does not show what it sums."""
         hang = any(start.reframed.frames[limbs[0][0]].parent != BASE for limbs in groups)
         if not self.recipe.accelerates or not hang:
             return start

@@ -126,7 +126,7 @@ class _Trace:
         return kinds[index]
 
     def recorded(self) -> Mapping[Slot, Scalar]:
-        """What the recipe gives, by slots whose indices count places."""
+        """Return the recipe's outputs by slots whose indices count places."""
         arrangement, unit = self.arrangement, self.arrangement.unit
         values = carrier_values(arrangement, self.robot.theta_b, self.tracer)
         bodies, drives = bodies_from_carriers(arrangement.n, arrangement.carriers, values, unit)
@@ -161,7 +161,7 @@ class _Trace:
         return [tuple(first[joint] + k for joint in place.joints) for k in counts]
 
     def outputs(self, found: Mapping[Slot, Scalar]) -> Iterator[tuple[Slot, Scalar]]:
-        """What is stored, by the core's slots and those of limbs. Zeros are not stored."""
+        """Return the stored outputs by slots of the core and of limbs. Zeros are not stored."""
         for quantity in self.recipe.signature.stored:
             entries = [
                 [(place.group, own) for place in self.places for own in self._entries(place, axis)]

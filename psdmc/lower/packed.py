@@ -1,4 +1,4 @@
-"""Of a matrix function's kernel, the part that puts out some entries of the matrix."""
+"""Packing of a matrix function's kernel: the part that computes some entries of the matrix."""
 
 from __future__ import annotations
 

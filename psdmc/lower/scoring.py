@@ -1,4 +1,4 @@
-"""What a PROGRAM costs on a target, as one number that a search compares."""
+"""Cost of a PROGRAM on a target, as one number that a search compares."""
 
 from __future__ import annotations
 

@@ -180,8 +180,9 @@ class Search:
         return best
 
     def _uncarried(self, reframed: Reframed) -> Arrangement:
-        """With every parameter by itself. Which of them may stand for others is found by columns of all joints' torques
-        together, of which a small joint's are a small part: on robots of many scales its digits are lost there."""
+        """Return the arrangement in which each parameter is separate. Which of them may stand for others is found by
+        columns of all joints' torques together, of which a small joint's are a small part: on robots of many scales its
+        digits are lost there."""
         carriers, transfer = every_parameter(reframed, self.robot.representative)
         return Arrangement(reframed, 1.0, carriers, transfer, CHOICES[0], is_basis=False)
 
@@ -197,22 +198,22 @@ class Search:
         return lambda arrangement: accuracy.error(arrangement, recipe) <= limit
 
     def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
-        """What a function's PROGRAM costs in an arrangement; traced once."""
+        """Compute the cost of a function's PROGRAM in an arrangement; it is traced once."""
         key = recipe.name, a.reframed, a.unit, a.carriers, a.choices
         if key not in self._costs:
             self._costs[key] = cost_of_dynamics(recipe, a, self.robot)
         return self._costs[key]
 
     def _anew(self, choices: Choices) -> Iterator[Arrangement]:
-        """What the search began with, so arranged: of what was chosen for another function, a large robot's budget takes
-        little back."""
+        """Start the search again from its first choices, in this arrangement. Of what was chosen for another function,
+        a large robot's budget takes little back."""
         for feet in self.geometry.feet:
             first = next(self.starts(feet))
             yield replace(first, choices=choices)
 
     def _by_the_cheaper_way(self, recipe: Recipe, start: Arrangement, scoring: Scoring) -> Arrangement:
-        """By articulated bodies where these cost less from the start. Serial arms keep the factorized mass matrix: what the
-        two differ by there is less than what the search goes on to find."""
+        """Choose articulated bodies if they cost less from the start. Serial arms keep the factorized mass matrix: what
+        the two differ by there is less than what the search goes on to find."""
         if not recipe.accelerates or self._is_arm or any_follows(start.reframed.frames):
             return start
         other = replace(start, choices=replace(start.choices, articulated=True))
@@ -275,7 +276,7 @@ def _weights(space: CarrierSpace) -> list[float]:
 
 
 def _rearranged(found: Arrangement, choices: Iterable[Choices]) -> Iterator[Arrangement]:
-    """With other choices, but the same way to accelerations."""
+    """Return the arrangement with other choices, but the same algorithm for accelerations."""
     way = found.choices.articulated
     return (replace(found, choices=replace(each, articulated=way)) for each in choices)
 

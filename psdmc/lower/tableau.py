@@ -33,7 +33,7 @@ class Tableau:
 
     @staticmethod
     def of(columns: Long, basis: Sequence[int]) -> Tableau:
-        """By Gauss-Jordan elimination with row pivots; the basis's columns must be independent.
+        """Build the tableau by Gauss-Jordan elimination with row pivots; the basis's columns must be independent.
 
         The other columns are needed in the pivots' rows only: what the basis's ask of those is done to them afterwards.
         """

@@ -38,17 +38,17 @@ RENAMED = (
 class DynamicsModel(Answers):
     """Inverse dynamics as monomials times constants: tau[i] = y(state) @ P[i] @ theta_b.
 
-    n joints, p monomials, l base parameters. Functions that are not below, such as forward_dynamics, are those of compiled
-    robots (psdmc.functions), in NumPy.
+    A model has all functions of compiled robots as methods, computed in NumPy. Their arrays are (..., nq) for q and
+    (..., nv) for rates and torques, in SI units; leading axes are states. n joints, p monomials, l base parameters.
 
-    expansion    E and P; None where derived with --no-expand
-    theta_b      (l,) float      base parameters, SI, units per entry; None while unknown
-    B            (l, 11n) float  theta_b = B @ x for standard parameters x within the chain's parameter_span
+    expansion    E and P; None if derived with --no-expand
+    theta_b      (l,) float      base parameters, SI units as in `base_parameters`; None if unknown
+    B            (l, 11n) float  theta_b = B @ x, for standard parameters x that the assumptions allow
     mechanism    the robot: joints, link frames, gravity, limits, standard parameters
-    certificate  (nv,)           largest torque error against Newton-Euler on fresh samples, per rate of the joints,
-                                 relative to that rate's largest torque there
+    certificate  (nv,)           largest torque error against Newton-Euler at random states, per joint rate, relative to
+                                 the largest torque of that rate
     provenance   plain JSON values: source text, its hash and format, options, snapping and its effect, tolerances
-    calibrated   what a calibration found; None: not calibrated
+    calibrated   what a calibration found, with the covariance of theta_b and the verdict; None if not calibrated
     """
 
     expansion: Expansion | None
@@ -84,31 +84,32 @@ class DynamicsModel(Answers):
 
     @property
     def chain(self) -> Mechanism:
-        """The mechanism, by its name in psdmc 0.1."""
+        """The mechanism; psdmc 0.1 called it `chain`."""
         return self.mechanism
 
     @property
     def joint_names(self) -> tuple[str, ...]:
+        """Names of the n joints, from base to tip."""
         return self.mechanism.joint_names
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """n names: the link that moves with each joint, and with all that is fixed to it is a body."""
+        """Names of the n links that the joints move. A link with everything fixed to it is a body."""
         return tuple(joint.link_name for joint in self.mechanism.joints)
 
     @property
     def q_names(self) -> tuple[str, ...]:
-        """nq names of q's entries: a joint's own, or 'root_joint.x' and so on where it has several coordinates."""
+        """Names of the nq entries of q: the joint's name, or 'root_joint.x' and so on for a joint with several entries."""
         return self.mechanism.q_names
 
     @property
     def v_names(self) -> tuple[str, ...]:
-        """nv names of the entries of rates, accelerations and torques: a joint's own, or 'root_joint.vx' and so on."""
+        """Names of the nv entries of rates, accelerations and torques, such as 'elbow' or 'root_joint.vx'."""
         return self.mechanism.v_names
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Names of the frames that kinematic functions are about."""
+        """Names of the frames of poses, Jacobians, wrenches and loads, in the order of results."""
         return tuple(frame.name for frame in self.mechanism.frames)
 
     @property
@@ -133,41 +134,41 @@ class DynamicsModel(Answers):
 
     @property
     def E(self) -> NDArray[np.uint8] | None:
-        """(5n, p) exponents of the monomials; None where they were not expanded."""
+        """Exponents of the monomials, (5n, p) uint8; None if the model was derived without them."""
         return None if self.expansion is None else self.expansion.E
 
     @property
     def P(self) -> tuple[sparse.csr_array, ...] | None:
-        """n sparse reduction matrices (p, l), one per joint; None with E."""
+        """Sparse reduction matrices (p, l), one per joint; None if the model was derived without them."""
         return None if self.expansion is None else self.expansion.P
 
     @property
     def p(self) -> int | None:
-        """Number of monomials; None where they were not expanded."""
+        """Number of monomials; None if the model was derived without them."""
         return None if self.expansion is None else self.expansion.p
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """For each base parameter the first standard parameter (index into x) that only this base parameter contains,
-        with factor one."""
+        """Index into x, per base parameter, of the first standard parameter that only this base parameter contains, with
+        factor one."""
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
     @property
     def is_reduced(self) -> bool:
-        """Whether every base parameter has such a pivot, as those from the derivation do."""
+        """True if every base parameter has a pivot, as in every derived model."""
         return bool(self._leads.any(axis=1).all())
 
     @property
     def _leads(self) -> NDArray[np.bool_]:
-        """(l, 11n) true where a standard parameter is contained in one base parameter alone, with factor one."""
+        """Shape (l, 11n): true if a standard parameter is contained in one base parameter alone, with factor one."""
         is_alone = (self.B != 0.0).sum(axis=0) == 1
         return np.asarray(is_alone & (self.B == 1.0))
 
     @property
     def representative(self) -> Array:
-        """(11n, l) standard parameters from base parameters, within the chain's parameter_span.
+        """Matrix (11n, l) that gives standard parameters with a given theta_b: B @ representative = 1.
 
-        Each base parameter is placed on its pivot; the span's other coordinates are zero. B @ representative = 1.
+        Each base parameter is placed on its pivot. The other free coordinates are zero.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -178,13 +179,13 @@ class DynamicsModel(Answers):
         )
 
     def expanded(self) -> Expansion:
-        """E and P; InputError where the model has none."""
+        """Return E and P; InputError if the model has none."""
         if self.expansion is None:
             raise InputError("this model was derived without E and P", "derive it again without --no-expand")
         return self.expansion
 
     def known_theta_b(self) -> Array:
-        """theta_b; InputError while it is unknown."""
+        """Return theta_b, (l,); InputError if it is unknown."""
         if self.theta_b is None:
             raise InputError(
                 f"the base parameters of '{self.mechanism.name}' are unknown",
@@ -194,7 +195,7 @@ class DynamicsModel(Answers):
 
     @property
     def unknown_base_parameters(self) -> tuple[int, ...]:
-        """Indices of the base parameters that contain an unknown standard parameter; none where theta_b is known."""
+        """Indices of the base parameters that contain an unknown standard parameter; empty if theta_b is known."""
         if self.theta_b is not None:
             return ()
         is_unknown = np.isnan(self.mechanism.parameters.reshape(-1))
@@ -202,7 +203,7 @@ class DynamicsModel(Answers):
 
     @property
     def file_theta_b(self) -> Array | None:
-        """(l,) theta_b; while it is unknown what links of known inertia add to it, None where there is no such link."""
+        """theta_b, (l,), or the part of it that comes from links of known inertia; None if no link has one."""
         if self.theta_b is not None:
             return self.theta_b
         known = self.mechanism.known_parameters
@@ -211,13 +212,15 @@ class DynamicsModel(Answers):
         return np.asarray(times(self.B, known.reshape(-1)))
 
     def equivalent_parameters(self) -> Array:
-        """(11n,) standard parameters that have the model's theta_b: `representative @ theta_b`, one choice of many. They
-        are not the links' own, and belong to no rigid bodies."""
+        """Return standard parameters (11n,) that have the model's theta_b: one choice of many, `representative @ theta_b`.
+
+        They are not the links' parameters, and no rigid bodies need have them. InputError if theta_b is unknown.
+        """
         found: Array = times(self.representative, self.known_theta_b())
         return found
 
     def standard_parameters(self) -> Array:
-        """`equivalent_parameters`, by its name in psdmc 0.1."""
+        """Return `equivalent_parameters()`; this is its name in psdmc 0.1."""
         warnings.warn(RENAMED, DeprecationWarning, stacklevel=2)
         return self.equivalent_parameters()
 
@@ -228,12 +231,12 @@ class DynamicsModel(Answers):
         inertias: ArrayLike,
         drive_inertias: ArrayLike | None = None,
     ) -> Array:
-        """(l,) base parameters of a robot with these bodies and the model's kinematics: `theta_b=` of its functions.
+        """Return theta_b (l,) of a robot with these bodies, for the argument `theta_b` of functions.
 
-            masses          (n,) kg, a body for each joint in the order of `link_names`: the link and all that is fixed to it
+            masses          (n,) kg, one body per joint, in the order of `link_names`: the link and all that is fixed to it
             coms            (n, 3) m, centres of mass in the link frames
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the link frames' axes
-            drive_inertias  (n,) kg m^2 (kg where a joint slides); None: the model's own
+            drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the model's
 
         Raises InputError for numbers that are not finite or outside the ranges of robot files, and for a negative mass.
         InputError also if an inertia is not symmetric or has no mass, or if the model's assumptions exclude the bodies.
@@ -251,12 +254,15 @@ class DynamicsModel(Answers):
         *,
         out: Array | None = None,
     ) -> Array:
-        """tau (..., nv), N m or N, directly from E, P and theta_b: slow, and the reference for faster code. Without E
-        and P, by Newton-Euler on the same base parameters. `theta_b` (l,) replaces the model's own; `out` is written to."""
+        """Return torques tau (..., nv) in N m, or N for sliding joints.
+
+        q (..., nq), qd and qdd (..., nv). `theta_b` (l,) replaces the model's base parameters, `out` takes the result.
+        psdmc evaluates E, P and theta_b, or Newton-Euler if the model has no E. This is slow: `psdmc.compile` is faster.
+        """
         return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
     def torques_for(self, theta_b: ArrayLike, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """Inverse dynamics with base parameters (l,) that are not the model's own."""
+        """Return torques (..., nv) as `inverse_dynamics` does, with the base parameters theta_b (l,)."""
         theta = real_array("theta_b", theta_b)
         if theta.shape != (self.l,):
             raise InputError(
@@ -270,58 +276,62 @@ class DynamicsModel(Answers):
         return found.reshape(*shape, self.nv)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
-        """Y (..., nv, l) with tau = Y theta_b."""
+        """Return the regressor Y (..., nv, l), with tau = Y theta_b."""
         return self._answer("regressor", q, qd, qdd, out=out)
 
     def mass_matrix(
         self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
     ) -> Array:
-        """M(q), (..., nv, nv)."""
+        """Return the mass matrix M(q), (..., nv, nv), both triangles."""
         return self._answer("mass_matrix", q, theta_b, out=out)
 
     def nonlinear_effects(
         self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
     ) -> Array:
-        """h(q, qd) = C(q, qd) qd + g(q), (..., nv)."""
+        """Return h(q, qd) = C(q, qd) qd + g(q), (..., nv): Coriolis, centrifugal and gravity torques."""
         return self._answer("nonlinear_effects", q, qd, theta_b, out=out)
 
     def gravity(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None) -> Array:
-        """g(q), (..., nv)."""
+        """Return the gravity torques g(q), (..., nv)."""
         return self._answer("gravity", q, theta_b, out=out)
 
     @property
     def base_parameters(self) -> BaseParameters:
-        """Equation, unit and value (None while unknown) of each entry of theta_b: a tuple, and `to_frame()` for pandas,
-        `to_latex()`."""
+        """Equation, unit and value of each entry of theta_b, a tuple; the value is None if it is unknown.
+
+        `to_frame()` returns a pandas data frame, `to_latex()` LaTeX.
+        """
         unknown, known = self.unknown_base_parameters, self.file_theta_b
         values = [None] * self.l if known is None else known.tolist()
         shown = [None if k in unknown else value for k, value in enumerate(values)]
         return BaseParameters(equations.base_parameters(self.mechanism, self.B, self.pivots, shown))
 
     def to_latex(self) -> str:
-        """The base parameters' equations with values and units, as an `aligned` environment of amsmath: entries of theta_b
-        are numbered from 0, joints from 1."""
+        """Return the base parameters' equations, values and units as an `aligned` environment of amsmath.
+
+        Entries of theta_b are numbered from 0, joints from 1.
+        """
         return self.base_parameters.to_latex()
 
     def torque_expression(self, joint: int | str, numbers: bool = False) -> sympy.Expr:
-        """The torque of one joint as a SymPy expression, for robots of few joints; its `args` are the terms.
+        """Return the torque of one joint as a SymPy expression, for small robots; its `args` are the terms.
 
-            joint    its number, 0 being the first, or its name
-            numbers  whether theta_b's values stand in it; otherwise symbols theta_b0, theta_b1 and so on
+            joint    name of the joint, or its number from 0
+            numbers  True: use the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        Symbols q1, qd1, qdd1 and so on are of joints numbered from 1, as in the base parameters' equations. InputError for
-        an unknown joint, a model without E and P, or a torque of too many monomials; ToolchainError without SymPy.
+        The symbols q1, qd1, qdd1 belong to the first joint. Raises InputError for an unknown joint, a model without E and
+        P, or a torque of more than 2,000 monomials. Raises ToolchainError if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
         return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)
 
     @property
     def content_hash(self) -> str:
-        """SHA-256 of everything that a model file holds, as hexadecimal digits."""
+        """SHA-256 of the content of the model file, as hexadecimal digits."""
         return store.content_hash(self)
 
     def save(self, path: str | Path) -> None:
-        """Write a model file, as `psdmc.save(model, path)` does."""
+        """Write the model to a file, as `psdmc.save(model, path)` does."""
         store.save(self, path)
 
     def with_payload(
@@ -331,13 +341,12 @@ class DynamicsModel(Answers):
         inertia: ArrayLike | None = None,
         frame: Placement | str | None = None,
     ) -> DynamicsModel:
-        """The model with a rigid load fixed to the link that carries its tip, or another named frame.
+        """Return a model with a rigid load fixed to the tip, or to another named frame.
 
             mass      kg
             com       (3,) m, centre of mass in `frame`
             inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
-            frame     frame of `com` and `inertia`: the name of the tip or of another of the model's frames, or a Placement
-                      in the tip frame; None: the tip
+            frame     frame of `com` and `inertia`: a name of `frame_names`, or a Placement in the tip frame; None: the tip
 
         Raises InputError if no rigid body has these numbers, if they are outside the ranges of robot files, or if the
         model's assumptions exclude the load.

@@ -284,7 +284,7 @@ WORDS: Mapping[str, Callable[[Values], str]] = {
     "load_few_samples": lambda v: f"{v['samples']:.3g} independent samples per unknown",
     "mass_hidden": lambda v: f"the log does not show the load's mass: {v['seen']}",
     "mass_negative": lambda v: (
-        f"the mass comes out at {v['mass']:.3g} +- {v['std']:.2g} kg: is the model that of the robot without its load, and "
+        f"the mass is {v['mass']:.3g} +- {v['std']:.2g} kg: is the model that of the robot without its load, and "
         "has the log's torque the same sign?"
     ),
     "no_mass": lambda v: (

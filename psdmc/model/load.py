@@ -62,7 +62,7 @@ def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
 
 
 def load(path: str | Path) -> DynamicsModel:
-    """The model in a file; InputError where it is missing, damaged, forged, foreign or of a newer psdmc."""
+    """Return the model in a file; InputError if it is missing, damaged, edited, or written by a newer psdmc."""
     source = Path(path)
     return load_bytes(_bytes_of(source), source)
 

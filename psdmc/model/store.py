@@ -53,8 +53,10 @@ class Model(ModelParts, Protocol):
 
 
 def save(model: Model, path: str | Path) -> None:
-    """Write a model file, whole or not at all. Raises InputError where the path cannot be written, ToolchainError where
-    the disk fails."""
+    """Write a model to a file, completely or not at all.
+
+    Raises InputError if the path cannot be written, and ToolchainError if the disk fails.
+    """
     n = len(model.mechanism)
     if n > MOST_JOINTS:
         raise InputError(

@@ -1,4 +1,4 @@
-"""python -m psdmc.report.bench_markdown RESULT.json: the headline table for README and docs, with its command."""
+"""python -m psdmc.report.bench_markdown RESULT.json: the tables of docs/benchmarks.md, with their command."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ DYNAMICS = (
     ("forward_dynamics", "state", "forward dynamics"),
     ("mass_matrix", "state", "mass matrix"),
     ("regressor", "state", "regressor"),
-    ("inverse_dynamics", "rows", "inverse, batch rows"),
-    ("forward_dynamics", "rows", "forward, batch rows"),
-    ("inverse_dynamics", "lanes", "inverse, lane by lane"),
-    ("forward_dynamics", "lanes", "forward, lane by lane"),
+)
+BATCHES = tuple(
+    (f"{name}_dynamics", layout, f"{name} dynamics, {layout}")
+    for name in ("inverse", "forward")
+    for layout in ("rows", "lanes")
 )
 DERIVATIVES = tuple(
     (f"{name}_dynamics_derivatives", layout, f"derivatives of {name} dynamics{how}")
@@ -32,7 +33,7 @@ GRADIENTS = tuple(
     for layout, how in (("state", ""), ("rows", ", batch rows"), ("lanes", ", lane by lane"))
     for name in ("inverse", "forward")
 )
-"""Function, layout and title of the three tables' columns."""
+"""Function, layout and title of the four tables' columns."""
 
 
 def markdown(result: BenchResult, command: str = "make bench") -> str:
@@ -41,7 +42,7 @@ def markdown(result: BenchResult, command: str = "make bench") -> str:
 
 
 def _lines(result: BenchResult, command: str) -> Iterator[str]:
-    for columns in (DYNAMICS, DERIVATIVES, GRADIENTS):
+    for columns in (DYNAMICS, BATCHES, DERIVATIVES, GRADIENTS):
         yield "| robot | " + " | ".join(title for _, _, title in columns) + " |"
         yield "|" + "---|" * (len(columns) + 1)
         for case in result.cases:

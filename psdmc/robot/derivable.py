@@ -1,4 +1,4 @@
-"""Which mechanisms psdmc derives and lowers: trees whose joints have coordinates of their own or follow another's."""
+"""Mechanisms that psdmc derives and lowers: trees whose joints have coordinates or follow another joint."""
 
 from __future__ import annotations
 

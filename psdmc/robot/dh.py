@@ -87,7 +87,7 @@ def read_dh(text: str, source: str) -> DhRobot:
     problems: list[str] = []
     robot = _robot(_parsed(text, source), problems)
     if problems or robot is None:
-        raise InputError(f"{source}: {limits.joined(problems)}", "see the DH format in docs/notation.md")
+        raise InputError(f"{source}: {limits.joined(problems)}", "see the DH format in docs/robot_files.md")
     return robot
 
 

@@ -1,4 +1,4 @@
-"""From a DH table to a robot.
+"""Reader that makes a robot from a DH table.
 
 Standard: each row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) from one distal frame to the next, which is the
 link's frame; the joint frame sits after Rz(theta + q), and the rest is the link frame's constant placement in

@@ -1,4 +1,4 @@
-"""What a robot file is, by its name and its first element, and what the later stages read of it: a URDF or a DH table."""
+"""Kinds of robot files, recognised by name and first element, and the URDF or DH table that later stages read."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, Loa
     found = read_mjcf(file, file.name, options.root)
     if found.is_free and (options.base is not None or options.tip is not None):
         raise InputError(
-            f"{file.name}: its root moves freely, --base and --tip cut a chain out of a robot that stands",
+            f"{file.name}: its root moves freely, and --base and --tip need a robot on a fixed base",
             "leave --base and --tip out; --lock holds joints",
         )
     gravity = found.gravity if options.gravity is None else options.gravity

@@ -27,8 +27,8 @@ def halving_shares(last: float) -> tuple[float, ...]:
 def graded_pivots(
     work: NDArray[Any], norms: NDArray[Any], shares: Sequence[float], groups: NDArray[Any] | None = None
 ) -> tuple[list[int], float, float]:
-    """Columns of `work` (m, k) in the order in which they become pivots, the smallest share of a pivot, and the largest
-    share left of any other column. Changes `work` in place: its first rows become triangular in the pivots.
+    """Find the order in which columns of `work` (m, k) become pivots. Also returns the smallest share of a pivot, and
+    the largest share left of any other column. Changes `work` in place: its first rows become triangular in the pivots.
 
     norms   (k,)  the columns' lengths beforehand
     groups  (k,)  ascending; the columns of one group are gone through with all shares before the next group's. None: all

@@ -53,7 +53,7 @@ class Range:
         return f"0, or {self.least:g} to {self.most:g} {self.unit} in magnitude".replace("  ", " ")
 
     def fault(self, value: float) -> str | None:
-        """What is wrong with a finite number, or None."""
+        """Describe the fault of a finite number, or return None."""
         if value == 0.0 or self.least <= abs(value) <= self.most:
             return None
         return f"is out of range, expected {self}"
@@ -109,13 +109,13 @@ def joined(faults: Sequence[str]) -> str:
 
 
 def gravity_fault(gravity: Sequence[float]) -> str | None:
-    """What is wrong with an acceleration of gravity (three finite numbers, m/s^2), or None."""
+    """Describe the fault of a gravity vector (three finite numbers, m/s^2), or return None."""
     faults = [GRAVITY.fault(component) for component in gravity]
     return next((fault for fault in faults if fault), None) or GRAVITY_LENGTH.fault(math.hypot(*gravity))
 
 
 def scale_fault(lengths: Iterable[float]) -> str | None:
-    """What is wrong with a robot's lengths (m) as a whole, or None."""
+    """Describe the fault of a robot's lengths (m) as a whole, or return None."""
     longest = max((abs(length) for length in lengths), default=0.0)
     fault = LONGEST_LENGTH.fault(longest)
     return f"the longest of all its lengths, {longest:g} m, {fault}" if fault else None

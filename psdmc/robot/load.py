@@ -52,7 +52,7 @@ class LoadedRobot:
         return self.mechanism
 
     def unsnapped(self) -> LoadedRobot:
-        """The same robot with the file's own rotations, to compute the effect of snapping."""
+        """Return the robot with the file's rotations, to compute the effect of snapping."""
         keywords = self.options.as_json() | {"snap": 0.0}
         return load_robot_text(self.source_text, self.source_format, source_name=self.source_name, **keywords)
 
@@ -196,7 +196,8 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
         raise InputError(f"{source}: --lock holds joints of a URDF", "leave it out for a DH table")
     if options.floating:
         raise InputError(
-            f"{source}: --floating frees the root link of a URDF", "a DH table's base stands: leave it out"
+            f"{source}: --floating frees the root link of a URDF",
+            "the base of a DH table is fixed: leave --floating out",
         )
     if options.unknown:
         raise InputError(

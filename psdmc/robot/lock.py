@@ -18,8 +18,8 @@ from psdmc.robot.urdf import LOCKABLE, UrdfJoint, UrdfRobot
 
 
 def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> dict[str, float]:
-    """The position, rad or m, of each joint that is held: those in `lock`, those that follow one of them, and those
-    that follow a joint with a multiplier of zero.
+    """Return the position, rad or m, of each held joint: those in `lock` and those that follow one of them. Joints that
+    follow with a multiplier of zero are held, too.
 
     InputError where `lock` names no movable joint, or a position that a joint cannot have; and for a joint of a type that
     URDF does not have.

@@ -54,7 +54,7 @@ def mimic_coordinates(
 def followed(
     joint: UrdfJoint, known: Mapping[str, UrdfJoint], source: str, ends: Collection[str] = ()
 ) -> Followed:
-    """What a mimic joint follows: the first joint on the way that mimics none, or is among `ends`.
+    """Return the joint that a mimic joint follows: the first one that mimics none, or is among `ends`.
 
     InputError where the joints form a ring, or its leader is no movable joint.
     """
@@ -65,7 +65,7 @@ def followed(
         leader = here.mimic.joint
         if leader in passed:
             raise InputError(
-                f"{source}: joint {shown(joint.name)} mimics itself, by way of {shown(passed[-1])}",
+                f"{source}: joint {shown(joint.name)} mimics itself through {shown(passed[-1])}",
                 "let one of these joints mimic none",
             )
         if leader not in known or not known[leader].is_movable:

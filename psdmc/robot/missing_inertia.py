@@ -83,7 +83,7 @@ def _unknown(
     links: Container[str],
     source: str,
 ) -> list[bool]:
-    """Which bodies the words name, by any of their links. `links` are the file's."""
+    """Find the bodies that the words name, by any of their links. `links` are the file's."""
     moving = [link for body in bodies for link in body]
     strange = [word for word in words if word not in (ALL, MISSING, *moving)]
     if strange:
@@ -126,7 +126,7 @@ def with_massless_warning(chain: Mechanism) -> Mechanism:
 
 
 def massless_words(chain: Mechanism) -> str:
-    """Which links have no inertia in the file: the subject and verb of a sentence."""
+    """List the links without inertia in the file, as subject and verb of a sentence."""
     if len(chain.massless) == 1:
         return f"link '{chain.massless[0]}' has no <inertial>"
     return f"{len(chain.massless)} links ({listed(chain.massless, MOST_NAMED)}) have no <inertial>"

@@ -1,4 +1,4 @@
-"""What an MJCF file repeats, in itself and in all that it includes and attaches.
+"""Bounds on repeated elements of an MJCF file, in itself and in all that it includes and attaches.
 
 MuJoCo's compiler takes time that grows with the square of the copies, and dies of a model that is a part of itself; no
 signal ends the one, no exception tells of the other.
@@ -66,9 +66,9 @@ class _Reading:
 
 
 def refuse_many_copies(path: Path, source: str) -> None:
-    """InputError where a file, with all that it includes and attaches, asks for more than MAX_COPIES elements by repetition,
-    attaches itself, makes a mesh or a field that is too large, or repeats something and is no well-formed XML. Whatever
-    else is wrong with it is left to MuJoCo."""
+    """Raise InputError for a file with more than MAX_COPIES repeated elements, or one that attaches itself. Included
+    and attached files count. It also refuses a mesh or a field that is too large, and repetition in a file that is no
+    well-formed XML. Whatever else is wrong with it is left to MuJoCo."""
     copies = _of_document(path, _Reading(source)).copies
     if not copies <= MAX_COPIES:
         many = f"{copies:.0f}" if copies < MOST_DIGITS else f"more than {MOST_DIGITS:.0f}"
@@ -180,7 +180,8 @@ def _model(path: Path, name: str | None, document: _Document, reading: _Reading)
 
 
 def _attached(element: Element, document: _Document, reading: _Reading) -> _Count:
-    """What <attach> puts in its place: the whole model, or one body of it. It is a copy where it is attached again."""
+    """Return the element that <attach> inserts: the whole model, or one body of it. It is a copy where it is attached
+    again."""
     path, name = document.models.get(element.get("model", "")), element.get("body")
     if path is None:
         return _Count(1.0, 0.0)
@@ -205,7 +206,7 @@ def _times(count: str) -> float:
 
 
 def _resolved(path: Path) -> Path:
-    """The same for two ways to one file."""
+    """Return one path for two paths to the same file."""
     try:
         return path.resolve()
     except (OSError, ValueError, RuntimeError):

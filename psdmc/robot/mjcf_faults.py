@@ -1,5 +1,4 @@
-"""What an MJCF file has beside a tree of rigid bodies and changes how the tree moves: followers, and what is refused by
-name."""
+"""Elements of an MJCF file that change how the tree moves: followers, and elements that psdmc refuses by name."""
 
 from __future__ import annotations
 

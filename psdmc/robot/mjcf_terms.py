@@ -1,4 +1,4 @@
-"""What a compiled MJCF spreads over several arrays: inertias of drives, coefficients of forces, whether constraints act.
+"""Values that a compiled MJCF spreads over several arrays: drive inertias, force coefficients, active constraints.
 
 Arrays that the installed MuJoCo does not have yet are zero.
 """
@@ -33,8 +33,8 @@ def reflected(model: Any, actuator: int) -> float:
 
 
 def acting(model: Any, kind: str, word: str) -> NDArray[np.bool_]:
-    """Of each joint (kind jnt), degree of freedom, tendon or actuator: whether it has such a force, of any sign and power
-    of position or velocity. word: stiffness, damping, frictionloss."""
+    """Find the joints (kind jnt), degrees of freedom, tendons or actuators that have such a force. The force may have
+    any sign and power of position or velocity. word: stiffness, damping, frictionloss."""
     return np.asarray(_of(model, kind, word) != 0.0) | is_odd(model, kind, word)
 
 

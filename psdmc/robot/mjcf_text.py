@@ -119,8 +119,8 @@ def _body(writer: _Writer, body: int) -> None:
 
 
 def _at_reference(writer: _Writer, j: int, origin: Array, turn: Array, axis: Array) -> tuple[Array, Array]:
-    """A joint's frame, so that its q is the file's: turned about, or shifted along, its axis by minus its reference, which
-    ball joints have not."""
+    """Shift a joint's frame so that its q is the file's; ball joints have no reference. The frame is turned about, or
+    shifted along, its axis by minus the reference."""
     model, mujoco = writer.model, writer.mujoco
     if _is_ball(writer, j):
         return origin, turn
@@ -170,7 +170,7 @@ def _is_ball(writer: _Writer, j: int) -> bool:
 
 
 def _ball(writer: _Writer, j: int, element: Element) -> None:
-    """What makes a floating joint a ball joint, to psdmc."""
+    """Return the elements that turn a floating joint into a ball joint for psdmc."""
     _dynamics(writer, j, element)
     SubElement(element, BALL)
 

@@ -47,7 +47,7 @@ class NotCompared(Exception):
 
 
 def mujoco_version() -> str:
-    """Of the MuJoCo that is installed; NotCompared where there is none."""
+    """Return the version of the installed MuJoCo; NotCompared if there is none."""
     return str(_mujoco().__version__)
 
 

@@ -1,4 +1,4 @@
-"""What MuJoCo warns of while it compiles a robot: kept, where it would print it and write MUJOCO_LOG.TXT where it stands."""
+"""Collector of MuJoCo's warnings while it compiles a robot; MuJoCo would print them and write MUJOCO_LOG.TXT."""
 
 from __future__ import annotations
 

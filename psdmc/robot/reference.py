@@ -40,7 +40,7 @@ class Reference:
 
     @property
     def joint_types(self) -> list[JointType]:
-        """Of the joints in Pinocchio's order; all of one coordinate are called revolute."""
+        """Return the types of the joints in Pinocchio's order; all with one coordinate are called revolute."""
         known = {f"JointModel{kind.pinocchio}": kind for kind in WIDE_TYPES.values()}
         return [known.get(joint.shortname(), REVOLUTE) for joint in list(self.model.joints)[1:]]
 

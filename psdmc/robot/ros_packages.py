@@ -1,5 +1,4 @@
-"""Folders of ROS packages by name, without ROS: given ones, then those that the variables of ROS 2 and ROS 1 lead to, then
-those about the robot's own file."""
+"""Folders of ROS packages by name, without ROS: given ones, those of ROS variables, and those near the robot's file."""
 
 from __future__ import annotations
 
@@ -38,8 +37,9 @@ def checked_packages(packages: Mapping[str, str | os.PathLike[str]] | None) -> d
 
 
 def package_folder(name: str, given: Mapping[str, Path], file: Path) -> Path | None:
-    """The folder of the package, absolute: a given one, else by AMENT_PREFIX_PATH (its share/NAME), by ROS_PACKAGE_PATH
-    (the first package.xml with that name), else above or beside the robot's file; None where there is none."""
+    """Return the absolute folder of a package, or None. It is the given one, else that of AMENT_PREFIX_PATH (its
+    share/NAME) or of ROS_PACKAGE_PATH (the first package.xml with that name), else one above or next to the robot's
+    file."""
     if not NAME.fullmatch(name):
         return None
     found = given.get(name) or next((folder for folder in _candidates(name, file)), None)

@@ -1,5 +1,5 @@
-"""Words of psdmc's own in the URDF that it makes of an MJCF: drive inertias, ball joints and notes, in a name space that
-others skip."""
+"""Words that psdmc adds to the URDF that it makes of an MJCF, in a name space that other readers skip. They are drive
+inertias, ball joints and notes."""
 
 from __future__ import annotations
 

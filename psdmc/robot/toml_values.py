@@ -1,6 +1,4 @@
-"""Readers of values in a TOML file: each takes what the parser gives and returns it typed, or raises ValueError that says
-what was found and what expected.
-"""
+"""Readers of values in a TOML file: each returns a typed value, or raises ValueError with what was found and expected."""
 
 from __future__ import annotations
 

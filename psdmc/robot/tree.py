@@ -1,4 +1,4 @@
-"""Which joints of a URDF are the robot: its whole tree, or the chain from a base link to a tip link."""
+"""Selection of a URDF's joints: its whole tree, or the chain from a base link to a tip link."""
 
 from __future__ import annotations
 
@@ -119,7 +119,8 @@ def _moved_links(path: Sequence[UrdfJoint]) -> set[str]:
 
 
 def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
-    """What a tree is made of, and how to have the chain that psdmc took before it took trees, unless its root is free."""
+    """Describe the tree, and the options that select the chain that psdmc took in earlier releases, unless its root is
+    free."""
     if robot.free_root is not None:
         return f"the whole tree, to its ends {listed(ends)}"
     try:

@@ -113,7 +113,7 @@ class UrdfRobot:
 def read_urdf(text: str, source: str) -> UrdfRobot:
     """The file's content; InputError names everything that is wrong with its links and joints at once."""
     root = parse_xml(text, source, "robot")
-    hint = f"psdmc reads URDF {VERSIONS[0]} to {VERSIONS[-1]}; see docs/notation.md"
+    hint = f"psdmc reads URDF {VERSIONS[0]} to {VERSIONS[-1]}; see docs/robot_files.md"
     _refuse(robot_faults(root), source, hint)
     _refuse_sizes(root, source)
     problems = name_faults(root.get("name", ""), "robot")
@@ -123,7 +123,7 @@ def read_urdf(text: str, source: str) -> UrdfRobot:
     problems = []
     bodies = _each(root, "link", lambda link: (link.get("name", ""), _inertial(link)), problems)
     joints = _each(root, "joint", _joint, problems)
-    _refuse(problems, source, "correct the file; docs/notation.md says what it may hold")
+    _refuse(problems, source, "correct the file; docs/robot_files.md says what it may hold")
     inertials = dict(bodies)
     if not inertials:
         raise InputError(f"{source}: no <link> in it", "give a URDF with links and joints")

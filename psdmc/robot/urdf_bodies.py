@@ -123,7 +123,7 @@ def _compare(own: Array, other: object, link: str, what: str, source: str) -> No
             values = f"{_listed(own[group])} and {_listed(found[group])}"
             raise InputError(
                 f"{source}: link '{link}': psdmc and Pinocchio read {what} differently: {values}",
-                "write its numbers as plain decimals, and tell us of the file: one of the two readers is wrong",
+                "write its numbers as plain decimals, and report the file: one of the two readers is wrong",
             )
 
 

@@ -1,4 +1,4 @@
-"""From a URDF to a robot: joints placed and bodies merged by the file's own numbers."""
+"""Reader that makes a robot from a URDF: places joints and merges bodies by the file's numbers."""
 
 from __future__ import annotations
 

@@ -28,8 +28,8 @@ ZERO_NAMES = (*PARAMETER_NAMES, *COM_NAMES)
 
 
 def canonical(names: Collection[str]) -> tuple[str, ...]:
-    """The same statement in full, in a fixed order: no mass means no body, no first moment puts the centre of mass at
-    the origin."""
+    """Complete an assumption, in a fixed order: no mass means no body, no first moment puts the centre of mass at the
+    origin."""
     said = set(names)
     if "m" in said:
         said |= set(PARAMETER_NAMES[:BODY_PARAMETERS]) | set(COM_NAMES)

@@ -135,7 +135,7 @@ def _self_test(words: list[str], root: Path) -> str:
 
 
 def checks_of(report: str) -> str:
-    """What a build's self-test checked, in its own words: '39 checks of 15 functions'."""
+    """Return the self-test's summary: '39 checks of 15 functions'."""
     found = re.findall(r": (\d+ checks of \d+ functions), 0 failed", report)
     return found[-1] if found else "nothing to check"
 

@@ -23,12 +23,14 @@ from psdmc.toolchain.stubs import documentation
 
 
 class CompiledRobot(CompiledFunctions):
-    """The functions of a compiled package on NumPy arrays: q, qd and the like are (..., n).
+    """A compiled robot: its methods compute dynamics for NumPy arrays of states.
 
-    Leading axes broadcast; results are float64 or float32 as the package was compiled, several of them a named tuple.
-    Calls for many states release the GIL and may run in several threads. `theta_b` (l,) replaces the parameters
-    compiled in, for functions that take it. `out`, an array or a tuple of them, is written to and returned: it has the
-    result's shape and dtype, and may be an input.
+    q is (..., nq), rates and torques are (..., nv), in SI units. Leading axes are states, and broadcast. Results are
+    float64 or float32, as compiled; a function with several results returns a named tuple. Calls for many states release
+    the GIL, so threads run in parallel.
+
+    theta_b  (l,) base parameters that replace those in the code
+    out      array, or tuple of arrays, that takes the result; it needs the result's shape and dtype, and may be an input
 
     A call adds about 0.3 us to the arithmetic if its arrays are contiguous, of the robot's dtype and of one leading
     shape. Otherwise, or without Python's C headers, a call adds about 10 us.

@@ -25,7 +25,7 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, slots=True)
 class RobotAxes:
-    """What the arrays of one robot run over.
+    """Sizes and names of the axes of one robot's arrays.
 
     sizes  lengths of axes by their words
     names  of the entries of q (nq), of rates (nv), joints (n) and named frames (frames)
@@ -53,7 +53,7 @@ def bound_arguments(
 
 @cache
 def signature_of(function: Signature) -> inspect.Signature:
-    """Of a method, `self` included."""
+    """Return the signature of a method, `self` included."""
     return inspect.Signature(
         [
             inspect.Parameter(

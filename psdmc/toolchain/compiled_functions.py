@@ -28,11 +28,10 @@ Array = NDArray[Any]
 
 
 class CompiledFunctions(RobotFacts):
-    """The library of a compiled package, called by a function's signature.
+    """Calls the library of a compiled package by each function's signature.
 
-    more    compiles one function that the package does not have, by name, when it is first called; None: such a call is
-            an error
-    origin  how another process has the same; None: it cannot be pickled
+    more    compiles a function, by its name, that the package does not have; None: such a call is an error
+    origin  the request from which another process builds the same robot; None: it cannot be pickled
     """
 
     def __init__(
@@ -60,7 +59,7 @@ class CompiledFunctions(RobotFacts):
         self._others: list[CompiledFunctions] = []  # whose libraries stay open as long as this one's
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What pickle keeps: the request that the robot was compiled for, its model included, no machine code."""
+        """Pickle the request that the robot was compiled for, its model included, without machine code."""
         if self._origin is None:
             raise TypeError(f"{self.name}: only robots from psdmc.compile can be pickled")
         return self._origin.again, (self._origin.request,)
@@ -73,7 +72,7 @@ class CompiledFunctions(RobotFacts):
         return self
 
     def __dask_tokenize__(self) -> tuple[str, str]:
-        """By which Dask knows equal robots."""
+        """Return the key by which Dask recognises equal robots."""
         return ("psdmc.CompiledRobot", self._origin.key if self._origin else str(self.library))
 
     def call(
@@ -83,9 +82,9 @@ class CompiledFunctions(RobotFacts):
         theta_b: ArrayLike | None = None,
         out: Any = None,
     ) -> Any:
-        """The output, or a named tuple of the outputs, of a function at these states.
+        """Call a function at these states; returns its output, or a named tuple of several.
 
-        out  the array, or tuple of arrays, that results are written to and that is returned; None: new ones
+        out  array, or tuple of arrays, that takes the results and is returned; None: new arrays
         """
         if any(map(is_foreign, inputs)):
             return self._foreign(function, inputs, theta_b, out)
@@ -108,10 +107,11 @@ class CompiledFunctions(RobotFacts):
         return outs[0] if len(outs) == 1 else results(function)(*outs)
 
     def pattern(self, name: str) -> tuple[Array, Array]:
-        """Rows and columns, (k,) each, of the entries of a function's matrix that may differ from zero at some state, row by
-        row: `robot.mass_matrix(q)[..., rows, columns]` are its values, packed.
+        """Return rows and columns, (k,) each, of the matrix entries that can differ from zero.
 
-        name  of a function that returns one matrix: 'mass_matrix', 'regressor' ...; InputError for others
+        `robot.mass_matrix(q)[..., rows, columns]` equals `robot.mass_matrix_packed(q)`.
+
+        name  a function that returns one matrix, such as 'mass_matrix' or 'regressor'; InputError for others
         """
         self._kernel(name)
         if name not in self._patterns:

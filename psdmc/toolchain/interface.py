@@ -65,7 +65,7 @@ class Interface:
 
     @property
     def sizes(self) -> Sizes:
-        """What the words of signatures mean for this robot."""
+        """Return the sizes that the words of signatures mean for this robot."""
         return Sizes(self.n, self.nq, self.nv, self.l, len(self.frame_names))
 
     @property

@@ -154,7 +154,7 @@ def _check_leads(function: Signature, arrays: Sequence[Any], own: Sequence[int])
 
 
 def _uncut(array: Any, axes: int) -> Any:
-    """With one chunk along each of its last axes."""
+    """Rechunk to one chunk along each of the last axes."""
     return array.rechunk({-k: -1 for k in range(1, axes + 1)})
 
 
@@ -268,13 +268,13 @@ def _check_states(function: Signature, arrays: Sequence[Any]) -> None:
 
 
 def _hint(axes: RobotAxes, quantity: Quantity) -> str:
-    """What the robot has along a quantity's first named axis."""
+    """List the robot's names along a quantity's first named axis."""
     word = next((word for word in quantity.axes if axes.names.get(word)), "n")
     return f"the robot has {', '.join(axes.names[word])}"
 
 
 def _named(axes: RobotAxes, output: Quantity, array: xr.DataArray) -> xr.DataArray:
-    """With the names of joints and frames as coordinates."""
+    """Add the names of joints and frames as coordinates."""
     known = {
         dimension: list(axes.names[word])
         for word, dimension in zip(output.axes, dimensions(output), strict=True)

@@ -1,4 +1,4 @@
-"""What a compiled robot is: names, sizes, limits, gravity and base parameters, from its interface."""
+"""Facts about a compiled robot: names, sizes, limits, gravity and base parameters, from its interface."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ class JointLimits(NamedTuple):
 
 
 class RobotFacts:
-    """The facts about a compiled robot. n joints, l base parameters."""
+    """Names, sizes, limits and parameters of a compiled robot with n joints and l base parameters."""
 
     def __init__(self, interface: Interface) -> None:
         self._interface = interface
 
     @property
     def name(self) -> str:
-        """The robot's name in C, the prefix of its functions there."""
+        """Name of the robot in C, the prefix of its functions."""
         return self._interface.robot
 
     @property
     def n(self) -> int:
-        """Number of joints that follow no other."""
+        """Number of joints that do not follow another joint."""
         return self._interface.n
 
     @property
@@ -61,50 +61,49 @@ class RobotFacts:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """n names, from base to tip."""
+        """Names of the n joints, from base to tip."""
         return self._interface.joint_names
 
     @property
     def q_names(self) -> tuple[str, ...]:
-        """nq names of q's entries: a joint's own, or 'root_joint.x' and so on where it has several coordinates."""
+        """Names of the nq entries of q: the joint's name, or 'root_joint.x' and so on for a joint with several entries."""
         return self._interface.q_names
 
     @property
     def v_names(self) -> tuple[str, ...]:
-        """nv names of the entries of rates, accelerations and torques: a joint's own, or 'root_joint.vx' and so on."""
+        """Names of the nv entries of rates, accelerations and torques, such as 'elbow' or 'root_joint.vx'."""
         return self._interface.v_names
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Names of the frames that kinematic functions are about."""
+        """Names of the frames of poses, Jacobians and wrenches, in the order of results."""
         return self._interface.frame_names
 
     @property
     def dtype(self) -> np.dtype[np.float64] | np.dtype[np.float32]:
-        """Of all results."""
+        """NumPy type of all results: float64 or float32."""
         single, double = np.dtype(np.float32), np.dtype(np.float64)
         return single if self._interface.dtype == "float32" else double
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """Names of the functions that are compiled, each once: without theta_b, with it, or both."""
+        """Names of the compiled functions."""
         return tuple(dict.fromkeys(name.removesuffix("_theta") for name in self._interface.kernels))
 
     @cached_property
     def limits(self) -> JointLimits:
-        """The joints' limits, as the robot's file has them; nothing holds states to them."""
+        """Limits of the joints from the robot file, each (n,). The functions do not enforce them."""
         columns = np.array(self._interface.limits, np.float64).T
         return JointLimits(*(_frozen(column) for column in columns))
 
     @cached_property
     def gravity_acceleration(self) -> Vector:
-        """(3,) m/s^2 in the base frame (of a floating base: in the world's), compiled in; `gravity(q)` are the torques
-        against it."""
+        """Gravity, (3,) m/s^2 in the base frame, or in the world frame of a floating base; it is part of the code."""
         return _frozen(self._interface.gravity)
 
     @cached_property
     def theta_b(self) -> Vector | None:
-        """(l,) base parameters compiled in, SI; None where they were unknown, so that functions want them given."""
+        """Base parameters in the code, (l,), SI; None if unknown: functions then need the argument `theta_b`."""
         values = self._interface.theta_b
         return None if values is None else _frozen(values)
 

@@ -62,7 +62,7 @@ def documentation(function: Signature) -> str:
     written = "array" if len(function.outputs) == 1 else "tuple of arrays"
     return (
         f"{function.meaning}.\n\nTakes {given}{theta}.\nReturns {shapes}{failure}.\n"
-        f"out: the {written} to write to. nq = nv = n where every joint has one coordinate."
+        f"out: the {written} to write to. nq = nv = n if every joint has one coordinate."
     )
 
 

@@ -168,7 +168,7 @@ def test_the_summary_counts_what_was_written(arm, tmp_path: Path):
     assert "3 kg with its centre of mass at (0.1, 0.05, 0) m" in mounted
     assert "_loaded (2), nothing for the others (6)" in mounted
     assert any(line.startswith("exciting motion: condition number ") for line in lines)
-    assert sum(line.startswith("not looked at") for line in lines) == 3
+    assert sum(line.startswith("not checked") for line in lines) == 3
 
 
 def sum_of(plan, step: str) -> float:
@@ -183,7 +183,7 @@ def sum_of(plan, step: str) -> float:
             "limits for joint(s) 'wrist', which the model does not have",
         ),
         (GivenLimits(ranges={"elbow": (1.0, 0.0)}), "joint 'elbow': range 1 to 0 is none"),
-        (GivenLimits(ranges={"elbow": (-200.0, 1.0)}), "goes beyond the file's"),
+        (GivenLimits(ranges={"elbow": (-200.0, 1.0)}), "exceeds the file's"),
         (GivenLimits(speeds={"elbow": 50.0}), "joint 'elbow': speed 50, the file's limit is 5"),
     ],
 )

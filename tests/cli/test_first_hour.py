@@ -33,7 +33,7 @@ def test_a_package_goes_where_its_model_is_called(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("arm: ")
     assert (tmp_path / "arm" / MANIFEST).is_file()
-    assert "note: in C it is two_link; --name gives it another name" in done.stdout
+    assert "note: the prefix of C names is two_link; --name changes it" in done.stdout
     header = "arm/include/two_link/two_link.h"
     assert f"{header}: the header, #include <two_link/two_link.h>\n" in done.stdout
     assert (tmp_path / "arm" / "include" / "two_link" / "two_link.h").is_file()
@@ -70,10 +70,10 @@ def test_what_a_second_emission_removes_and_renames_is_said(tmp_path: Path) -> N
     done = typed("emit-c", "arm.npz", "--functions", "gravity", "--name", "elbow", cwd=tmp_path)
 
     removed = next(line for line in done.stdout.splitlines() if ": removed, " in line)
-    assert removed.startswith("arm: removed, as the package has them no more: ")
+    assert removed.startswith("arm: removed, because the package no longer has them: ")
     assert {"src/jacobian.c", "include/two_link/two_link.h"} <= set(removed.split(": ")[2].split(", "))
     assert not (tmp_path / "arm" / "src" / "jacobian.c").exists()
-    assert "note: renamed since the package that was there: two_link_* is now elbow_*\n" in done.stdout
+    assert "note: two_link_* of the old package is now called elbow_*\n" in done.stdout
     assert (tmp_path / "arm" / "notes.txt").read_text() == "mine"
 
 

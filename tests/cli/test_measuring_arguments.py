@@ -82,8 +82,8 @@ def test_excite_has_bounds(
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--one-log", "--load", "2,0,0,0.1"), "--load is of the motor runs, which --one-log leaves out"),
-        (("--no-collisions", "--meshes", "."), "--meshes, and --no-collisions, with which no shape is read"),
+        (("--one-log", "--load", "2,0,0,0.1"), "--load is for motor runs, and --one-log has none"),
+        (("--no-collisions", "--meshes", "."), "--meshes has no effect with --no-collisions"),
     ],
 )
 def test_options_of_excite_that_exclude_each_other(
@@ -150,7 +150,7 @@ def test_the_plan_is_printed(capsys: pytest.CaptureFixture[str], model: Path, tm
     assert "exciting motion: condition number" in said.out
     assert "the best of 1000 random motions, which were not asked to hit nothing" in said.out
     assert "torques: by theta_b without friction, at most 80% of the limits" in said.out
-    assert "not looked at: self-collision" in said.out
+    assert "not checked: self-collision" in said.out
     assert "floor at -2 m: origins of joints and the tip, not their bodies, stay 10 mm above" in said.out
     assert f"psdmc calibrate {model} {tmp_path / 'plan'} -o two_link_calibrated.npz" in said.err
     motion = read_trajectory(tmp_path / "plan" / "trajectories" / "exciting.csv")

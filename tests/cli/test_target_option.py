@@ -93,5 +93,5 @@ def test_another_name_in_c_is_told(
     assert emit(model, tmp_path / "arm", "--name", name) in (0, None)
 
     said = capsys.readouterr().out
-    assert (f"note: in C '{name}' is {in_c}\n" in said) if in_c else ("note:" not in said)
+    assert (f"note: the C name of '{name}' is {in_c}\n" in said) if in_c else ("note:" not in said)
     assert (tmp_path / "arm" / "include" / (in_c or name) / f"{in_c or name}.h").is_file()

@@ -60,7 +60,7 @@ def test_a_negated_log_gives_a_reason_a_report_and_no_model(folder: Path):
     lines = done.stdout.splitlines()
     assert lines[0] == "verdict: not usable"
     assert any("likely: the effort of every joint has the opposite sign" in line for line in lines)
-    assert "bad.npz: not written; --keep writes it all the same" in lines
+    assert "bad.npz: not written; add --keep to write it anyway" in lines
     assert not (folder / "bad.npz").exists()
     page = (folder / "bad.html").read_text(encoding="utf-8")
     assert page.index("Verdict: not usable") < page.index("Accuracy on held-out data")

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from house_style import Piece
+from messages import messages as printed
 
 ROOT = Path(__file__).parents[2]
 FENCE = re.compile(r"(?ms)^```.*?^```")
@@ -72,11 +73,7 @@ def _split(text: str, separator: re.Pattern[str], line: int) -> Iterator[tuple[i
 
 def messages(root: Path = ROOT) -> Iterator[Piece]:
     """What the program prints: errors, hints, warnings, notes, help."""
-    try:
-        from messages import messages as printed
-    except ImportError:  # MARKED: to go when tests/prose/messages.py is here
-        return
-    for file, line, text in printed():
+    for file, line, text in printed(root):
         name = Path(file)
         yield Piece(str(name.relative_to(root) if name.is_relative_to(root) else name), line, "message", text)
 

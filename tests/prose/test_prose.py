@@ -124,14 +124,20 @@ def test_the_check_covers_what_users_read():
     assert {"psdmc/compiler.py", "psdmc/model/dynamics_model.py", "psdmc/toolchain/robot_facts.py"} <= public
 
 
-def test_messages_are_covered(monkeypatch: pytest.MonkeyPatch):
-    made_up = type(sys)("messages")
-    made_up.messages = lambda: [("psdmc/errors.py", 3, "The file is held against Pinocchio's.")]
-    monkeypatch.setitem(sys.modules, "messages", made_up)
-    pieces = list(messages())
+def test_messages_are_covered(tmp_path: Path):
+    shown = tmp_path / "psdmc" / "shown.py"
+    shown.parent.mkdir()
+    shown.write_text('raise InputError(f"{file}: is held against the model", "no hint")\n', encoding="utf-8")
+    pieces = list(messages(tmp_path))
 
-    assert pieces == [Piece("psdmc/errors.py", 3, "message", "The file is held against Pinocchio's.")]
+    assert pieces == [Piece("psdmc/shown.py", 1, "message", "`x`: is held against the model")]
     assert [fault.rule for fault in house_style.faults(pieces)] == ["banned word"]
+
+
+def test_many_messages_are_found():
+    files = {piece.file for piece in messages()}
+
+    assert {"psdmc/cli/pipeline.py", "psdmc/robot/mimic.py", "psdmc/toolchain/build_package.py"} <= files
 
 
 def test_the_command_fails_on_a_planted_sentence(

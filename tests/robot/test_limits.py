@@ -321,7 +321,9 @@ def test_a_tip_on_another_branch_hints_at_what_is_below():
 
 
 def test_every_limit_is_in_the_documents():
-    text = (Path(__file__).parents[2] / "docs" / "notation.md").read_text(encoding="utf-8").replace(",", "")
+    text = (
+        (Path(__file__).parents[2] / "docs" / "robot_files.md").read_text(encoding="utf-8").replace(",", "")
+    )
     table = text[text.index("## Numbers and limits") :]
     for number in (limits.MAX_LINKS, limits.MAX_JOINTS, limits.MAX_CHARACTERS, limits.MAX_NAME):
         assert f"| {number}" in table

@@ -146,7 +146,7 @@ def test_a_turn_that_two_joints_lie_beyond_is_snapped_for_both_and_said_once() -
                 joint("a", "base", "one", extra='<mimic joint="b"/>'),
                 joint("b", "base", "two", extra='<mimic joint="a"/>'),
             ),
-            "joint 'a' mimics itself, by way of 'b'",
+            "joint 'a' mimics itself through 'b'",
         ),
         ((joint("a", "base", "one", extra='<mimic joint="c"/>'),), "mimics 'c', which is no movable joint"),
         ((joint("a", "base", "one", extra='<mimic multiplier="x" joint="a"/>'),), "multiplier='x'"),

@@ -175,7 +175,7 @@ def test_the_commands_take_them(arm: Path, tmp_path: Path, monkeypatch: Any) -> 
         ("derive", "moved.xacro", "a:=1", "--xacro-arg", "a:=2"): "xacro argument 'a' is given twice",
         ("derive", "moved.xacro", "--package", "x"): "--package: 'x' is no NAME=DIR",
         ("show", "m.npz", "a:=1"): "m.npz: a model, which has no further arguments",
-        ("check", "m.npz", "a:=1"): "arguments and packages of a xacro file without the file",
+        ("check", "m.npz", "a:=1"): "xacro arguments or packages are given, but no xacro file",
     }.items():
         done = typed(*words, cwd=there)
         assert (done.returncode, done.stderr.splitlines()[0]) == (2, f"error: {said}")

@@ -46,7 +46,7 @@ def check_range(info: PackageInfo, kernels: Mapping[str, Kernel], real: str) -> 
     for what, value in numbers:
         if math.isinf(rounded_out(value, real)):
             raise InputError(
-                f"{info.name}: {what} is {value:.6g}, beyond float32's {LARGEST_FLOAT:.6g}",
+                f"{info.name}: {what} is {value:.6g}, more than float32's {LARGEST_FLOAT:.6g}",
                 "emit it with --real float64, or check the robot's units",
             )
 

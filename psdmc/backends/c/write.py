@@ -117,7 +117,7 @@ def _refuse_links(root: Path, paths: Mapping[str, str]) -> None:
     for path in paths:
         if link_in(root, path):
             raise InputError(
-                f"{root}: not writing {path}: a symbolic link stands there",
+                f"{root}: not writing {path}: it is a symbolic link",
                 "remove the link, or choose another folder",
             )
 

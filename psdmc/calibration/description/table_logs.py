@@ -71,7 +71,7 @@ def _tables(table: TomlTable, where: str, reading: Reading) -> dict[str, Path]:
     if not table.has("tables"):
         return {"": reading.folder / table.text("file")}
     if table.has("file"):
-        reading.faults.append(f"{where}: tables: beside file, expected one or the other")
+        reading.faults.append(f"{where}: `tables` and `file` are both given, expected one of them")
     given = table.content["tables"]
     names = tuple(given) if isinstance(given, dict) else ()
     if not 0 < len(names) <= MOST_TABLES or any(not name for name in names):

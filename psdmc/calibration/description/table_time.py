@@ -35,7 +35,7 @@ def _read(value: object, reading: Reading) -> TimeEntry:
     table = TomlTable(value, "time", ("column", "unit", "rate"), reading.faults)
     if table.has("rate"):
         if table.has("column") or table.has("unit"):
-            reading.faults.append("time: rate: beside a column or unit, expected one or the other")
+            reading.faults.append("time: `rate` is given with `column` or `unit`, expected one or the other")
         return TimeEntry(rate=table.number("rate", SLOWEST, FASTEST))
     unit = table.word("unit", (*TIME_UNITS, DATE), "s")
     column = column_of(table, "column") if table.has("column") else "time_s"

@@ -105,7 +105,7 @@ def _require_alone(run: FrictionRun, chain: Mechanism, k: int, states: States) -
     rms = np.sqrt(np.mean(states.qd**2, axis=0))
     if rms[k] == 0:
         raise InputError(
-            f"{run.log.name}: joint {run.joint} stands still: its friction cannot be seen",
+            f"{run.log.name}: joint {run.joint} does not move, so the log does not show its friction",
             "move that joint in its friction runs",
         )
     others = [name for j, name in enumerate(chain.joint_names) if j != k and rms[j] > 0.05 * rms[k]]

@@ -180,7 +180,7 @@ def _even_part(
     use = (near & steady[there] & steady[back])[:, None] & moves[there] & moves[back]
     if use.sum() < 10 * len(chain):
         raise InputError(
-            f"{run.log.name}: the way back does not retrace the way there at constant speed",
+            f"{run.log.name}: the backward sweep does not follow the forward sweep at constant speed",
             "gravity needs each path run forwards and backwards, slowly: `psdmc excite` plans such runs",
         )
     return (

@@ -159,7 +159,7 @@ def _both_ways(chain: Mechanism, k: int, log: Log, options: FilterOptions) -> tu
     name = chain.joints[k].name
     if any(len(way) < 10 for way in ways):
         raise InputError(
-            f"{log.name}: joint {name} is not swept both ways at a constant speed",
+            f"{log.name}: joint {name} is not swept in both directions at a constant speed",
             "run `psdmc excite` for sweeps, or check which joint the run belongs to",
         )
     branches = []

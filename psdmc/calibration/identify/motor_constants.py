@@ -30,7 +30,7 @@ def require_constants(constants: Mapping[str, float], joint_names: Sequence[str]
     if odd:
         raise InputError(
             f"torque constants: {first_faults(odd)}: expected positive numbers, at most {LARGEST_CONSTANT:g} N m/A",
-            "where a current counts against its joint's sense, change the current's sign in the log",
+            "if a positive current gives a negative torque, change the sign of the current in the log",
         )
 
 

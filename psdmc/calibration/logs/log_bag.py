@@ -198,7 +198,7 @@ def _require_alike(row: Any, number: int, names: tuple[str, ...], path: str) -> 
         raise InputError(
             f"{path}: message {number} names joints {listed([quoted(x) for x in row.name])}, "
             f"the first {listed([quoted(x) for x in names])}",
-            "record the joints of one publisher on a topic of their own",
+            "record the joints of each publisher on a separate topic",
         )
     for what in ("position", "effort"):
         if len(getattr(row, what)) != len(names):

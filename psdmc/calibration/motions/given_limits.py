@@ -103,7 +103,7 @@ def _ranged(joint: Joint, low: float, high: float) -> Limits:
         )
     if low < limits.lower or high > limits.upper:
         raise InputError(
-            f"joint {shown(joint.name)}: range {low:g} to {high:g} goes beyond the file's, {limits.lower:.4g} to"
+            f"joint {shown(joint.name)}: range {low:g} to {high:g} exceeds the file's, {limits.lower:.4g} to"
             f" {limits.upper:.4g}",
             "ranges are in rad (m), and within the file's",
         )

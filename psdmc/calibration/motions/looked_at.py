@@ -76,7 +76,7 @@ def _of_torques(allowed: Allowed, model: DynamicsModel) -> str:
             if model.theta_b is None
             else "no joint has an effort limit (--effort JOINT=NM)"
         )
-        return f"not looked at: torques, {why}"
+        return f"not checked: torques, {why}"
     bare = [
         name
         for name, value in zip(allowed.chain.joint_names, allowed.torques.largest, strict=True)
@@ -96,23 +96,23 @@ def _of_shapes(allowed: Allowed, model: DynamicsModel, shapes: Sequence[Path] | 
             " a load or cables have no shape"
         )
     if shapes is None:
-        return "not looked at: self-collision, as asked for (--no-collisions)"
+        return "not checked: self-collision, as asked for (--no-collisions)"
     try:
         clearance_of(model, shapes)
     except InputError as error:
-        return f"not looked at: self-collision, {error.message}{f' ({error.hint})' if error.hint else ''}"
-    return "not looked at: self-collision"
+        return f"not checked: self-collision, {error.message}{f' ({error.hint})' if error.hint else ''}"
+    return "not checked: self-collision"
 
 
 def _of_floor(allowed: Allowed, floor: float | None) -> str:
     if floor is None:
-        return "not looked at: floor and surroundings (--floor HEIGHT: m, of a floor above the base's origin)"
+        return "not checked: floor and surroundings (give the floor's height above the base's origin, m: --floor HEIGHT)"
     by = (
         "shapes"
         if isinstance(allowed.clearance, Clearance)
         else "origins of joints and the tip, not their bodies,"
     )
-    return f"floor at {floor:g} m: {by} stay {1000 * APART:g} mm above; other surroundings are not looked at"
+    return f"floor at {floor:g} m: {by} stay {1000 * APART:g} mm above; other surroundings are not checked"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -281,7 +281,7 @@ def read_plant_robot(path: Path) -> PlantRobot:
     gravity = content.get("gravity", [0.0, 0.0, -9.81])
     if any(abs(x) > LARGEST_LENGTH for x in gravity):
         faults.append(f"gravity: expected numbers of at most {LARGEST_LENGTH:g}")
-    require_none(faults, str(path), "a virtual robot has to know everything: see docs/notation.md")
+    require_none(faults, str(path), "a virtual robot has to know everything: see docs/robot_files.md")
     return PlantRobot(
         str(content.get("name", "robot")), (float(gravity[0]), float(gravity[1]), float(gravity[2])), rows
     )

@@ -50,7 +50,8 @@ class Free(WideJoint):
         return (q[0], q[1], q[2])
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """With t the angle of w, the origin goes by v + (1 - cos t) / t^2 w x v + (t - sin t) / t^3 w x (w x v)."""
+        """Move the origin along v and w. With t the angle of w, it goes by v + (1 - cos t) / t^2 w x v + (t - sin t) /
+        t^3 w x (w x v)."""
         linear, angles, here = step[:3], step[3:], unit(q[3:])
         turned, share, cosine = turned_by(here, angles)
         across = _cross(angles, linear)
@@ -63,8 +64,8 @@ class Free(WideJoint):
         return (*(p + way for p, way in zip(q[:3], moved, strict=True)), *(nearer * x for x in turned))
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        """With t the angle of w, the linear rates p - w x p / 2 + (1 - t/2 cot(t/2)) / t^2 w x (w x p) bring the origin to
-        p."""
+        """Compute the rates that bring the origin to p. With t the angle of w, the linear rates are p - w x p / 2 + (1
+        - t/2 cot(t/2)) / t^2 w x (w x p)."""
         angles, cotangent = angles_between(q[3:], other[3:])
         apart = [there - here for here, there in zip(q[:3], other[:3], strict=True)]
         moved = _inward(rotation_of(inverse(q[3:])), apart)

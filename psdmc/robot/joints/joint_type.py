@@ -1,4 +1,4 @@
-"""What a joint type is: everything that any stage needs to know about the way a joint moves.
+"""Joint types: everything that a stage needs to know about how a joint moves.
 
 A new type is one file beside this one and a line in the table of types (__init__.py). Code outside this folder never
 distinguishes types; it uses the properties below.
@@ -128,7 +128,7 @@ class JointType:
         return (*q[: part.start], *unit(q[part]), *q[part.stop :]) if part.stop else tuple(q)
 
     def normalized(self, q: Array) -> Array:
-        """The same of an array (nq, ...), in its precision."""
+        """Normalize an array (nq, ...) in its precision."""
         return np.stack(self.restored(list(q)))
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:

@@ -105,6 +105,6 @@ def product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Quaternion:
 
 
 def inverse(quaternion: Sequence[Scalar]) -> Quaternion:
-    """Of a unit quaternion."""
+    """Return the inverse of a unit quaternion."""
     x, y, z, w = quaternion
     return (-x, -y, -z, w)

@@ -56,6 +56,6 @@ def square_of(values: Sequence[Scalar]) -> Scalar:
 
 
 def unit(values: Sequence[Scalar]) -> tuple[Scalar, ...]:
-    """The same, divided by its length."""
+    """Divide a vector by its length."""
     length = 1.0 / root(square_of(values))
     return tuple(value * length for value in values)

@@ -1,4 +1,4 @@
-"""What joints of several coordinates have in common."""
+"""Common parts of joints with several coordinates."""
 
 from __future__ import annotations
 

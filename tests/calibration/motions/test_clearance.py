@@ -96,17 +96,17 @@ def test_what_cannot_be_looked_at_is_said(tmp_path: Path):
     plan = plan_campaign(model, ChainRegressor(model), one)
 
     said = next(line for line in plan.looked if "self-collision" in line)
-    assert said.startswith("not looked at: self-collision, crane.urdf: collision shape of link 'upper': mesh")
+    assert said.startswith("not checked: self-collision, crane.urdf: collision shape of link 'upper': mesh")
     assert "--meshes DIR" in said
     with pytest.raises(InputError, match="is in none of the given folders"):
         plan_campaign(model, ChainRegressor(model), replace(one, shapes=(tmp_path,)))
     bare = model_of(tmp_path, urdf(shapes=False))
     plan = plan_campaign(bare, ChainRegressor(bare), one)
     assert (
-        "not looked at: self-collision, crane.urdf has no collision shapes (add <collision> to its links)"
+        "not checked: self-collision, crane.urdf has no collision shapes (add <collision> to its links)"
         in plan.looked
     )
-    assert any(line.startswith("not looked at: floor") for line in plan.looked)
+    assert any(line.startswith("not checked: floor") for line in plan.looked)
 
 
 def test_a_floor_needs_no_shapes(tmp_path: Path):

@@ -74,6 +74,6 @@ def test_unknown_parameters_and_limits_are_said(tmp_path: Path):
     partly = plan_campaign(model, ChainRegressor(model), given)
     unknown = plan_campaign(replace(model, theta_b=None), ChainRegressor(model), given)
 
-    assert "not looked at: torques, no joint has an effort limit (--effort JOINT=NM)" in without_limits.looked
+    assert "not checked: torques, no joint has an effort limit (--effort JOINT=NM)" in without_limits.looked
     assert any("'turn', 'bend' have no limit" in line for line in partly.looked)
-    assert "not looked at: torques, theta_b is unknown" in unknown.looked
+    assert "not checked: torques, theta_b is unknown" in unknown.looked

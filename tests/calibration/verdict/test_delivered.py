@@ -189,7 +189,7 @@ def test_physical_is_the_default_of_the_command(
     assert min(coulomb()) >= 0
     assert "physical consistency moved the parameters" in capsys.readouterr().out
     assert min(coulomb("--physical")) >= 0
-    assert "note: --physical is the default now" in capsys.readouterr().out
+    assert "note: --physical is the default;" in capsys.readouterr().out
 
 
 @pytest.mark.slow
