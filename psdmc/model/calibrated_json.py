@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 from typing import Any, TypeVar, cast
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from psdmc.model import json_values as json
 from psdmc.model.calibrated import (
-    IDENTIFIED,
     Array,
     Calibrated,
     FrictionRunConstants,
@@ -29,16 +28,14 @@ from psdmc.model.calibrated import (
     Verdict,
     code_of,
     parameters_of,
-    viscous_name,
 )
+from psdmc.model.calibrated_before import KINDS, MOST, upgraded
 from psdmc.model.grounds import Delay, Ground
 
 Row = TypeVar("Row")
 
 SCHEMA = 1
 """Of what as_json gives. What psdmc 0.1 and 0.2 wrote has none."""
-MOST = 1_000_000
-"""Largest number of rows of a table; a campaign's friction has seven per joint."""
 LARGEST_COVARIANCE = 4_000
 """Base parameters of which a file may hold a covariance: 64 MB."""
 LARGEST_COUNT = 2**53
@@ -46,8 +43,6 @@ LARGEST_COUNT = 2**53
 LEANING = 1e-9
 """Share by which a covariance may exceed the product of the standard deviations: rounding."""
 FIGURES = ("r2", "rmse", "gain", "gain_std", "friction_power", "friction_power_std", "noise_ratio", "speed")
-KINDS = {"reasons": "against", "suspects": "suspected", "doubts": "doubted"}
-"""Keys of a verdict's grounds, and its fields."""
 
 
 # Written
@@ -195,7 +190,7 @@ def from_json(value: object) -> Calibrated:
     if "schema" in content:
         json.whole(content["schema"], "the calibration's schema", 1, SCHEMA)
     else:
-        content = _upgraded(content)
+        content = upgraded(content)
     parameters = _rows(content, "base_parameters", _parameter)
     return Calibrated(
         robot=_text(content, "robot"),
@@ -382,121 +377,4 @@ def _load_of(value: object) -> LoadUsed:
         json.numbers(_part(value, name), f"the load's {name}", count)
         for name, count in (("com", 3), ("inertia", 6))
     )
-    return LoadUsed(
-        _finite(value, "mass"), tuple(com.tolist()), tuple(inertia.tolist()), _text(value, "frame")
-    )
-
-
-# What psdmc 0.1 and 0.2 wrote
-
-CODES = {
-    "identified": "identified",
-    "weakly visible": "weak",
-    "by the stated prior": "stated",
-    "not essential": "dropped",
-    "only in combination": "together",
-    "mostly invisible": "mostly",
-    "not visible": "invisible",
-}
-"""First words of what older psdmc wrote of a number's visibility, and the code that it has now."""
-
-
-def _upgraded(old: Mapping[str, Any]) -> dict[str, Any]:
-    """What psdmc 0.1 or 0.2 wrote, as the first schema has it; ValueError for what is no such thing."""
-    facts = dict(_record({"facts": {}, **old}, "facts"))
-    logs = [
-        {"date": "", "use": use, **json.record(row, "a log"), **({"use": use} if use != "fit" else {})}
-        for name, use in (("data", "fit"), ("with_load", "with_load"))
-        for row in _list({name: facts.pop(name, [])}, name)
-    ]
-    load, verdict, prediction = facts.pop("load", None), old.get("verdict"), old.get("prediction")
-    found = {
-        "robot": "",
-        "method": "unknown",
-        "joints": [],
-        "quality": {},
-        "notes": [],
-        **old,
-        "base_parameters": [
-            _upgraded_row({"group": "all", "file": None, **row}, {"relative", "determined"})
-            for row in _old_rows(old, "base_parameters")
-        ],
-        "covariance": None,
-        "motors": [_upgraded_row(row) for row in _old_rows(old, "motors")],
-        "friction": [_upgraded_row(row) for row in _named_by_exponents(old)],
-        "springs": [
-            _upgraded_row({"joint": row.pop("spring", None), **row}) for row in _old_rows(old, "springs")
-        ],
-        "warnings": [{"code": "", "text": text} for text in _texts({"warnings": [], **old}, "warnings")],
-        "prediction": None if prediction is None else _upgraded_prediction(prediction),
-        "verdict": None if verdict is None else _upgraded_verdict(verdict),
-        "logs": logs,
-        "load": None if load is None else _upgraded_load(load),
-        "versions": facts.pop("versions", {}),
-        "facts": facts,
-    }
-    return found
-
-
-def _old_rows(old: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
-    return [
-        dict(json.record(row, f"a row of the calibration's {name}")) for row in _list({name: [], **old}, name)
-    ]
-
-
-def _upgraded_row(row: dict[str, Any], gone: Iterable[str] = ()) -> dict[str, Any]:
-    text = row.get("visibility", IDENTIFIED if row.get("identifiable") else "")
-    said = json.text(text, "a visibility")
-    code = next((code for words, code in CODES.items() if said.startswith(words)), "")
-    kept = {"std": None, "unit": "", "seen": True, **{k: v for k, v in row.items() if k not in gone}}
-    name = json.text(row.get("name"), "a name of the calibration")
-    return kept | {"visibility": {"code": code, "text": said}, "parameters": parameters_of(name)}
-
-
-def _named_by_exponents(old: Mapping[str, Any]) -> Sequence[dict[str, Any]]:
-    """Rows of friction, viscous terms called by their exponents. psdmc 0.1 called the first one viscous, whatever its
-    exponent."""
-    rows = _old_rows(old, "friction")
-    law = json.record(old.get("prediction") or {}, "the calibration's prediction")
-    exponents = [json.number(each, "an exponent") for each in _list({"exponents": [], **law}, "exponents")]
-    if not exponents or viscous_name(exponents[0]) in [row.get("name") for row in rows]:
-        return rows
-    first = exponents[0]
-    units = {"Nms/rad": f"Nm (s/rad)^{first:g}", "Ns/m": f"N (s/m)^{first:g}"}
-    renamed = {"viscous": viscous_name(first), "viscous^1": "viscous"}
-    return [
-        row | {"name": renamed[row["name"]], "unit": units.get(str(row.get("unit", "")), row.get("unit", ""))}
-        if json.text(row.get("name"), "a name of the calibration") in renamed
-        else row
-        for row in rows
-    ]
-
-
-def _upgraded_prediction(value: object) -> dict[str, Any]:
-    nothing = {
-        "steps": {},
-        "sign_speed": 0.0,
-        "exponents": [],
-        "offset": False,
-        "runs": {},
-        "coupling": [],
-        "columns": {},
-    }
-    return {**nothing, **json.record(value, "the calibration's prediction")}
-
-
-def _upgraded_verdict(value: object) -> dict[str, Any]:
-    old = json.record(value, "the verdict")
-    grounds = {
-        key: [{"code": "said", "text": text} for text in _texts({key: [], **old}, key)] for key in KINDS
-    }
-    delays = [
-        {"shown": False, **json.record(each, "a delay")} for each in _list({"delays": [], **old}, "delays")
-    ]
-    return {"samples_per_unknown": None, "joints": {}, **old, **grounds, "delays": delays}
-
-
-def _upgraded_load(value: object) -> dict[str, Any]:
-    old = json.record(value, "the load")
-    names = {"mass_kg": "mass", "com_m": "com", "inertia_kg_m2": "inertia"}
-    return {names.get(name, name): each for name, each in old.items()}
+    return _of(LoadUsed, value, com=tuple(com.tolist()), inertia=tuple(inertia.tolist()))
