@@ -21,12 +21,10 @@ from psdmc.calibration.identify.linear_problem import linear_problem
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.motions.allowed import Allowed
-from psdmc.calibration.motions.criterion import scaled
-from psdmc.calibration.motions.excite import Excitation, ExciteOptions, excite
-from psdmc.calibration.motions.excite_options import chosen_objective
-from psdmc.calibration.motions.fit_columns import FitColumns, all_columns, inertial_columns
-from psdmc.calibration.motions.lead_in import from_rest_to_rest
-from psdmc.calibration.motions.limited_sines import LimitedSines
+from psdmc.calibration.motions.criterion import FitColumns, all_columns, inertial_columns, scaled
+from psdmc.calibration.motions.excite import Excitation, excite
+from psdmc.calibration.motions.excite_options import ExciteOptions, chosen_objective
+from psdmc.calibration.motions.limited_sines import LimitedSines, from_rest_to_rest
 from psdmc.calibration.plant.virtual_robot import load_virtual_robot, simulate
 from psdmc.compiler import compile as compile_model
 from psdmc.compiler import derive

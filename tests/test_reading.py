@@ -17,7 +17,7 @@ from bundled import ROBOTS
 from command_line import typed
 
 import psdmc
-from psdmc.calibration.logs.table_text import PIECE_BYTES, whole_lines
+from psdmc.calibration.logs.formats.text import PIECE_BYTES, whole_lines
 from psdmc.errors import InputError
 from psdmc.reading import in_words, read_file, read_rest
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import shutil
+import subprocess
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
-from psdmc.bench.cold import CALLS, swept_memory
 from psdmc.bench.contestant import Runner
 from psdmc.bench.machine import IDLE_SHARE, others_share
 from psdmc.progress import Step
@@ -132,3 +135,57 @@ def _times(trials: Sequence[_Trials]) -> Times:
 def _tail(blocks: Array) -> Tail:
     median, high = np.percentile(blocks, [50, 99.99]).tolist()
     return Tail(median, high, float(blocks.max()), len(blocks))
+
+
+CACHES = Path("/sys/devices/system/cpu/cpu0/cache")
+"""Where Linux describes them."""
+
+CALLS = 25
+"""Cold calls per contestant and round: a sweep takes milliseconds."""
+
+LEAST, MOST = 1 << 26, 1 << 28
+"""Bytes swept at least, also where the system does not say how large its caches are, and at most."""
+
+UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
+
+
+@cache
+def swept_memory() -> Array:
+    """Memory of twice the largest cache's size, within LEAST and MOST; every page is written, so that it is one of its
+    own."""
+    largest = max(map(_bytes, CACHES.glob("index*/size")), default=0)
+    return np.ones(min(max(2 * largest, LEAST), MOST) // 8)
+
+
+def _bytes(size: Path) -> int:
+    """The number in a file such as "32768K"; zero where it holds none."""
+    text = size.read_text(encoding="ascii").strip()
+    number, unit = text.rstrip("KMG"), text[-1:]
+    return int(number) * UNITS.get(unit, 1) if number.isdecimal() else 0
+
+
+CODE = frozenset("tTwW")
+"""nm's letters for functions."""
+
+
+def code_sizes(library: Path) -> dict[str, int]:
+    """Bytes of each function by its name. What a compiler splits off, `name.cold` and the like, counts as the function's.
+    Empty where there is no GNU or LLVM nm: the column then stays empty."""
+    nm = shutil.which("nm")
+    if nm is None:
+        return {}
+    command = [nm, "--print-size", "--defined-only", str(library)]
+    said = subprocess.run(command, capture_output=True, text=True, check=False, errors="replace").stdout
+    found: dict[str, int] = {}
+    for line in said.splitlines():
+        words = line.split()
+        if len(words) == 4 and words[2] in CODE:
+            name = words[3].partition(".")[0]
+            found[name] = found.get(name, 0) + int(words[1], 16)
+    return found
+
+
+def code_bytes(sizes: Mapping[str, int], belongs: Callable[[str], bool]) -> int | None:
+    """Bytes of the functions that belong to one; None where none is known."""
+    own = [size for name, size in sizes.items() if belongs(name)]
+    return sum(own) if own else None

@@ -18,7 +18,7 @@ from psdmc.calibration.campaign_plan import CampaignOptions as CampaignOptions
 from psdmc.calibration.campaign_plan import Plan as Plan
 from psdmc.calibration.campaign_plan import PlannedRun as PlannedRun
 from psdmc.calibration.campaign_plan import plan_campaign as plan_campaign
-from psdmc.calibration.logs.log_bag import is_folder
+from psdmc.calibration.logs.foreign_bytes import is_folder
 from psdmc.calibration.motions.excite import Excitation
 from psdmc.calibration.motions.trajectory import write_trajectory
 from psdmc.errors import InputError

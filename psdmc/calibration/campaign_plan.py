@@ -13,14 +13,13 @@ from psdmc.calibration.campaign_file import Step
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions, Load
-from psdmc.calibration.logs.table_files import TABLES
-from psdmc.calibration.motions.allowed import Allowed
+from psdmc.calibration.logs.formats import WRITTEN
+from psdmc.calibration.motions.allowed import Allowed, GivenLimits, bounded
 from psdmc.calibration.motions.allowed_motion import SHARES, TRIES, Try, first_allowed, smaller_boxes
-from psdmc.calibration.motions.excite import Excitation, ExciteOptions, excite
-from psdmc.calibration.motions.excite_poses import motor_poses, unfelt
-from psdmc.calibration.motions.fit_columns import all_columns, inertial_columns
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
-from psdmc.calibration.motions.lead_in import from_rest_to_rest
+from psdmc.calibration.motions.criterion import all_columns, inertial_columns
+from psdmc.calibration.motions.excite import Excitation, excite, motor_poses, unfelt
+from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.limited_sines import from_rest_to_rest
 from psdmc.calibration.motions.looked_at import allowed_of, looked_at
 from psdmc.calibration.motions.search import cpu_seconds
 from psdmc.calibration.motions.sweeps import (
@@ -77,8 +76,9 @@ class CampaignOptions:
     table: str = "csv"
 
     def __post_init__(self) -> None:
-        if f".{self.table}" not in TABLES:
-            raise InputError(f"table is {self.table!r}, expected csv, npz or parquet", "choose one of these")
+        if f".{self.table}" not in WRITTEN:
+            known = ", ".join(ending.removeprefix(".") for ending in WRITTEN)
+            raise InputError(f"table is {self.table!r}, expected one of {known}", "choose one of these")
         if self.floor is not None and not abs(self.floor) <= HIGHEST_FLOOR:
             raise InputError(
                 f"floor is at {self.floor:g} m, expected at most {HIGHEST_FLOOR:g} above or below the base",

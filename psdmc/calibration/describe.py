@@ -8,7 +8,7 @@ from pathlib import Path
 from psdmc.atomic import write_whole
 from psdmc.calibration.campaign_file import is_campaign
 from psdmc.calibration.description.draft import drafted
-from psdmc.calibration.logs.table_files import column_names
+from psdmc.calibration.logs.log_files import column_names
 from psdmc.errors import InputError
 from psdmc.model.load import load
 

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from psdmc.atomic import make_folder, write_whole
 from psdmc.calibration.campaign_file import ListedRun, listed_runs
-from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER
-from psdmc.calibration.logs.log_bag import is_folder
+from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, SHORTER, is_folder
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.motions.trajectory import read_trajectory, trajectory_joints

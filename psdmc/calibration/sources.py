@@ -12,8 +12,8 @@ from psdmc.calibration.description.efforts import torque_constants
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.description.table_fit import FIT, FitChoice, with_choice
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.logs.log_bag import is_bag
-from psdmc.calibration.logs.open_log import open_log
+from psdmc.calibration.logs.formats import has_topics
+from psdmc.calibration.logs.log_files import open_log
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
@@ -51,7 +51,7 @@ class LogNaming:
 
     def require_bag(self, paths: Sequence[Path]) -> None:
         """InputError where a topic is named, and no log has any. A description says its topics itself."""
-        if self.topic and not any(is_bag(path) or is_description(path) for path in paths):
+        if self.topic and not any(has_topics(path) or is_description(path) for path in paths):
             raise InputError(f"--topic {quoted(self.topic)}: none of the logs is a bag", "leave it out")
 
     def opened(self, path: Path, progress: Progress) -> AnyLog:

@@ -106,7 +106,7 @@ def excite(
     from psdmc.calibration.campaign import CampaignOptions
     from psdmc.calibration.campaign_summary import summary
     from psdmc.calibration.identify.steps import Load
-    from psdmc.calibration.motions.given_limits import GivenLimits
+    from psdmc.calibration.motions.allowed import GivenLimits
     from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
     from psdmc.cli.tables import print_line
     from psdmc.report.calibrate_commands import excite_command

@@ -10,9 +10,8 @@ from made_up_bench import made_up_result
 from tiny_contestants import tiny
 
 from psdmc.bench.case import Case
-from psdmc.bench.code_size import code_bytes, code_sizes
-from psdmc.bench.cold import CALLS, LEAST, MOST, swept_memory
 from psdmc.bench.contestant import Runner
+from psdmc.bench.measure import CALLS, LEAST, MOST, code_bytes, code_sizes, swept_memory
 from psdmc.bench.results import BenchResult
 from psdmc.bench.run import Settings, run
 from psdmc.bench.states import States

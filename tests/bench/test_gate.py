@@ -10,8 +10,7 @@ import pytest
 
 from psdmc.bench.case import DIFFERENTIATED, Case
 from psdmc.bench.cases import EXAMPLES, standard_chains
-from psdmc.bench.counts import Baseline, count
-from psdmc.bench.gate import BASELINE, compare
+from psdmc.bench.gate import BASELINE, Baseline, compare, count
 from psdmc.bench.rivals import psdmc_c
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError

@@ -1,8 +1,8 @@
 """The cost against the number of joints is that of the LBR7 with an eighth joint, too."""
 
+from psdmc.bench.__main__ import SEED, eight_joints
 from psdmc.bench.case import generic_chain
 from psdmc.bench.cases import bundled_chain
-from psdmc.bench.scaling import SEED, eight_joints
 from psdmc.derivation.derive import derive_model
 
 

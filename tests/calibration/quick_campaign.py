@@ -2,7 +2,7 @@
 
 from psdmc.calibration.campaign import CampaignOptions
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.motions.excite import ExciteOptions
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 
 QUICK = CampaignOptions(

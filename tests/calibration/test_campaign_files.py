@@ -20,8 +20,9 @@ from psdmc.calibration.campaign import (
 from psdmc.calibration.campaign_file import listed_runs, read_campaign
 from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
 from psdmc.calibration.identify.steps import GravityRun, InertialRun, Load
-from psdmc.calibration.motions.excite import Excitation, ExciteOptions, SineSum
-from psdmc.calibration.motions.given_limits import GivenLimits
+from psdmc.calibration.motions.allowed import GivenLimits
+from psdmc.calibration.motions.excite import Excitation, SineSum
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.sweeps import (
     SineOptions,
     SweepOptions,
@@ -288,7 +289,7 @@ def test_a_seed_that_is_none_is_refused(arm, tmp_path: Path):
     ],
 )
 def test_a_trajectory_of_no_motion_is_refused(tmp_path: Path, column: str, value: list[float], message: str):
-    from psdmc.calibration.logs.table_files import read_columns, write_columns
+    from psdmc.calibration.logs.log_files import read_columns, write_columns
 
     motion = Trajectory(("a",), np.arange(4.0), *(np.zeros((4, 1)),) * 3)
     write_trajectory(motion, tmp_path / "motion.csv")

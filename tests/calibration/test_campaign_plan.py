@@ -16,8 +16,8 @@ from psdmc.calibration.campaign_plan import CampaignOptions, plan_campaign
 from psdmc.calibration.campaign_summary import summary
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.motions.excite import ExciteOptions
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.allowed import GivenLimits, bounded
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.calibration.motions.trajectory import read_trajectory
 from psdmc.calibration.simulate_campaign import SimulateOptions, simulate_campaign

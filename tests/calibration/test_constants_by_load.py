@@ -19,8 +19,7 @@ from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.least_squares import FitOptions
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_files import write_log
-from psdmc.calibration.logs.open_log import open_log
+from psdmc.calibration.logs.log_files import open_log, write_log
 from psdmc.calibration.motors_of_loads import LoadedLogs, loaded_quality
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.cli.boundary import run

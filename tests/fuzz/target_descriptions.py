@@ -15,7 +15,7 @@ from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.identify.knowledge import knowledge_of
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.logs.table_files import write_columns
+from psdmc.calibration.logs.log_files import write_columns
 
 
 def write_described(folder: Path) -> None:

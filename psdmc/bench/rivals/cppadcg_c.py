@@ -8,8 +8,9 @@ from pathlib import Path
 
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
-from psdmc.bench.code_size import code_sizes
 from psdmc.bench.contestant import Contestant, source
+from psdmc.bench.machine import version_of
+from psdmc.bench.measure import code_sizes
 from psdmc.bench.rivals.pinocchio_cpp import (
     DEFINES,
     includes,
@@ -18,7 +19,6 @@ from psdmc.bench.rivals.pinocchio_cpp import (
     variant_of,
     ways_of,
 )
-from psdmc.bench.versions import version_of
 from psdmc.errors import ToolchainError
 from psdmc.toolchain.compiler_command import find_compiler
 

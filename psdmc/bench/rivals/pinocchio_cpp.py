@@ -13,8 +13,8 @@ import numpy as np
 from psdmc.bench.build import built, cxx
 from psdmc.bench.case import Case, robot_as_numbers
 from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.bench.machine import version_of
 from psdmc.bench.states import output_sizes
-from psdmc.bench.versions import version_of
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.errors import ToolchainError
 from psdmc.robot.mechanism import DRIVE, Array

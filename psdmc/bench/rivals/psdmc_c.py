@@ -14,8 +14,8 @@ from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.package_files import library_files
 from psdmc.bench.build import built, cxx, produced
 from psdmc.bench.case import BENCHED, MOST_DIFFERENTIATED, Case
-from psdmc.bench.code_size import code_bytes, code_sizes
 from psdmc.bench.contestant import Contestant, Unavailable, source
+from psdmc.bench.measure import code_bytes, code_sizes
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import Lowering, lower
 from psdmc.model.dynamics_model import DynamicsModel

@@ -11,7 +11,7 @@ from psdmc.calibration.description.table_joints import JOINTS, JointEntry
 from psdmc.calibration.description.table_quantities import EFFORT, POSITION, VELOCITY, Entry, refused
 from psdmc.calibration.description.units import TICKS, UNITS, Says
 from psdmc.calibration.logs.log import Quantity
-from psdmc.calibration.logs.some_columns import Columns
+from psdmc.calibration.logs.log_format import Columns
 from psdmc.calibration.logs.wording import listed, quoted
 
 What = Literal["position", "velocity", "effort"]

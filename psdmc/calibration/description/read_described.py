@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 
 import numpy as np
+from scipy import interpolate
 
 from psdmc.calibration.description.columns_found import Found, JointColumns, joint_columns, place_of
 from psdmc.calibration.description.description import LogDescription
 from psdmc.calibration.description.efforts import held_quantity, torque_factor
-from psdmc.calibration.description.in_si import Layout, in_si
-from psdmc.calibration.description.table_coupling import COUPLING
-from psdmc.calibration.description.table_csv_form import CSV_FORM
-from psdmc.calibration.description.table_logs import LOGS, LogEntry
+from psdmc.calibration.description.table_coupling import COUPLING, CouplingEntry
+from psdmc.calibration.description.table_logs import CSV_FORM, LOGS, TIME, LogEntry, TimeEntry
 from psdmc.calibration.description.table_quantities import refused
-from psdmc.calibration.description.table_time import TIME, TimeEntry
-from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.log_date import date_of
-from psdmc.calibration.logs.row_store import HELD_BYTES, RowStore
-from psdmc.calibration.logs.some_columns import Columns, open_columns
-from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
+from psdmc.calibration.identify.coupling import coupling_of
+from psdmc.calibration.logs.formats import format_of
+from psdmc.calibration.logs.log import Array, Quantity, date_of
+from psdmc.calibration.logs.log_format import Columns, Opening
+from psdmc.calibration.logs.stored_log import HELD_BYTES, AnyLog, RowStore, StoredLog
 from psdmc.calibration.logs.table_limits import LARGEST_STORED_ROWS
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
@@ -59,9 +58,9 @@ def _described(
     description: LogDescription, entry: LogEntry, joint_names: tuple[str, ...], held: int
 ) -> AnyLog:
     with ExitStack() as stack:
-        form = description.part(CSV_FORM)
+        opening = Opening(description.part(CSV_FORM), entry.topic, held)
         tables = {
-            name: stack.enter_context(open_columns(path, form, entry.topic, held))
+            name: stack.enter_context(format_of(path).columns(path, opening))
             for name, path in entry.tables.items()
         }
         layout = _layout(description, entry.name, joint_columns(description, joint_names, tables))
@@ -184,3 +183,108 @@ def _side_by_side(
         found = ", ".join(f"{name} has {count}" for name, count in lengths.items())
         raise refused(f"tables of one log differ in rows: {found}, expected a row of each for every time")
     yield np.column_stack([whole.get(-1, whole[0]), *(whole[k] for k in range(len(columns)))])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """Columns of a store: position, velocity where all have one, effort; n each.
+
+    factors, zeros  (columns,)  SI value = factor * (number - zero)
+    sliding         names of joints in m; None where a unit was not said
+    """
+
+    columns: tuple[Found, ...]
+    factors: Array
+    zeros: Array
+    has_velocity: bool
+    quantity: Quantity
+    sliding: tuple[str, ...] | None
+    notes: tuple[str, ...]
+
+
+def in_si(
+    time: Array, store: RowStore, layout: Layout, coupling: CouplingEntry, entry: LogEntry
+) -> tuple[Array, RowStore]:
+    """The rows in SI units, delays taken out, of joints, between the entry's start and end.
+
+    Numbers that are not finite stay what they are: the checks of a log name them.
+    """
+    delays = np.array([found.delay for found in layout.columns])
+    begin = time[0]
+    time, store = without_delays(time, store, delays, entry.name)
+    with np.errstate(invalid="ignore", over="ignore"):
+        first, stop = _kept(time - begin, entry)
+        if first >= stop:
+            lasts = f"it lasts {float(time[-1] - begin):.4g} s" if len(time) else "nothing is left of it"
+            raise refused(f"{entry.name}: no rows from {entry.start:g} to {entry.end:g} s, {lasts}")
+        maps = _maps(layout, coupling)
+        converted = RowStore(store.width, store.held)
+        for start in range(first, stop, BLOCK_ROWS):
+            rows = (store.rows(start, min(start + BLOCK_ROWS, stop)) - layout.zeros) * layout.factors
+            parts = np.split(rows, len(maps), axis=1)
+            converted.append(np.hstack([onto(part) for onto, part in zip(maps, parts, strict=True)]))
+    return time[first:stop], converted
+
+
+def _maps(layout: Layout, coupling: CouplingEntry) -> list[Callable[[Array], Array]]:
+    """What turns a quantity's columns into the joints', in the order of a store's quantities."""
+    motions = [coupling.position, *([coupling.velocity] if layout.has_velocity else [])]
+    maps = [_same if found is None else found.to_joints for found in map(coupling_of, motions)]
+    torques = coupling_of(coupling.effort)
+    return [*maps, _same if torques is None else torques.torque_of_joints]
+
+
+def _same(values: Array) -> Array:
+    return values
+
+
+def _kept(time: Array, entry: LogEntry) -> tuple[int, int]:
+    """First row between start and end, and the one after the last; time counts from the log's first row."""
+    first = int(np.searchsorted(time, entry.start)) if entry.start > 0.0 else 0
+    stop = int(np.searchsorted(time, entry.end, side="right")) if np.isfinite(entry.end) else len(time)
+    return first, stop
+
+
+BLOCK_ROWS = 65_536
+"""Rows converted at once."""
+NEIGHBOURS = 4
+"""Rows on either side that interpolation between rows uses."""
+
+
+def without_delays(time: Array, store: RowStore, delays: Array, name: str) -> tuple[Array, RowStore]:
+    """The rows whose columns are all there, column k being its value `delays[k]` (s) later; InputError where time does
+    not grow.
+
+    time   (N,);  store  N rows of len(delays) columns
+    """
+    if not delays.any():
+        return time, store
+    if len(time) < 2 or not np.all(np.diff(time) > 0.0):
+        raise InputError(
+            f"{name}: its time does not grow from row to row: delays cannot be taken out",
+            "sort the rows by time and drop doubled ones",
+        )
+    first = int(np.searchsorted(time, time[0] - min(float(delays.min()), 0.0)))
+    stop = int(np.searchsorted(time, time[-1] - max(float(delays.max()), 0.0), side="right"))
+    moved = RowStore(store.width, store.held)
+    for start in range(first, stop, BLOCK_ROWS):
+        own = time[start : min(start + BLOCK_ROWS, stop)]
+        moved.append(_moved(time, store, own, start, delays, name))
+    return time[first:stop], moved
+
+
+def _moved(time: Array, store: RowStore, own: Array, start: int, delays: Array, name: str) -> Array:
+    values = np.array(store.rows(start, start + len(own)))
+    for delay in dict.fromkeys(delays[delays != 0.0].tolist()):
+        begin, end = np.searchsorted(time, own[[0, -1]] + delay)
+        low, high = max(int(begin) - NEIGHBOURS, 0), min(int(end) + NEIGHBOURS, len(time))
+        columns = np.flatnonzero(delays == delay)
+        around = store.rows(low, high)[:, columns]
+        if not np.isfinite(around).all():
+            raise InputError(
+                f"{name}: a column with a delay holds values that are not finite near {own[0]:.6g} s",
+                "cut the log to a clean stretch, or leave the delay out",
+            )
+        inside = np.clip(own + delay, time[low], time[high - 1])
+        values[:, columns] = interpolate.PchipInterpolator(time[low:high], around)(inside)
+    return values

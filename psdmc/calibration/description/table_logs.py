@@ -9,8 +9,68 @@ from pathlib import Path
 from typing import cast
 
 from psdmc.calibration.description.table import Reading, Table
+from psdmc.calibration.description.table_quantities import column_of
+from psdmc.calibration.description.units import TIME_UNITS
 from psdmc.calibration.logs.log import USES, Use
+from psdmc.calibration.logs.log_format import TextForm
 from psdmc.calibration.logs.toml_tables import TomlTable, shown
+
+SLOWEST, FASTEST = 0.01, 1e6
+"""Hz."""
+DATE = "date"
+"""Unit of columns that hold dates."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeEntry:
+    """The time of rows.
+
+    column  name or number from 1
+    unit    s per number in it
+    rate    Hz, of rows without a column of time; 0: there is one
+    dates   whether the column holds dates, such as 2026-05-01T12:00:00.125, whose s count from 1970
+    """
+
+    column: str | int = "time_s"
+    unit: float = 1.0
+    rate: float = 0.0
+    dates: bool = False
+
+
+def _read_time(value: object, reading: Reading) -> TimeEntry:
+    table = TomlTable(value, "time", ("column", "unit", "rate"), reading.faults)
+    if table.has("rate"):
+        if table.has("column") or table.has("unit"):
+            reading.faults.append("time: `rate` is given with `column` or `unit`, expected one or the other")
+        return TimeEntry(rate=table.number("rate", SLOWEST, FASTEST))
+    unit = table.word("unit", (*TIME_UNITS, DATE), "s")
+    column = column_of(table, "column") if table.has("column") else "time_s"
+    return TimeEntry(column, 1.0 if unit == DATE else TIME_UNITS[unit].size, dates=unit == DATE)
+
+
+TIME: Table[TimeEntry] = Table("time", _read_time, TimeEntry())
+
+
+SEPARATOR_WORDS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+MOST_SKIPPED = 10_000
+
+
+def _read_csv_form(value: object, reading: Reading) -> TextForm:
+    table = TomlTable(value, "csv", ("separator", "header", "skip"), reading.faults)
+    header = table.content.get("header")
+    if header is not None and not isinstance(header, bool):
+        reading.faults.append(f"csv: header: found {shown(header)}, expected true or false")
+        header = None
+    word = table.word("separator", tuple(SEPARATOR_WORDS), "") if table.has("separator") else ""
+    return TextForm(
+        separator=SEPARATOR_WORDS.get(word),
+        header=header,
+        skip=table.whole("skip", 0, MOST_SKIPPED, 0),
+    )
+
+
+CSV_FORM: Table[TextForm] = Table("csv", _read_csv_form, TextForm())
+
 
 LARGEST_LOGS = 1000
 """As of a campaign's runs."""

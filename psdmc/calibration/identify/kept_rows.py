@@ -8,7 +8,7 @@ import numpy as np
 
 from psdmc.calibration.identify.linear_rows import Block
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.row_store import RowStore
+from psdmc.calibration.logs.stored_log import RowStore
 
 BLOCK_SAMPLES = 2048
 """Samples that come as one block."""

@@ -8,11 +8,11 @@ from typing import Any
 
 from psdmc.calibration.columns.columns import Columns, read_columns
 from psdmc.calibration.identify.estimate import FitOptions
-from psdmc.calibration.logs.check_options import CheckOptions
 from psdmc.calibration.logs.filter import SplitOptions
+from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.logs.row_store import HELD_BYTES
+from psdmc.calibration.logs.stored_log import HELD_BYTES
 from psdmc.model.calibrated import Matrix
 from psdmc.robot.mechanism import Mechanism
 

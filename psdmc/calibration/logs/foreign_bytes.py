@@ -23,6 +23,14 @@ SHORTER = "cut it into several"
 WRITE_AGAIN = "record, export or copy it again; the format goes by the file's ending"
 
 
+def is_folder(path: Path) -> bool:
+    """Return whether there is a folder of this name; names that no file can have are none."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
 @contextmanager
 def opened(path: Path, largest: int = LARGEST_FILE) -> Iterator[BinaryIO]:
     """The file, for reading bytes; InputError where it is missing, unreadable, empty, no file or larger than `largest`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from typing import Literal
 
 import numpy as np
@@ -138,3 +139,15 @@ def _column(values: object, shape: tuple[int, ...], what: str) -> Array:
         )
     array.setflags(write=False)
     return array
+
+
+EARLIEST, LATEST = 9.0e8, 4.0e9
+"""s since 1970 that are taken for a date: 1998 to 2096."""
+
+
+def date_of(first_time: float) -> str:
+    """The date (UTC) of a first row whose time (s) counts from 1970, else empty. The file's own date is not used: it
+    changes with copying, and the same log must give the same calibrated file."""
+    if not EARLIEST < first_time < LATEST:
+        return ""
+    return datetime.fromtimestamp(first_time, UTC).date().isoformat()

@@ -1,24 +1,28 @@
-"""Logs as files: CSV, Parquet and npz share their column names; ROS 2 bags have none.
+"""Logs as files: read whole or piece by piece, and written. Tables share their column names; bags have none.
 
-`time_s`, then per joint `position_rad.<joint>` (`position_m.` where it slides), optional `velocity_rad_s.<joint>`
-(`velocity_m_s.`), and one of `current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` where it slides);
+`time_s`, then per joint `position_rad.<joint>` (`position_m.` if it slides), optional `velocity_rad_s.<joint>`
+(`velocity_m_s.`), and one of `current_a.`, `motor_torque_nm.`, `joint_torque_nm.` (`_n.` if it slides);
 `effort_nm.` is read as motor torque, and the log's notes say so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from psdmc.calibration.logs.log import Array, Log, Quantity
-from psdmc.calibration.logs.log_bag import BAGS, is_bag, read_bag
-from psdmc.calibration.logs.log_date import date_of
-from psdmc.calibration.logs.table_files import TABLES, read_columns, write_columns
+from psdmc.atomic import make_folder, whole_file
+from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED, opened
+from psdmc.calibration.logs.formats import format_of, table_of
+from psdmc.calibration.logs.log import Array, Log, Quantity, date_of
+from psdmc.calibration.logs.log_format import TableFormat
+from psdmc.calibration.logs.stored_log import HELD_BYTES, AnyLog, RowStore, StoredLog
+from psdmc.calibration.logs.table_limits import LARGEST_STORED_ROWS, require_size
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
+from psdmc.progress import Progress, Step
 
 EFFORTS: tuple[tuple[str, Quantity], ...] = (
     ("current_a", "current"),
@@ -41,25 +45,124 @@ _EFFORT_COLUMNS: dict[Quantity, tuple[str, str]] = {
 
 
 def read_log(path: str | Path) -> Log:
-    """A log from .csv, .parquet, .npz, or a ROS 2 bag (.db3, .mcap or its folder).
+    """Return a log in memory from a table (.csv, .parquet, .npz, .mat) or a ROS 2 bag (.db3, .mcap or its folder).
 
-    InputError where the file is missing, no log, damaged, or lacks a column.
+    InputError if the file is missing, no log, damaged, or lacks a column.
     """
     path = Path(path)
-    if is_bag(path):
-        bag = read_bag(path)
-        return bag if isinstance(bag, Log) else bag.held()
-    require_format(path)
-    found = log_from_columns(path.name, read_columns(path))
-    return replace(found, date=date_of(float(found.time[0]) if len(found) else 0.0))
+    kind = format_of(path)
+    if isinstance(kind, TableFormat):
+        columns = read_columns(path)
+        return log_from_columns(path.name, columns)
+    bag = kind.read(path)
+    return bag if isinstance(bag, Log) else bag.held()
 
 
-def require_format(path: Path) -> None:
-    """InputError where a file's ending is no log format's."""
-    if path.suffix.lower() not in TABLES:
-        raise InputError(
-            f"{path}: '{path.suffix}' is no log format", f"known are {', '.join((*TABLES, *BAGS))}"
-        )
+SMALL_FILE = 64 * 1024**2
+"""Bytes of a table that is read at once."""
+
+
+def open_log(
+    path: str | Path, progress: Progress = lambda step: None, held: int = HELD_BYTES, topic: str = ""
+) -> AnyLog:
+    """Return a log of any size from a file that read_log takes.
+
+    held      bytes of rows in memory; more rows go to a temporary file, and a StoredLog is returned
+    progress  called with how much of a large file has been read
+    topic     of a bag's joint states; empty: its only one, or /joint_states
+
+    InputError as of read_log.
+    """
+    path = Path(path)
+    kind = format_of(path)
+    if not isinstance(kind, TableFormat):
+        return kind.read(path, topic, held)
+    with opened(path, LARGEST_STORED) as file:
+        size = file.seek(0, 2)
+    if size <= min(SMALL_FILE, held):
+        return read_log(path)
+    return _stored(path, kind, size, progress, held)
+
+
+def _stored(path: Path, kind: TableFormat, size: int, progress: Progress, held: int) -> AnyLog:
+    with opened(path, LARGEST_STORED) as file:
+        names, pieces = kind.pieces(file, str(path))
+        layout = layout_of(path.name, names)
+        places = [names.index(column) for column in layout.columns]
+        store, times = RowStore(len(places), held), []
+        for piece in _counted(pieces, path, size, progress, file.tell):
+            times.append(np.array(piece[:, names.index("time_s")]))
+            store.append(np.ascontiguousarray(piece[:, places]))
+    if not times:
+        raise _no_rows(path)
+    time = np.concatenate(times)
+    return log_of_store(layout, time, store, date_of(float(time[0])))
+
+
+def _counted(
+    pieces: Iterator[Array], path: Path, size: int, progress: Progress, place: Callable[[], int]
+) -> Iterator[Array]:
+    count = 0
+    for piece in pieces:
+        count += len(piece)
+        if count > LARGEST_STORED_ROWS:
+            raise InputError(
+                f"{path}: more than {LARGEST_STORED_ROWS:,} rows, expected at most that",
+                "cut it into several",
+            )
+        share = min(place() / size, 1.0)
+        progress(Step(f"reading {path.name}: {count:,} rows, {share:.0%}", share))
+        yield piece
+
+
+def log_of_store(layout: Layout, time: Array, store: RowStore, date: str) -> AnyLog:
+    """The log whose positions, velocities and efforts are in a store; in memory where the store is."""
+    log = StoredLog(
+        name=layout.name,
+        joint_names=layout.joint_names,
+        time=time,
+        store=store,
+        has_velocity=layout.velocities is not None,
+        quantity=layout.quantity,
+        stored=len(layout.joint_names),
+        places=tuple(range(len(layout.joint_names))),
+        notes=layout.notes,
+        sliding=layout.sliding,
+        date=date,
+    )
+    return log if store.on_disk else log.held()
+
+
+def read_columns(path: Path) -> dict[str, Array]:
+    """Return named columns of equal length of a table.
+
+    InputError if the file is missing, unreadable, too large, damaged, or holds anything but numbers.
+    """
+    kind = table_of(path)
+    with opened(path) as file:
+        names, pieces = kind.pieces(file, str(path))
+        if not names:
+            raise InputError(f"{path}: holds no columns", "record or export it again")
+        size, count, rows = path.stat().st_size, 0, []
+        for piece in pieces:
+            count += len(piece)
+            require_size(count, len(names), size, str(path))
+            rows.append(piece)
+    if not rows:
+        raise _no_rows(path)
+    values = np.concatenate(rows) if len(rows) > 1 else rows[0]
+    return {column: values[:, k] for k, column in enumerate(names)}
+
+
+def _no_rows(path: Path) -> InputError:
+    return InputError(f"{path}: no rows under its header", "record or export it again")
+
+
+def column_names(path: Path) -> tuple[str, ...]:
+    """Return the names of a table's columns, without reading it all."""
+    kind = table_of(path)
+    with opened(path) as file:
+        return tuple(kind.pieces(file, str(path))[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +234,7 @@ def log_from_columns(name: str, columns: Mapping[str, Array]) -> Log:
         quantity=found.quantity,
         notes=found.notes,
         sliding=found.sliding,
+        date=date_of(float(columns["time_s"][0]) if len(columns["time_s"]) else 0.0),
     )
 
 
@@ -221,5 +325,13 @@ def columns_of(log: Log) -> dict[str, Array]:
 
 
 def write_log(log: Log, path: str | Path) -> None:
-    """Write .csv, .parquet or .npz, atomically."""
+    """Write a log as .csv, .parquet or .npz; a reader never sees a part of the file."""
     write_columns(columns_of(log), Path(path))
+
+
+def write_columns(columns: Mapping[str, Array], path: Path) -> None:
+    """Write named columns of equal length as a table; a reader never sees a part of the file."""
+    kind = table_of(path)
+    make_folder(path.parent)
+    with whole_file(path) as own:
+        kind.write(columns, own)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
+from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.clearance import Clearance, FloorPoints
-from psdmc.calibration.motions.torque_limits import TorqueLimits
+from psdmc.calibration.motions.criterion import SPEED_STEP
 from psdmc.calibration.motions.trajectory import Trajectory, limit_faults
-from psdmc.robot.mechanism import Mechanism
+from psdmc.errors import InputError
+from psdmc.robot.limits import shown
+from psdmc.robot.mechanism import Joint, Limits, Mechanism
 
 LOOKED_AT = 0.01
 """s between the rows whose torque is computed: a hundred per second, ten per period of the fastest sine."""
@@ -42,3 +47,169 @@ class Allowed:
             touch = self.clearance.first_touch(motion.q)
             found = [] if touch is None else [touch]
         return found
+
+
+LARGEST_LIMIT = 1e6
+"""rad/s^2, m/s^2, rad/s, N m: above any joint's."""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenLimits:
+    """By joint name, SI. A range may only be narrower than the file's; a speed, too.
+
+    ranges         lowest and highest position, rad (m)
+    speeds         rad/s (m/s)
+    accelerations  rad/s^2 (m/s^2)
+    acceleration   of the joints that have none otherwise; None: refuse them
+    efforts        N m (N)
+    """
+
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    speeds: Mapping[str, float] = field(default_factory=dict)
+    accelerations: Mapping[str, float] = field(default_factory=dict)
+    acceleration: float | None = None
+    efforts: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        sizes = {
+            "acceleration": [self.acceleration] if self.acceleration is not None else [],
+            "speed": self.speeds.values(),
+            "accelerations": self.accelerations.values(),
+            "effort": self.efforts.values(),
+        }
+        for what, values in sizes.items():
+            _require_sizes(what, values)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        named = (self.ranges, self.speeds, self.accelerations, self.efforts)
+        return tuple(dict.fromkeys(name for given in named for name in given))
+
+
+def _require_sizes(what: str, values: Iterable[float]) -> None:
+    for value in values:
+        if not 0 < value <= LARGEST_LIMIT:
+            raise InputError(
+                f"{what} is {value:g}, expected more than 0, at most {LARGEST_LIMIT:g}",
+                "in rad/s^2, rad/s or N m; m/s^2, m/s or N where a joint slides",
+            )
+
+
+def bounded(chain: Mechanism, given: GivenLimits) -> Mechanism:
+    """The chain with the given limits, and half a turn either way for joints that turn freely.
+
+    InputError where a limit is still missing, a range is none or beyond the file's, or a joint does not exist.
+    """
+    unknown = [shown(name) for name in given.names if name not in chain.joint_names]
+    if unknown:
+        known = ", ".join(map(shown, chain.joint_names))
+        raise InputError(
+            f"limits for joint(s) {', '.join(unknown)}, which the model does not have", f"it has {known}"
+        )
+    joints = tuple(replace(joint, limits=_limits(joint, given)) for joint in chain.joints)
+    require_limits(joints)
+    return replace(chain, joints=joints)
+
+
+def _limits(joint: Joint, given: GivenLimits) -> Limits:
+    limits, name = joint.limits, joint.name
+    if name in given.ranges:
+        limits = _ranged(joint, *given.ranges[name])
+    elif joint.type.comes_round and not np.isfinite([limits.lower, limits.upper]).any():
+        limits = replace(limits, lower=-joint.type.free_range, upper=joint.type.free_range)
+    if name in given.speeds:
+        if given.speeds[name] > limits.speed:
+            raise InputError(
+                f"joint {shown(name)}: speed {given.speeds[name]:g}, the file's limit is {limits.speed:g}",
+                "give a smaller --speed",
+            )
+        limits = replace(limits, speed=given.speeds[name])
+    if name in given.accelerations:
+        limits = replace(limits, acceleration=given.accelerations[name])
+    elif not np.isfinite(limits.acceleration) and given.acceleration is not None:
+        limits = replace(limits, acceleration=given.acceleration)
+    return replace(limits, effort=given.efforts.get(name, limits.effort))
+
+
+def _ranged(joint: Joint, low: float, high: float) -> Limits:
+    limits = joint.limits
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise InputError(
+            f"joint {shown(joint.name)}: range {low:g} to {high:g} is none",
+            "give --range JOINT=LOW:HIGH, rad (m)",
+        )
+    if low < limits.lower or high > limits.upper:
+        raise InputError(
+            f"joint {shown(joint.name)}: range {low:g} to {high:g} exceeds the file's, {limits.lower:.4g} to"
+            f" {limits.upper:.4g}",
+            "ranges are in rad (m), and within the file's",
+        )
+    return replace(limits, lower=low, upper=high)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TorqueLimits:
+    """Largest torques and how a motion's are computed.
+
+    largest   (n,) N m (N), infinite where a joint has no limit
+    theta_b   (l,)
+    friction  (..., n) speeds to (..., n) torques; None: not known
+    """
+
+    chain: Mechanism
+    model: Regressor
+    largest: Array
+    theta_b: Array
+    friction: Callable[[Array], Array] | None = None
+
+    def torque(self, q: Array, qd: Array, qdd: Array, load: Load | None = None) -> Array:
+        """(N, n) N m (N). A load counts by its weight alone: it is carried in slow sweeps."""
+        tau = self.of(self.model.regressor(q, qd, qdd), qd)
+        return tau if load is None else tau + payload_torque(self.chain, q, load.mass, load.com)
+
+    def of(self, regressor: Array, qd: Array) -> Array:
+        """(..., n) from the regressor (..., n, l) and the speeds."""
+        tau = np.asarray(regressor @ self.theta_b)
+        return tau if self.friction is None else tau + self.friction(qd)
+
+    def excess(self, regressor: Array, qd: Array, share: float) -> tuple[float, Array, Array]:
+        """What torques take beyond `share` of their limits: the mean over samples of its squares, in shares of the limit,
+        and its derivatives by the regressor (N, n, l) and, through friction, by the speeds (N, n)."""
+        tau = self.of(regressor, qd)
+        usable = share * self.largest
+        beyond = np.maximum(np.abs(tau) / usable - 1.0, 0.0)
+        by_torque = 2.0 * beyond * np.sign(tau) / usable / len(tau)
+        by_speed = np.zeros_like(qd)
+        if self.friction is not None:
+            rate = (self.friction(qd + SPEED_STEP) - self.friction(qd - SPEED_STEP)) / (2 * SPEED_STEP)
+            by_speed = by_torque * rate
+        return float(np.sum(beyond**2)) / len(tau), by_torque[..., None] * self.theta_b, by_speed
+
+    def faults(self, tau: Array, share: float) -> list[str]:
+        """One sentence for each joint whose torque (N, n) goes beyond `share` of its limit."""
+        reach = np.abs(tau).max(axis=0)
+        return [
+            f"{joint.name}: torque {value:.4g} beyond {share:.0%} of {limit:g}"
+            for joint, value, limit in zip(self.chain.joints, reach, self.largest, strict=True)
+            if value > share * limit
+        ]
+
+
+def require_limits(joints: Sequence[Joint]) -> None:
+    """InputError names the joints that have no limits to move within, and which."""
+    lacking = []
+    for joint in joints:
+        limits = joint.limits
+        named = {
+            "position": limits.upper - limits.lower,
+            "speed": limits.speed,
+            "acceleration": limits.acceleration,
+        }
+        missing = [what for what, value in named.items() if not np.isfinite(value)]
+        if missing:
+            lacking.append(f"{joint.name} ({', '.join(missing)})")
+    if lacking:
+        raise InputError(
+            f"joint(s) without limits to move within: {', '.join(lacking)}",
+            "add them to the robot file; an acceleration for all such joints can be given with --acceleration",
+        )

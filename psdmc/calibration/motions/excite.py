@@ -5,22 +5,23 @@ from __future__ import annotations
 
 import bisect
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.predictor import Regressor, payload_torque
+from psdmc.calibration.identify.steps import Load
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.motions.allowed import Allowed
-from psdmc.calibration.motions.criterion import Scaled, scaled
-from psdmc.calibration.motions.excite_options import ExciteOptions as ExciteOptions
-from psdmc.calibration.motions.fit_columns import FitColumns
+from psdmc.calibration.motions.allowed import Allowed, require_limits
+from psdmc.calibration.motions.criterion import FitColumns, Scaled, scaled
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.limited_sines import LimitedSines
+from psdmc.calibration.motions.limited_sines import SineSum as SineSum
 from psdmc.calibration.motions.search import Criterion, SearchProgress, cpu_seconds, search
-from psdmc.calibration.motions.sine_sum import SineSum as SineSum
+from psdmc.calibration.motions.sweeps import swept_range
 from psdmc.errors import InputError
-from psdmc.robot.mechanism import Joint, Mechanism
+from psdmc.robot.mechanism import Mechanism
 
 SHRINKS = tuple(0.97**k for k in range(60))
 """Amplitudes that are tried, as shares of the first, until a motion keeps what its joints' limits do not imply."""
@@ -128,26 +129,6 @@ def excite(
     )
 
 
-def require_limits(joints: Sequence[Joint]) -> None:
-    """InputError names the joints that have no limits to move within, and which."""
-    lacking = []
-    for joint in joints:
-        limits = joint.limits
-        named = {
-            "position": limits.upper - limits.lower,
-            "speed": limits.speed,
-            "acceleration": limits.acceleration,
-        }
-        missing = [what for what, value in named.items() if not np.isfinite(value)]
-        if missing:
-            lacking.append(f"{joint.name} ({', '.join(missing)})")
-    if lacking:
-        raise InputError(
-            f"joint(s) without limits to move within: {', '.join(lacking)}",
-            "add them to the robot file; an acceleration for all such joints can be given with --acceleration",
-        )
-
-
 def _all_of(model: Regressor, n: int) -> FitColumns:
     still = np.zeros((1, n))
     return FitColumns(model, np.eye(model.regressor(still, still, still).shape[-1]))
@@ -242,3 +223,31 @@ def _why_not(space: LimitedSines, point: Array, allowed: Allowed) -> str:
         "; ".join(_faults(space.motion(point).shrunk(SHRINKS[-1]), space, allowed))
         or "each one hits something"
     )
+
+
+SWEEP_POINTS = 15
+UNFELT = 1e-6
+"""Share of the load's weight times 1 m (of its weight, where a joint slides) that counts as nothing."""
+
+
+def motor_poses(
+    chain: Mechanism, load: Load, *, tries: int = 400, range_share: float = 0.9, seed: int = 0
+) -> tuple[Array, Array]:
+    """Random poses (tries, n), and the root mean square (tries, n), N m (N), of the torque by which the load acts on each
+    joint over that joint's sweep."""
+    rng = np.random.default_rng(seed)
+    low, high = np.array([swept_range(joint, range_share) for joint in chain.joints]).T
+    poses = rng.uniform(low, high, (tries, len(chain)))
+    effect = np.empty((tries, len(chain)))
+    for k in range(len(chain)):
+        q = np.repeat(poses[:, None], SWEEP_POINTS, axis=1)
+        q[:, :, k] = np.linspace(low[k], high[k], SWEEP_POINTS)
+        torque = payload_torque(chain, q.reshape(-1, len(chain)), load.mass, load.com)[:, k]
+        effect[:, k] = np.sqrt(np.mean(torque.reshape(tries, SWEEP_POINTS) ** 2, axis=1))
+    return poses, effect
+
+
+def unfelt(chain: Mechanism, load: Load, effect: Array) -> tuple[int, ...]:
+    """Joints that the load does not act on in any pose: their axes are along gravity, or it lies on them."""
+    weight = load.mass * float(np.linalg.norm(chain.gravity))
+    return tuple(int(k) for k in np.flatnonzero(effect.max(axis=0) <= UNFELT * weight))

@@ -7,13 +7,15 @@ same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite_options import ExciteOptions
-from psdmc.calibration.motions.sine_sum import SineSum, sine_basis
+from psdmc.calibration.motions.trajectory import Trajectory
+from psdmc.errors import InputError
 from psdmc.robot.mechanism import Mechanism
 
 NORM = 40
@@ -125,3 +127,103 @@ def _norm(shares: Array, axes: tuple[int, ...]) -> Array:
 def _norm_slope(shares: Array, norm: Array) -> Array:
     """Derivatives of the norm by the entries."""
     return np.asarray(np.sign(shares) * (np.abs(shares) / norm[:, None]) ** (NORM - 1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SineSum:
+    """q_i(t) = centre_i + sum over k of a_ik sin(w_k t) + b_ik cos(w_k t), w_k = 2 pi harmonic_k / duration.
+
+    centre (n,), sine (n, h), cosine (n, h): rad (m). As amplitude and phase: A sin(w t + phi), A = hypot(a, b).
+    """
+
+    duration: float
+    harmonics: tuple[int, ...]
+    centre: Array
+    sine: Array
+    cosine: Array
+
+    @property
+    def amplitude(self) -> Array:
+        return np.hypot(self.sine, self.cosine)
+
+    @property
+    def phase(self) -> Array:
+        return np.arctan2(self.cosine, self.sine)
+
+    def at(self, time: Array) -> tuple[Array, Array, Array]:
+        """(N, n) each: position, speed and acceleration at any times (N,)."""
+        basis = sine_basis(self.harmonics, self.duration, time)
+        q, qd, qdd = (self.sine @ s + self.cosine @ c for s, c in basis)
+        return q.T + self.centre, qd.T, qdd.T
+
+    def sampled(self, joint_names: tuple[str, ...], period: float, repeats: int = 1) -> Trajectory:
+        """The motion on an even grid, `repeats` periods of it."""
+        count = round(repeats * self.duration / period) + 1
+        time: Array = np.arange(count, dtype=np.float64) * period
+        return Trajectory(joint_names, time, *self.at(time))
+
+    def shrunk(self, share: float) -> SineSum:
+        """The motion with all amplitudes times `share`, about the same centre."""
+        return replace(self, sine=share * self.sine, cosine=share * self.cosine)
+
+
+def sine_basis(harmonics: tuple[int, ...], duration: float, time: Array) -> list[tuple[Array, Array]]:
+    """(sine, cosine) rows (h, N) of position, speed and acceleration."""
+    w = 2.0 * np.pi * np.array(harmonics)[:, None] / duration
+    s, c = np.sin(w * time), np.cos(w * time)
+    return [(s, c), (w * c, -w * s), (-(w**2) * s, -(w**2) * c)]
+
+
+RAMPS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, *(12.0 * 2.0**k for k in range(7)))
+"""s, tried in this order until the limits are kept: up to 13 minutes, for a motion that leaves 1 % of an acceleration
+that is a hundredth of its speed."""
+
+Faults = Callable[[Trajectory], list[str]]
+"""What a motion may not do and does, a sentence each."""
+
+
+def from_rest_to_rest(
+    motion: SineSum, chain: Mechanism, period: float, repeats: int, faults: Faults
+) -> Trajectory:
+    """`repeats` periods of the motion with a ramp before and after them, rows `period` apart.
+
+    InputError where no ramp keeps the limits.
+    """
+    found: list[str] = []
+    for ramp in RAMPS:
+        whole = ramped(motion, chain.joint_names, period, repeats, ramp)
+        found = faults(whole)
+        if not found:
+            return whole
+    raise InputError(
+        f"the exciting motion cannot begin at rest within the limits: {'; '.join(found)}",
+        "leave more of the limits: a smaller --margin or --torque-margin",
+    )
+
+
+def ramped(
+    motion: SineSum, joint_names: tuple[str, ...], period: float, repeats: int, ramp: float
+) -> Trajectory:
+    """The motion with ramps of that many seconds, rounded to rows."""
+    rows = max(round(ramp / period), 1)
+    middle: Array = np.arange(round(repeats * motion.duration / period) + 1, dtype=np.float64) * period
+    length = rows * period
+    x: Array = np.arange(rows, dtype=np.float64) / rows
+    gone, rate, bend = _smooth_step(x)
+    way = gone * length - 0.5 * length
+    end = middle[-1]
+    path = np.concatenate([way, middle, end - way[::-1]])
+    pace = np.concatenate([rate, np.ones(len(middle)), rate[::-1]])[:, None]
+    change = np.concatenate([bend, np.zeros(len(middle)), -bend[::-1]])[:, None] / length
+    q, qd, qdd = motion.at(path)
+    time: Array = np.arange(len(path), dtype=np.float64) * period
+    return Trajectory(joint_names, time, q, qd * pace, qdd * pace**2 + qd * change)
+
+
+def _smooth_step(x: Array) -> tuple[Array, Array, Array]:
+    """Integral, value and slope of 6 x^5 - 15 x^4 + 10 x^3."""
+    return (
+        x**4 * (2.5 + x * (x - 3.0)),
+        x**3 * (10.0 + x * (6.0 * x - 15.0)),
+        30.0 * x**2 * (1.0 - x) ** 2,
+    )

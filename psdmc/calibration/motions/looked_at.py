@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.motions.allowed import Allowed
+from psdmc.calibration.motions.allowed import Allowed, TorqueLimits
 from psdmc.calibration.motions.clearance import APART, Clearance, FloorPoints, clearance_of, floor_points
-from psdmc.calibration.motions.torque_limits import TorqueLimits
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.linear_friction import linear_friction

@@ -8,19 +8,17 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
 
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.motions.criterion import scaled, smooth_score
+from psdmc.calibration.motions.allowed import TorqueLimits
+from psdmc.calibration.motions.criterion import FitColumns, scaled, smooth_score
 from psdmc.calibration.motions.excite_options import ExciteOptions
-from psdmc.calibration.motions.fit_columns import FitColumns
 from psdmc.calibration.motions.limited_sines import LimitedSines
-from psdmc.calibration.motions.torque_limits import TorqueLimits
-from psdmc.calibration.motions.walk import walked
 
 POWERS = (1.0, 3.0, 10.0, 30.0)
 """Of the means of eigenvalues that stand for the extreme ones, descent after descent."""
@@ -206,3 +204,32 @@ class _Counted:
     def _tell(self, evaluations: float) -> None:
         if self.progress is not None:
             self.progress(evaluations / self.budget, cpu_seconds() - self.started, self.best_score)
+
+
+FIRST_STEP = 0.1
+"""Of each coordinate of the space, whose random motions have standard deviations of one."""
+SMALLEST_STEP = 1e-4
+"""Below it a walk gains nothing that counts; it then begins again with the first."""
+GROWTH = 1.25
+"""Of the step after a success; after a failure its fourth root's inverse, so that a fifth of the steps succeed (Rechenberg
+1973)."""
+
+
+def walked(
+    cost: Callable[[Array], float],
+    point: Array,
+    is_free: Callable[[Array], bool],
+    steps: Iterable[object],
+    rng: np.random.Generator,
+) -> Array:
+    """The cheapest point found in as many steps, one of those that are free; `point` is."""
+    lowest, step = cost(point), FIRST_STEP
+    for _ in steps:
+        tried = point + step * rng.standard_normal(len(point))
+        value = cost(tried)
+        # whether it is free takes longer to find out, and is asked of what is better alone
+        if value < lowest and is_free(tried):
+            point, lowest, step = tried, value, step * GROWTH
+        else:
+            step = step * GROWTH**-0.25 if step > SMALLEST_STEP else FIRST_STEP
+    return point

@@ -30,10 +30,9 @@ from psdmc.calibration.identify.motor import judge_motors
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import StepOptions, judged, step_of
-from psdmc.calibration.logs.check_options import CheckOptions
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.log_checks import checked
+from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError

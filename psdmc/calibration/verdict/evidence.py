@@ -13,13 +13,11 @@ from psdmc.calibration.identify.coupling import Coupling
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.logs.check_options import CheckOptions
 from psdmc.calibration.logs.filter import States, stretches
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.log_checks import checked
-from psdmc.calibration.logs.log_survey import surveyed
+from psdmc.calibration.logs.log_checks import CheckOptions, checked
+from psdmc.calibration.logs.log_survey import Saturated, surveyed
 from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.logs.saturation import Saturated
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.model.dynamics_model import DynamicsModel
 

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 from bundled import bundled_model, bundled_robot, robot_path
 
-from psdmc.calibration.logs.table_files import write_columns
+from psdmc.calibration.logs.log_files import write_columns
 from psdmc.cli.boundary import run
 from psdmc.model.load import load
 from psdmc.robot.reference import reference

@@ -12,8 +12,7 @@ from test_ur10 import model  # noqa: F401  a fixture
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.logs.log_files import read_log
-from psdmc.calibration.logs.table_files import write_columns
+from psdmc.calibration.logs.log_files import read_log, write_columns
 from psdmc.model.dynamics_model import DynamicsModel
 
 pytestmark = pytest.mark.skipif(not UR10_LOG.exists(), reason="the UR10 log is not part of the project")

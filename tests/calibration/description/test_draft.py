@@ -13,7 +13,7 @@ from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.draft import drafted
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.table_files import write_columns
+from psdmc.calibration.logs.log_files import write_columns
 from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 

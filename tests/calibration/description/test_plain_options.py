@@ -14,8 +14,7 @@ from test_payload_identification import Run, record
 from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_files import read_log
-from psdmc.calibration.logs.table_files import write_columns
+from psdmc.calibration.logs.log_files import read_log, write_columns
 from psdmc.cli.boundary import run
 
 

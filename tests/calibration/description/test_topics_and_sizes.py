@@ -13,11 +13,10 @@ import psdmc
 from psdmc.calibration.calibrate import calibrate
 from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
+from psdmc.calibration.logs.formats.ros2_bag import FORMAT as ROS2_BAG
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_bag import read_bag
-from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.logs.log_files import read_log, write_columns
 from psdmc.calibration.logs.stored_log import StoredLog
-from psdmc.calibration.logs.table_files import write_columns
 from psdmc.calibration.sources import LogNaming
 from psdmc.errors import InputError
 
@@ -57,14 +56,14 @@ def test_a_topic_is_named_or_the_only_one(tmp_path: Path, mcap: bool, alone: boo
         return bare(folder) if alone else folder
 
     both = opened("both", "/left", "/right")
-    assert np.all(read_bag(opened("one", "/arm/joint_states")).rows(0, 3).position == 0.0)
-    assert np.all(read_bag(opened("usual", "/other", "/joint_states")).rows(0, 3).position == 1.0)
-    assert np.all(read_bag(both, "/right").rows(0, 3).position == 1.0)
+    assert np.all(ROS2_BAG.read(opened("one", "/arm/joint_states")).rows(0, 3).position == 0.0)
+    assert np.all(ROS2_BAG.read(opened("usual", "/other", "/joint_states")).rows(0, 3).position == 1.0)
+    assert np.all(ROS2_BAG.read(both, "/right").rows(0, 3).position == 1.0)
     with pytest.raises(InputError, match="it has them on '/left', '/right'") as raised:
-        read_bag(both)
+        ROS2_BAG.read(both)
     assert "--topic" in (raised.value.hint or "")
     with pytest.raises(InputError, match="on topic '/none': it has them on '/left'"):
-        read_bag(both, "/none")
+        ROS2_BAG.read(both, "/none")
 
 
 def test_a_topic_of_plain_logs_that_are_no_bags_is_refused(tmp_path: Path):
@@ -94,9 +93,9 @@ matrix = [[0.5, 0.5], [0.5, -0.5]]
 def test_what_does_not_fit_into_memory_is_the_same(
     tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("psdmc.calibration.logs.table_text.PIECE_BYTES", 50_000)
-    monkeypatch.setattr("psdmc.calibration.description.in_si.BLOCK_ROWS", 301)
-    monkeypatch.setattr("psdmc.calibration.description.delays.BLOCK_ROWS", 257)
+    monkeypatch.setattr("psdmc.calibration.logs.formats.text.PIECE_BYTES", 50_000)
+    monkeypatch.setattr("psdmc.calibration.description.read_described.BLOCK_ROWS", 301)
+    monkeypatch.setattr("psdmc.calibration.description.read_described.BLOCK_ROWS", 257)
     plain = read_log(record(tmp_path / "plain.csv", Run(seed=1, loaded=False, seconds=10.0)))
     write_columns(
         {"time_s": plain.time}

@@ -14,9 +14,8 @@ from psdmc.calibration.calibrate import CalibrateOptions
 from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_files import read_log
+from psdmc.calibration.logs.log_files import read_log, write_columns
 from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.logs.table_files import write_columns
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
 

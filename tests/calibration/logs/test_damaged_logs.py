@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from psdmc.calibration.logs.bag_sizes import MAGIC
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import log_from_columns, read_log, write_log
-from psdmc.calibration.logs.mcap_size import MAGIC
 from psdmc.errors import InputError
 
-SUFFIXES = (".csv", ".npz", ".parquet", ".db3", ".mcap")
+SUFFIXES = (".csv", ".npz", ".parquet", ".db3", ".mcap", ".bag")
 COLUMNS = {
     "time_s": np.arange(4.0),
     "position_rad.a": np.arange(4.0),
@@ -105,7 +105,7 @@ def test_truncated_and_flipped_files_are_refused_or_read(tmp_path: Path, log: Lo
         ({"time_s": np.zeros(2, dtype=complex)}, "holds complex128, expected numbers"),
         ({"time_s": np.array(["0", "1"])}, "expected numbers"),
         ({"time_s": np.array([True, False])}, "holds bool"),
-        ({"time_s": np.array([{}], dtype=object)}, "not an npz file, or damaged: Object arrays"),
+        ({"time_s": np.array([{}], dtype=object)}, "column 'time_s' holds object, expected numbers"),
         ({"time_s": np.zeros(3), "position_rad.a": np.zeros(2)}, "column 'time_s' has 3 rows, but 'position_rad.a' has 2"),
         ({}, "holds no columns"),
     ],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from psdmc.calibration.logs.log_date import date_of
+from psdmc.calibration.logs.log import date_of
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from psdmc.calibration.logs import unpacked
+from psdmc.calibration.logs import bag_sizes
+from psdmc.calibration.logs.bag_sizes import CHUNK_INDEX, HEAD, MAGIC, _records, unpacked_size
 from psdmc.calibration.logs.log_files import read_log
-from psdmc.calibration.logs.mcap_size import CHUNK_INDEX, HEAD, MAGIC, _records
-from psdmc.calibration.logs.unpacked import unpacked_size
 from psdmc.errors import InputError
 
 bags = pytest.importorskip("rosbags.rosbag2")
@@ -112,7 +111,7 @@ def test_an_index_that_leads_to_no_chunk_is_refused(tmp_path: Path):
 @pytest.mark.parametrize("packing", ["zstd", "lz4"])
 @pytest.mark.parametrize("piece", [7, 1000, 2**20])
 def test_sizes_are_those_of_what_comes_out(packing: str, piece: int, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(unpacked, "PIECE", piece)
+    monkeypatch.setattr(bag_sizes, "PIECE", piece)
     plain = np.random.default_rng(0).bytes(5000) + bytes(20_000)
     packed = {"zstd": zstd, "lz4": lz4}[packing].compress(plain)
     kept = io.BytesIO()

@@ -11,16 +11,14 @@ from calibration.conftest import smooth_log
 
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate, calibrate_logs
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.logs import table_pieces
 from psdmc.calibration.logs.even_grid import even_grid
 from psdmc.calibration.logs.filter import filtered, independent_rows, stretches
+from psdmc.calibration.logs.formats import npz, parquet, text
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_checks import checked
-from psdmc.calibration.logs.log_files import read_log, write_log
+from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.logs.open_log import open_log
-from psdmc.calibration.logs.row_store import RowStore
-from psdmc.calibration.logs.stored_log import StoredLog
+from psdmc.calibration.logs.stored_log import RowStore, StoredLog
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
 
@@ -35,8 +33,9 @@ def long_log(arm) -> Log:
 
 
 def in_pieces(log: Log, folder: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> StoredLog:
-    monkeypatch.setattr(table_pieces, "PIECE_BYTES", 5000)
-    monkeypatch.setattr(table_pieces, "PIECE_ROWS", 700)
+    monkeypatch.setattr(text, "PIECE_BYTES", 5000)
+    monkeypatch.setattr(npz, "PIECE_ROWS", 700)
+    monkeypatch.setattr(parquet, "PIECE_ROWS", 700)
     path = folder / f"long{suffix}"
     write_log(log, path)
     found = open_log(path, held=HELD)
@@ -140,7 +139,7 @@ def test_a_value_that_is_no_number_is_found_in_any_stretch(arm, long_log: Log, t
 
 def test_progress_is_said(arm, long_log: Log, tmp_path: Path, monkeypatch):
     said: list[str] = []
-    monkeypatch.setattr("psdmc.calibration.logs.open_log.SMALL_FILE", 1000)
+    monkeypatch.setattr("psdmc.calibration.logs.log_files.SMALL_FILE", 1000)
     write_log(long_log, tmp_path / "long.csv")
 
     calibrate(arm.model, tmp_path / "long.csv", CalibrateOptions(physical=False), progress=said.append)

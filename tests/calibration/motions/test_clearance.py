@@ -13,12 +13,11 @@ from arms import LENGTH, pinocchio_of, urdf
 from psdmc.calibration.campaign_plan import CampaignOptions, plan_campaign
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.motions.clearance import APART, clearance_of, floor_points, spread
-from psdmc.calibration.motions.collision_shapes import mesh_file
-from psdmc.calibration.motions.criterion import scaled
-from psdmc.calibration.motions.excite import ExciteOptions, excite
-from psdmc.calibration.motions.fit_columns import all_columns
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.allowed import GivenLimits, bounded
+from psdmc.calibration.motions.clearance import APART, clearance_of, floor_points, mesh_file, spread
+from psdmc.calibration.motions.criterion import all_columns, scaled
+from psdmc.calibration.motions.excite import excite
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.limited_sines import LimitedSines
 from psdmc.calibration.motions.looked_at import allowed_of
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions

@@ -7,10 +7,10 @@ import pytest
 from scipy import integrate, optimize
 
 from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.motions.allowed import GivenLimits, bounded
 from psdmc.calibration.motions.criterion import scaled, smooth_score
-from psdmc.calibration.motions.excite import ExciteOptions, excite
-from psdmc.calibration.motions.excite_options import chosen_objective
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.excite import excite
+from psdmc.calibration.motions.excite_options import ExciteOptions, chosen_objective
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.robot.load import load_robot_text

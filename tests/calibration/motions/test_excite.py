@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psdmc.calibration.motions.excite import ExciteOptions, excite
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.allowed import GivenLimits, bounded
+from psdmc.calibration.motions.excite import excite
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.trajectory import limit_faults
 from psdmc.errors import InputError
 from psdmc.robot.mechanism import Limits

@@ -9,12 +9,11 @@ import pytest
 from slow_cases import slow_but_for
 
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.motions.allowed import Allowed
-from psdmc.calibration.motions.excite import ExciteOptions, excite
-from psdmc.calibration.motions.fit_columns import inertial_columns
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
-from psdmc.calibration.motions.lead_in import from_rest_to_rest
-from psdmc.calibration.motions.sine_sum import SineSum
+from psdmc.calibration.motions.allowed import Allowed, GivenLimits, bounded
+from psdmc.calibration.motions.criterion import inertial_columns
+from psdmc.calibration.motions.excite import excite
+from psdmc.calibration.motions.excite_options import ExciteOptions
+from psdmc.calibration.motions.limited_sines import SineSum, from_rest_to_rest
 from psdmc.calibration.motions.trajectory import Trajectory, limit_faults
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError

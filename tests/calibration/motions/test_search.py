@@ -12,12 +12,12 @@ from arms import urdf
 
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
-from psdmc.calibration.motions.excite import Excitation, ExciteOptions, excite
-from psdmc.calibration.motions.fit_columns import FitColumns, all_columns, inertial_columns
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.allowed import GivenLimits, TorqueLimits, bounded
+from psdmc.calibration.motions.criterion import FitColumns, all_columns, inertial_columns
+from psdmc.calibration.motions.excite import Excitation, excite
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.limited_sines import LimitedSines
 from psdmc.calibration.motions.search import Criterion
-from psdmc.calibration.motions.torque_limits import TorqueLimits
 from psdmc.calibration.motions.trajectory import limit_faults
 from psdmc.compiler import compile as compile_model
 from psdmc.compiler import derive

@@ -12,8 +12,8 @@ from arms import pinocchio_of, torques, urdf
 from psdmc.calibration.campaign_plan import CampaignOptions, plan_campaign
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import Load
-from psdmc.calibration.motions.excite import ExciteOptions
-from psdmc.calibration.motions.given_limits import GivenLimits
+from psdmc.calibration.motions.allowed import GivenLimits
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.sweeps import SineOptions, SweepOptions
 from psdmc.compiler import derive
 from psdmc.errors import InputError

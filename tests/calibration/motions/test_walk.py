@@ -12,11 +12,12 @@ from arms import urdf
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.motions import search
-from psdmc.calibration.motions.excite import ExciteOptions, excite
-from psdmc.calibration.motions.fit_columns import all_columns
-from psdmc.calibration.motions.given_limits import GivenLimits, bounded
+from psdmc.calibration.motions.allowed import GivenLimits, bounded
+from psdmc.calibration.motions.criterion import all_columns
+from psdmc.calibration.motions.excite import excite
+from psdmc.calibration.motions.excite_options import ExciteOptions
 from psdmc.calibration.motions.looked_at import allowed_of
-from psdmc.calibration.motions.walk import walked
+from psdmc.calibration.motions.search import walked
 from psdmc.compiler import derive
 
 

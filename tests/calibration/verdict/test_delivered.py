@@ -23,8 +23,7 @@ from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.steps import InertialRun
 from psdmc.calibration.logs.filter import filtered, smoothed_rows, thinned
 from psdmc.calibration.logs.log import Log
-from psdmc.calibration.logs.log_files import read_log, write_log
-from psdmc.calibration.logs.open_log import open_log
+from psdmc.calibration.logs.log_files import open_log, read_log, write_log
 from psdmc.calibration.logs.stored_log import StoredLog
 from psdmc.calibration.verdict.delivered import delivered_quality
 from psdmc.calibration.verdict.record import Calibration

@@ -15,11 +15,10 @@ from scipy.interpolate import CubicSpline
 from test_verdict import verdict_on
 
 import psdmc
-from psdmc.calibration.logs.check_options import CheckOptions
 from psdmc.calibration.logs.log import Log
+from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.log_files import write_log
-from psdmc.calibration.logs.log_survey import surveyed
-from psdmc.calibration.logs.saturation import Saturated
+from psdmc.calibration.logs.log_survey import Saturated, surveyed
 from psdmc.calibration.plant.spoiled import clipped, late
 from psdmc.calibration.verdict.findings import Findings
 from psdmc.calibration.verdict.judge import doubts

@@ -1,16 +1,29 @@
-"""Sizes in an MCAP file's record heads, checked before its reader allocates memory for them."""
+"""Sizes of packed bags, bounded before a reader allocates memory for what they unpack to.
+
+rosbag2 packs files as a whole, messages one by one, or chunks of an MCAP file. The unpacked size that a packed file
+states is a claim, and readers that allocate memory for whatever comes out would trust it.
+"""
 
 from __future__ import annotations
 
+import io
+import sqlite3
 import struct
+import sys
+import tempfile
+from bz2 import BZ2Decompressor
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-from psdmc.calibration.logs.foreign_bytes import WRITE_AGAIN, decoding, opened
+from psdmc.calibration.logs.foreign_bytes import LARGEST_FILE, WRITE_AGAIN, decoding, opened
 from psdmc.calibration.logs.table_limits import ALWAYS_ALLOWED, LARGEST_EXPANSION
-from psdmc.calibration.logs.unpacked import unpacked_size
 from psdmc.errors import InputError
 
+PACKED = ".zstd"
+"""Ending of a bag's file that is packed as a whole."""
+SMALLER = "record the bag again without compression, or cut it into several"
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, CHUNK, CHUNK_INDEX = 0x02, 0x06, 0x08
 HEAD = struct.Struct("<BQ")
@@ -23,6 +36,56 @@ LONGEST_PACKING = 100
 """Bytes of a compression's name."""
 SIZES = struct.Struct("<QQ")
 """The end of a chunk's index: packed and unpacked size."""
+PIECE = 2**20
+"""Bytes packed or unpacked at once."""
+
+
+def require_packed_file(file: Path) -> None:
+    """InputError where a file that is compressed as a whole unpacks to more than its size makes plausible, or to an
+    MCAP file whose chunks do. It is unpacked into a temporary file to check the latter."""
+    allowed = _allowed(file)
+    with opened(file) as packed, tempfile.TemporaryDirectory() as folder:
+        inside = Path(folder) / "inside"
+        with decoding(str(file), "a packed ROS 2 bag"), inside.open("wb") as keep:
+            size = unpacked_size(packed, file.stat().st_size, "zstd", allowed, keep)
+        _require(size, allowed, file)
+        if file.stem.lower().endswith(".mcap"):
+            try:
+                require_mcap_size(inside)
+            except InputError as error:
+                raise InputError(error.message.replace(str(inside), str(file)), error.hint) from error
+
+
+def require_packed_messages(file: Path) -> None:
+    """InputError where messages that are compressed one by one unpack to more than the file's size makes plausible."""
+    if file.suffix.lower() != ".db3":
+        raise InputError(
+            f"{file}: messages packed one by one in a file that is not SQLite's are not read",
+            "record the bag again by `ros2 bag record --compression-mode file`, or without compression",
+        )
+    left = allowed = _allowed(file)
+    with decoding(str(file), "a packed ROS 2 bag"):
+        for message in _messages(file):
+            left -= unpacked_size(io.BytesIO(message), len(message), "zstd", left)
+            _require(allowed - left, allowed, file)
+
+
+def _messages(file: Path) -> Iterator[bytes]:
+    with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
+        for (message,) in connection.execute("SELECT data FROM messages"):
+            if isinstance(message, bytes):
+                yield message
+
+
+def _allowed(file: Path) -> int:
+    return min(LARGEST_FILE, max(ALWAYS_ALLOWED, LARGEST_EXPANSION * file.stat().st_size))
+
+
+def _require(size: int, allowed: int, file: Path) -> None:
+    if size > allowed:
+        raise InputError(
+            f"{file}: {file.stat().st_size:,} bytes that unpack to more than {allowed:,}", SMALLER
+        )
 
 
 def require_mcap_size(path: Path) -> None:
@@ -139,3 +202,84 @@ def _indexed(file: BinaryIO, place: int, length: int) -> tuple[int, str, int, in
     (name,) = struct.unpack_from("<I", content, start)
     packed, unpacked = SIZES.unpack_from(content, start + 4 + name)
     return where, content[start + 4 : start + 4 + name].decode("ascii", "replace"), packed, unpacked
+
+
+def unpacked_size(file: BinaryIO, packed: int, packing: str, most: int, keep: BinaryIO | None = None) -> int:
+    """Bytes that the next `packed` bytes of a file unpack to; counting stops beyond `most`.
+
+    keep     where they are written, if anywhere
+    packing  'bz2', 'lz4' or 'zstd'; for any other, 0
+    """
+    start = _unpackers().get(packing)
+    if start is None:
+        return 0
+    unpacker, size = start(), 0
+    while packed > 0 and size <= most:
+        piece = file.read(min(PIECE, packed))
+        if not piece:
+            return size
+        packed -= len(piece)
+        while size <= most:
+            if unpacker.eof:
+                piece = unpacker.unused_data or b""
+                if not piece:
+                    break
+                unpacker = start()
+            out = unpacker.decompress(piece, max_length=PIECE)
+            size += len(out)
+            if keep is not None:
+                keep.write(out)
+            piece = b""
+            if not out and not unpacker.eof:
+                break
+    return size
+
+
+def _unpackers() -> dict[str, Callable[[], Any]]:
+    try:
+        from lz4.frame import LZ4FrameDecompressor
+
+        if sys.version_info >= (3, 14):
+            from compression.zstd import ZstdDecompressor
+        else:
+            from backports.zstd import ZstdDecompressor
+    except ImportError as error:
+        raise InputError(
+            "packed ROS bags need lz4 and backports.zstd", "pip install 'psdmc[calibrate]'"
+        ) from error
+    return {"bz2": BZ2Decompressor, "lz4": LZ4FrameDecompressor, "zstd": ZstdDecompressor}
+
+
+ROS1_MAGIC = b"#ROSBAG V2.0\n"
+ROS1_CHUNK = b"op=\x05"
+
+
+def require_ros1_sizes(file: BinaryIO, path: Path) -> None:
+    """InputError if a file is no ROS 1 bag, or its chunks unpack to more than its size makes plausible.
+
+    A bag is a list of records: the length of a header, its fields (each a length and NAME=VALUE), the length of the
+    data, the data (https://wiki.ros.org/Bags/Format/2.0).
+    """
+    allowed, unpacked = _allowed(path), 0
+    if file.read(len(ROS1_MAGIC)) != ROS1_MAGIC:
+        raise InputError(f"{path}: not a ROS 1 bag of format 2.0", WRITE_AGAIN)
+    with decoding(str(path), "a ROS 1 bag"):
+        while head := file.read(4):
+            fields = _ros1_fields(file.read(*struct.unpack("<I", head)))
+            (length,) = struct.unpack("<I", file.read(4))
+            end = file.tell() + length
+            if ROS1_CHUNK in fields:
+                packing = next((x[12:].decode() for x in fields if x.startswith(b"compression=")), "")
+                unpacked += unpacked_size(file, length, packing, allowed - unpacked)
+                _require(unpacked, allowed, path)
+            file.seek(end)
+
+
+def _ros1_fields(header: bytes) -> list[bytes]:
+    """The fields of a record's header."""
+    fields, place = [], 0
+    while place < len(header):
+        (length,) = struct.unpack_from("<I", header, place)
+        fields.append(header[place + 4 : place + 4 + length])
+        place += 4 + length
+    return fields

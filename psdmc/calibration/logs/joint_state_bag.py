@@ -1,0 +1,209 @@
+"""Bags of ROS: logs of sensor_msgs/JointState messages on one topic, whatever holds them."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from psdmc.calibration.logs.foreign_bytes import decoding
+from psdmc.calibration.logs.log import Array, date_of
+from psdmc.calibration.logs.log_format import PIECE_ROWS, Columns, LogFormat, Opening, refuse_dates
+from psdmc.calibration.logs.stored_log import AnyLog, RowStore, StoredLog
+from psdmc.calibration.logs.table_limits import (
+    LARGEST_COLUMNS,
+    LARGEST_ROWS,
+    LARGEST_STORED_ROWS,
+    LARGEST_VALUES,
+)
+from psdmc.calibration.logs.wording import listed, quoted
+from psdmc.errors import InputError
+
+MESSAGE_TYPE = "sensor_msgs/msg/JointState"
+USUAL_TOPIC = "/joint_states"
+LARGEST_MESSAGE = 1024**2
+"""Bytes of one joint state: a thousand joints."""
+PIECE_MESSAGES = 4096
+"""Messages held one by one."""
+
+
+class BagFormat(LogFormat):
+    """A kind of bag: a subclass says which topics hold joint states, and reads their serialised messages."""
+
+    has_topics = True
+    what: str
+    """What a damaged file is not, for messages."""
+
+    @abstractmethod
+    def require_sizes(self, path: Path, held: int | None) -> None:
+        """InputError if a file is missing or too large, or unpacks to more than its size makes plausible.
+
+        held  bytes of rows in memory; None: all
+        """
+
+    @abstractmethod
+    def topics(self, path: Path) -> tuple[str, ...]:
+        """Return the topics of joint states."""
+
+    @abstractmethod
+    def raw_messages(self, path: Path, topic: str) -> Iterator[bytes]:
+        """Yield the serialised joint states of a topic in the order of recording."""
+
+    @abstractmethod
+    def decoded(self, raw: bytes) -> Any:
+        """Return a joint state with the fields of its message type."""
+
+    def read(self, path: Path, topic: str = "", held: int | None = None) -> AnyLog:
+        """Return the joint states of one topic as a log; effort is read as motor torque, time from each message's header.
+
+        topic  empty: /joint_states, or the only one of joint states
+        held   bytes of rows in memory; more rows go to a temporary file, and a StoredLog is returned. None: all
+
+        InputError if the bag is damaged, the topic is missing, or its messages disagree on joints.
+        """
+        self.require_sizes(path, held)
+        with decoding(str(path), self.what):
+            topic = self._topic(path, topic)
+            names, stamps, store, has_velocity = self._kept(path, topic, held)
+        name = path.name or str(path)
+        n = len(names)
+        log = StoredLog(
+            name=name,
+            joint_names=names,
+            time=stamps - stamps[0],
+            store=store,
+            has_velocity=has_velocity,
+            quantity="motor_torque",
+            stored=n,
+            places=tuple(range(n)),
+            notes=(f"{name}: 'effort' is read as motor torque, friction included",),
+            date=date_of(float(stamps[0])),
+        )
+        return log if store.on_disk else log.held()
+
+    @contextmanager
+    def columns(self, path: Path, opening: Opening) -> Iterator[Columns]:
+        """Of joint states: time_s, then position.<joint>, velocity.<joint> if all have one, effort.<joint>."""
+        log = self.read(path, opening.topic, opening.held)
+        parts = ("position", "velocity", "effort") if log.has_velocity else ("position", "effort")
+        names = ("time_s", *(f"{part}.{joint}" for part in parts for joint in log.joint_names))
+
+        def rows(places: Sequence[int], dates: bool) -> Iterator[Array]:
+            refuse_dates(dates, str(path))
+            for start in range(0, len(log), PIECE_ROWS):
+                own = log.rows(start, min(start + PIECE_ROWS, len(log)))
+                velocity = () if own.velocity is None else (own.velocity,)
+                whole = np.column_stack([own.time, own.position, *velocity, own.effort])
+                yield whole[:, list(places)]
+
+        yield Columns(str(path), names, len(names), rows)
+
+    def _topic(self, path: Path, wanted: str) -> str:
+        """The topic to read; InputError where joint states are on none, or on several of other names."""
+        found = self.topics(path)
+        if wanted in found or (not wanted and USUAL_TOPIC in found):
+            return wanted or USUAL_TOPIC
+        if not wanted and len(found) == 1:
+            return found[0]
+        has = f"it has them on {listed([quoted(topic) for topic in found])}" if found else "it has none"
+        what = f"on topic {quoted(wanted)}" if wanted else "that could be meant alone"
+        hint = (
+            "name one: --topic, or topic in a log description"
+            if found
+            else "record joint states with positions and efforts"
+        )
+        raise InputError(f"{path}: no {MESSAGE_TYPE} {what}: {has}", hint)
+
+    def _kept(
+        self, path: Path, topic: str, held: int | None
+    ) -> tuple[tuple[str, ...], Array, RowStore, bool]:
+        """Joints, time stamps, rows of position, velocity and effort, and whether all have a velocity."""
+        most = LARGEST_ROWS if held is None else LARGEST_STORED_ROWS
+        names: tuple[str, ...] = ()
+        store, has_velocity = RowStore(0), True
+        stamps: list[tuple[int, int]] = []
+        piece: list[Array] = []
+        for number, row in enumerate(self._messages(path, topic), start=1):
+            if number == 1:
+                names = tuple(row.name)
+                store = RowStore(3 * len(names), 8 * LARGEST_VALUES if held is None else held)
+            _require_alike(row, number, names, str(path))
+            if number > most:
+                raise InputError(f"{path}: more than {most:,} messages", "cut the bag into several")
+            has_velocity = has_velocity and len(row.velocity) == len(names)
+            velocity = row.velocity if len(row.velocity) == len(names) else np.full(len(names), np.nan)
+            stamps.append((row.header.stamp.sec, row.header.stamp.nanosec))
+            piece.append(np.concatenate([row.position, velocity, row.effort]))
+            if len(piece) == PIECE_MESSAGES:
+                store.append(np.array(piece, dtype=np.float64))
+                piece = []
+        if not stamps:
+            raise InputError(
+                f"{path}: no {MESSAGE_TYPE} on topic '{topic}'", "the log's states are expected on that topic"
+            )
+        if piece:
+            store.append(np.array(piece, dtype=np.float64))
+        seconds, fraction = np.array(stamps, dtype=np.float64).T
+        return names, seconds + 1e-9 * fraction, store, has_velocity
+
+    def _messages(self, path: Path, topic: str) -> Iterator[Any]:
+        for raw in self.raw_messages(path, topic):
+            if len(raw) > LARGEST_MESSAGE:
+                raise InputError(
+                    f"{path}: a message of {len(raw):,} bytes, expected at most {LARGEST_MESSAGE:,}",
+                    "record the joints' states alone on that topic",
+                )
+            yield self.decoded(raw)
+
+
+def _require_alike(row: Any, number: int, names: tuple[str, ...], path: str) -> None:
+    """InputError where a message does not fit the first one."""
+    if not names or len(names) != len(dict.fromkeys(names)) or 4 * len(names) > LARGEST_COLUMNS:
+        raise InputError(
+            f"{path}: message 1 names {len(names)} joints: {listed([quoted(x) for x in names])}",
+            "record messages that name every joint once",
+        )
+    if tuple(row.name) != names:
+        raise InputError(
+            f"{path}: message {number} names joints {listed([quoted(x) for x in row.name])}, "
+            f"the first {listed([quoted(x) for x in names])}",
+            "record the joints of each publisher on a separate topic",
+        )
+    for what in ("position", "effort"):
+        if len(getattr(row, what)) != len(names):
+            raise InputError(
+                f"{path}: message {number} has {len(getattr(row, what))} {what}s for {len(names)} joints",
+                "record a topic whose messages carry position and effort of every joint",
+            )
+
+
+def require_rosbags() -> None:
+    """InputError if rosbags is not installed."""
+    try:
+        import rosbags.typesys  # noqa: F401
+    except ImportError as error:
+        raise InputError("ROS bags need rosbags", "pip install 'psdmc[calibrate]'") from error
+
+
+def any_reader_topics(path: Path) -> tuple[str, ...]:
+    """Return the topics of joint states of what rosbags' AnyReader opens."""
+    require_rosbags()
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([path]) as reader:
+        return tuple(dict.fromkeys(c.topic for c in reader.connections if c.msgtype == MESSAGE_TYPE))
+
+
+def any_reader_messages(path: Path, topic: str) -> Iterator[bytes]:
+    """Yield the serialised joint states of a topic of what rosbags' AnyReader opens."""
+    require_rosbags()
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([path]) as reader:
+        connections = [c for c in reader.connections if c.topic == topic and c.msgtype == MESSAGE_TYPE]
+        for _, _, raw in reader.messages(connections=connections) if connections else ():
+            yield bytes(raw)

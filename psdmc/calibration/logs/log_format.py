@@ -1,0 +1,130 @@
+"""What a kind of log file can do: recognise its files, list their columns, and read their rows in pieces."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from psdmc.calibration.logs.foreign_bytes import LARGEST_STORED, opened
+from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.stored_log import HELD_BYTES, AnyLog
+from psdmc.calibration.logs.wording import quoted
+from psdmc.errors import InputError, InternalError
+
+PIECE_ROWS = 65_536
+"""Rows that are read at once from a binary table."""
+NUMBERS = "fiu"
+"""Kinds of NumPy's types that are numbers: floating point, signed, unsigned."""
+
+Pieces = tuple[list[str], Iterator[Array]]
+"""The names of a table's columns, and its rows, (k, columns) a piece."""
+
+
+@dataclass(frozen=True, slots=True)
+class TextForm:
+    """What is known of a text table's form. None: psdmc finds out from the first lines. skip: lines before the table."""
+
+    separator: str | None = None
+    header: bool | None = None
+    skip: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """What a log description says about a file, and how much memory its rows may take.
+
+    form   of a text table
+    topic  of a bag; empty: its only one
+    held   bytes of a bag's rows in memory; more rows go to a temporary file
+    """
+
+    form: TextForm = field(default_factory=TextForm)
+    topic: str = ""
+    held: int = HELD_BYTES
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """The columns of an open log file, whatever they are called or hold.
+
+    name   of the file, for messages
+    names  of its columns; empty if a text table has no header
+    width  number of columns
+    rows   called once: (k, len(places)) of columns by place (from 0), in pieces. If its second argument is true, the
+           first of these columns holds dates, which become s since 1970
+    """
+
+    name: str
+    names: tuple[str, ...]
+    width: int
+    rows: Callable[[Sequence[int], bool], Iterator[Array]]
+
+
+class LogFormat(ABC):
+    """A kind of log file: one module of the folder `formats`, with one object called FORMAT.
+
+    endings     of its files, in lower case, with the dot
+    has_topics  whether a file holds topics, of which one is read
+    """
+
+    endings: tuple[str, ...]
+    has_topics = False
+
+    def sniff(self, path: Path) -> bool:
+        """Return whether this format reads a path."""
+        return path.suffix.lower() in self.endings
+
+    def read(self, path: Path, topic: str = "", held: int | None = None) -> AnyLog:
+        """Return the log that a file without named columns, such as a bag, holds."""
+        raise InternalError(f"{path}: a table, which is read in pieces")
+
+    @abstractmethod
+    @contextmanager
+    def columns(self, path: Path, opening: Opening) -> Iterator[Columns]:
+        """Open a file that a log description describes; InputError if it is missing, damaged or of another kind."""
+
+
+class TableFormat(LogFormat):
+    """A kind of table. `pieces` reads tables whose columns psdmc has named; `write` writes them, if it can."""
+
+    @contextmanager
+    def columns(self, path: Path, opening: Opening) -> Iterator[Columns]:
+        if opening.topic:
+            raise InputError(
+                f"{path}: topic {quoted(opening.topic)}, but it is no bag", "leave the topic out"
+            )
+        with opened(path, LARGEST_STORED) as file:
+            yield self.columns_of(file, str(path), opening.form)
+
+    @abstractmethod
+    def columns_of(self, file: BinaryIO, name: str, form: TextForm) -> Columns:
+        """Return the columns of an open file."""
+
+    @abstractmethod
+    def pieces(self, file: BinaryIO, name: str) -> Pieces:
+        """Return names and rows of a table of numbers; InputError if any column holds anything else."""
+
+    def write(self, columns: Mapping[str, Array], path: Path) -> None:
+        """Write named columns of equal length."""
+        raise InputError(f"{path}: psdmc does not write {path.suffix} files", "write .csv, .parquet or .npz")
+
+
+def refuse_dates(dates: bool, name: str) -> None:
+    """InputError if dates are asked of a file whose columns are all numbers."""
+    if dates:
+        raise InputError(f"{name}: its time holds no dates", "write s, ms, us or ns as the unit of [time]")
+
+
+def require_equal(lengths: Mapping[str, int], name: str) -> None:
+    """InputError if columns, whose lengths are given by name, differ in length."""
+    first = next(iter(lengths), "")
+    odd = [f"{quoted(column)} has {count}" for column, count in lengths.items() if count != lengths[first]]
+    if odd:
+        raise InputError(
+            f"{name}: column {quoted(first)} has {lengths[first]} rows, but {odd[0]}",
+            "all columns have one value per row",
+        )
