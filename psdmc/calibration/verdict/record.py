@@ -163,7 +163,7 @@ def four_step_record(
             facts=facts,
             prediction=Prediction("lugre", {name: step.used for name, step in steps.items()}, runs=runs),
             notes=weak_notes("inertial", names, seen),
-            covariance=inertial.covariance + inertial.prior_covariance,
+            covariance=_covariance(inertial.covariance + inertial.prior_covariance),
         ),
         theta_b,
     )
@@ -252,7 +252,7 @@ def linear_record(
                 columns=problem.columns.content,
             ),
             notes=(*_coupled_notes(options), *weak_notes("linear fit", names, seen)),
-            covariance=(solved.total_covariance + solved.prior_covariance)[: model.l, : model.l],
+            covariance=_covariance((solved.total_covariance + solved.prior_covariance)[: model.l, : model.l]),
         ),
         values[: model.l],
     )
@@ -307,6 +307,13 @@ def dropped_links(model: DynamicsModel) -> tuple[str, ...]:
             DROPPED_LINKS,
         ),
     )
+
+
+def _covariance(found: Array) -> Array:
+    """(l, l) without what rounding leaves of exact zeros: no variance negative, no correlation above one."""
+    std = np.sqrt(np.maximum(np.diag(found), 0.0))
+    largest = std * std[:, None]
+    return np.clip(found, -largest, largest)
 
 
 def _unit_of(joint: Joint, turning: str) -> str:

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from psdmc.calibration.actuators import ActuatorView, actuator_files, calibrated_actuators
 from psdmc.calibration.identify.lugre import Lugre, friction_torque
 from psdmc.errors import InputError
+from psdmc.model.calibrated_json import from_json
 from psdmc.toolchain.compiler_command import find_compiler
 
 STIFF = Lugre(9.59, 12.5, 0.0144, 23.7, 0.61, 288e3, 22.8)
@@ -142,4 +143,4 @@ def test_a_calibration_without_lugre_has_no_friction_function():
     plain = {"friction": [{"joint": "a", "name": "coulomb", "value": 1.0}], "motors": []}
 
     with pytest.raises(InputError, match=r"no LuGre friction was identified for joint\(s\) a"):
-        calibrated_actuators("arm", ("a",), plain)
+        calibrated_actuators("arm", ("a",), from_json(plain))
