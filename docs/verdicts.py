@@ -80,7 +80,7 @@ def denso_log(
     return model, replace(log, effort=log.effort * constants, quantity="motor_torque"), constants
 
 
-PLANTS = {"ur10_robot.urdf": UR10_GAINS, "panda.urdf": (20.0,) * 7, "double_pendulum.urdf": (1.0, 1.0)}
+PLANTS = {"ur10_robot.urdf": UR10_GAINS, "panda.urdf": (20.0,) * 7, "ur3_robot.urdf": (5.0,) * 6}
 """URDFs of the wheel example-robot-data, and torque constants (N m/A) for virtual robots of them."""
 REACH = 3.4
 """rad either way, of joints without limits or with wider ones."""

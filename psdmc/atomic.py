@@ -28,6 +28,9 @@ _TEMPORARY = re.compile(r"\.psdmc-[0-9a-f]{16}\.part(\.[a-z]{1,8})?")
 SHOWN = 3
 """Names that a message lists of a folder's."""
 
+HEAD = 1 << 20
+"""Bytes of a file in which psdmc looks for its own mark."""
+
 _THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE)
 """Errors of the disk: writing under another name would not help."""
 
@@ -95,6 +98,20 @@ def refuse_foreign_folder(path: str | os.PathLike[str], remedy: str) -> None:
             f"{os.fspath(path)}: psdmc did not write the files in this folder: {', '.join(found[:SHOWN])}{more}",
             remedy,
         )
+
+
+def refuse_foreign_file(path: str | os.PathLike[str], mark: str, remedy: str) -> None:
+    """InputError if a file is at `path` that psdmc did not write: its first HEAD bytes lack the mark of psdmc's own.
+
+    For files that a command writes beside the one that its user named.
+    """
+    with system_errors_at(path):
+        if not os.path.isfile(path):
+            return
+        with open(path, "rb") as file:
+            is_own = mark.encode() in file.read(HEAD)
+    if not is_own:
+        raise InputError(f"{os.fspath(path)}: psdmc did not write this file and does not replace it", remedy)
 
 
 def check_place(path: str | os.PathLike[str]) -> None:

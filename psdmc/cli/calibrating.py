@@ -180,7 +180,12 @@ def calibrate(
     for warning in record.unsaid:
         if code_of(warning) != DROPPED_LINKS:
             print(f"warning: {one_line(warning)}")
-    for written, what in ((report, "page"), (actuators, "friction and motors in C")):
+    numbers = None if report is None else report.with_suffix(".json")
+    for written, what in (
+        (report, "page"),
+        (numbers, "the page's numbers"),
+        (actuators, "friction and motors in C"),
+    ):
         if written is not None and written.exists():
             print(f"{written}: {what}")
     if not verdict.usable:

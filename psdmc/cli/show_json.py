@@ -42,10 +42,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
         "l": found.l,
         "monomials": None if found.sizes is None else found.sizes._asdict(),
         "entries_of_P": found.entries,
-        "base_parameters": [
-            {"index": k, "equation": each.equation, "unit": each.unit, "value": _finite(each.value)}
-            for k, each in enumerate(found.base_parameters)
-        ],
+        "base_parameters": model.base_parameters.plain(),
         "largest_torque_error": max(found.certificate),
         "snap_torque_change": _numbers(model.provenance.get("snap_torque_change")),
         "notes": list(found.notes),

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.atomic import check_place, write_together, write_whole
+from psdmc.atomic import check_place, refuse_foreign_file, write_together, write_whole
 from psdmc.errors import InputError, InternalError
 from psdmc.export.bodies import Written, written
 from psdmc.export.elements import as_text
 from psdmc.export.friction import calibrated_friction_notes, joint_friction
 from psdmc.export.from_mechanism import urdf_of
 from psdmc.export.from_source import urdf_with
-from psdmc.export.mjcf import mjcf_of
+from psdmc.export.mjcf import MARK, mjcf_of
 from psdmc.export.numbers import exact
 from psdmc.export.read_back import LIMIT, Reading, read_mjcf_back, read_urdf_back
 from psdmc.links.physical_links import PhysicalLinks, physical_links
@@ -58,7 +58,8 @@ def export_urdf(
     If the model holds a URDF, names, limits and shapes are from that file. Otherwise links, joints and limits are
     from the model. Friction of a calibrated model is in <dynamics>.
 
-    mjcf   True: also write an MJCF with the suffix .xml; None: only if the model has drive inertias
+    mjcf   True: also write an MJCF with the suffix .xml; None: only if the model has drive inertias. The MJCF replaces no
+           file but one that psdmc wrote
 
     Raises InputError if theta_b is unknown, if no physical links have it (NoSuchLinks), or if a file cannot be written.
     """
@@ -72,6 +73,9 @@ def export_urdf(
     wanted = bool(drives.any()) if mjcf is None else mjcf
     if wanted and beside == target:
         raise InputError(f"{target}: psdmc writes the MJCF to this file", "call the URDF NAME.urdf")
+    if wanted:
+        remedy = f"give -o another name, move {beside}, or --no-mjcf: an MJCF with drive inertia goes there"
+        refuse_foreign_file(beside, MARK, remedy)
     what, text, notes = _urdf(model, links)
     progress("reading it back")
     readings = read_urdf_back(model, text, drives, what.gravity)

@@ -20,6 +20,8 @@ COMPILER = {
     "boundinertia": "0",
     "inertiafromgeom": "false",
 }
+MARK = " ".join(f'{name}="{value}"' for name, value in COMPILER.items())
+"""Text by which psdmc knows an MJCF as its own."""
 FULL = (0, 2, 5, 1, 3, 4)
 """Order of MuJoCo's fullinertia, xx yy zz xy xz yz, in INERTIA_NAMES."""
 

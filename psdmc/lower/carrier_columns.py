@@ -38,7 +38,8 @@ SAMPLED_JOINTS = 10
 """Robots with more joints are not sampled as a whole, unless joints follow others: what their summed torques depend on is
 not found joint by joint."""
 
-STATES = 48
+STATES, ROWS = 48, 2
+"""Most states of the samples, and rows per column from which on a larger robot takes no more of them."""
 SEED = 20211
 
 
@@ -170,18 +171,20 @@ def _torque_rows(reframed: Reframed) -> Long:
 
 
 def _sampled_columns(reframed: Reframed) -> Long:
-    """(STATES nv, 11 n) regressor in pseudo-inertia form at fixed random states, in extended precision."""
+    """(states nv, 11 n) regressor in pseudo-inertia form at fixed random states, in extended precision."""
     n, nv = len(reframed.frames), first_rates(reframed.frames)[-1]
+    enough = -(-ROWS * PARAMETERS_PER_LINK * n // nv)
+    states = STATES if n <= SAMPLED_JOINTS else min(STATES, enough)
     nq = len(neutral(reframed.frames))
-    drawn = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(nq + 2 * nv, STATES)).astype(np.longdouble)
+    drawn = np.random.default_rng(SEED).uniform(-2.0, 2.0, size=(nq + 2 * nv, states)).astype(np.longdouble)
     q, qd, qdd = normalized(reframed.frames, drawn[:nq]), drawn[nq : nq + nv], drawn[nq + nv :]
     here = [Placement.identity()] * n
     rows = regressor(
         reframed.frames, here, range(11 * n), list(q), list(qd), list(qdd), reframed.base_acceleration
     )
-    standard = np.zeros((nv, STATES, 11 * n), np.longdouble)
+    standard = np.zeros((nv, states, 11 * n), np.longdouble)
     for i, row in enumerate(rows):
         for column, value in row.items():
             standard[i, :, column] = value
     back = np.round(np.linalg.inv(pseudo_map()))  # zeros and ones
-    return _combined(standard.reshape(-1, PARAMETERS_PER_LINK), back).reshape(nv * STATES, -1)
+    return _combined(standard.reshape(-1, PARAMETERS_PER_LINK), back).reshape(nv * states, -1)

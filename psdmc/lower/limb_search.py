@@ -25,7 +25,7 @@ from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limbs import TracedLimbs, cost_of_limbs, trace_limbs
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.scoring import for_lanes, for_one_state
-from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, Search, distinct
+from psdmc.lower.search import CHOICES, LARGEST_TRANSFER, MANY_JOINTS, Search, distinct
 from psdmc.program.limb_cost import StageCost, stage_costs
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.limb_stages import staged
@@ -43,9 +43,9 @@ WIDTHS = (2, 4, 8)
 USUAL = 4
 """Lanes for which an arrangement is chosen: doubles of AVX2, and of one state's vectors on most machines with AVX-512."""
 
-BUDGET, JOINTS = 80, 40
-"""Exchanges tried per function and way to see limbs, at some 10 ms each, and joints from which on fewer are tried:
-with the square of their number, as in search.py."""
+BUDGET, BUDGET_OF_LARGE = 80, 20
+"""Exchanges tried per function and way to see limbs, at some 10 ms each, for robots of up to MANY_JOINTS joints and of
+more, whose exchanges take longer."""
 
 LIKELY = 1.1
 """Ways to see limbs that cost this much more than another one are left before exchanges, which save 3 % at most."""
@@ -126,7 +126,7 @@ class LimbSearch:
 
     def _descended(self, best: LimbArrangement) -> LimbArrangement:
         """The cheapest that exchanges lead to."""
-        budget = BUDGET * JOINTS**2 // max(JOINTS, best.arrangement.n) ** 2
+        budget = BUDGET if best.arrangement.n <= MANY_JOINTS else BUDGET_OF_LARGE
         while budget > 0:
             improved = best
             for candidate in self._exchanged(best.arrangement, best.groups):

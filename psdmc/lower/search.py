@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import partial
 from itertools import islice, product
+from operator import ne
 
 import numpy as np
 
@@ -40,9 +41,13 @@ from psdmc.target.native import COSTS
 BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
 
-OPERATIONS = 800_000
-"""Of all PROGRAMs on which one function compares the choices of an arrangement that another function found: ten times the
-Coriolis matrix of a robot with a hundred joints. A longer function compares fewer."""
+OPERATIONS, OPERATIONS_OF_LARGE = 800_000, 250_000
+"""Of all PROGRAMs on which one function compares the choices of an arrangement that another function found: for robots of up
+to MANY_JOINTS joints, and of more. The Coriolis matrix of a humanoid with two hands has 45,000: it compares the found
+choices and those that differ in one. A longer function compares fewer."""
+
+MANY_JOINTS = 40
+"""Joints up to which a search tries all that it knows; what it leaves out of larger robots saves 1 % at most."""
 
 LARGEST_TRANSFER = 1e4
 """Carriers whose values would be larger multiples of theta_b (lengths in the chain's unit) are not considered: torques
@@ -226,20 +231,21 @@ class Search:
         return min(self.rearrangements(recipe, found), key=scoring.score)
 
     def rearrangements(self, recipe: Recipe, found: Arrangement) -> Iterator[Program]:
-        """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes. All
-        others are only counted, the found one's choices first, and no more than have OPERATIONS together."""
+        """The PROGRAMs that `rearranged` chooses from: the cheapest one for one state and the cheapest for lanes; of a robot
+        of more than MANY_JOINTS joints the latter alone, which its long functions share. All others are only counted, those
+        like the found one's first, and no more than have OPERATIONS together."""
         choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}
-        left = OPERATIONS
-        for k in sorted(range(len(choices)), key=lambda k: choices[k].choices != found.choices):
+        is_usual = found.n <= MANY_JOINTS
+        left = OPERATIONS if is_usual else OPERATIONS_OF_LARGE
+        targets = (self.single, self.batch) if is_usual else (self.batch,)
+        for k in sorted(range(len(choices)), key=lambda k: _changes(choices[k].choices, found.choices)):
             costs[k] = self.cost(recipe, choices[k])
             left -= costs[k].total
             if left < costs[k].total:
                 break
         tried = sorted(costs)
-        for best in sorted(
-            {min(tried, key=lambda k: scoring.weight(costs[k])) for scoring in (self.single, self.batch)}
-        ):
+        for best in sorted({min(tried, key=lambda k: target.weight(costs[k])) for target in targets}):
             yield trace_dynamics(recipe, choices[best], self.robot)
 
     def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
@@ -273,6 +279,11 @@ class Search:
 
 def _weights(space: CarrierSpace) -> list[float]:
     return [WEIGHTS[PSEUDO_NAMES[j % PARAMETERS_PER_LINK]] for j in range(space.count)]
+
+
+def _changes(one: Choices, other: Choices) -> int:
+    """How many choices two arrangements of a recursion differ in."""
+    return sum(map(ne, astuple(one), astuple(other)))
 
 
 def _rearranged(found: Arrangement, choices: Iterable[Choices]) -> Iterator[Arrangement]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from psdmc.errors import ToolchainError
 from psdmc.model.equations import BaseParameter
@@ -31,6 +31,14 @@ class BaseParameters(tuple[BaseParameter, ...]):
     def labels(self) -> tuple[str, ...]:
         """Each one's number from 0 and equation, such as 'theta_b[7] Izz2 + a2 mx2': at most LABEL characters of it."""
         return tuple(f"theta_b[{k}] {_first_terms(parameter.equation)}" for k, parameter in enumerate(self))
+
+    def plain(self) -> list[dict[str, Any]]:
+        """For JSON: number from 0, label, whole equation, unit and value (None while unknown) of each."""
+        named = enumerate(zip(self.labels, self, strict=True))
+        return [
+            {"index": k, "name": name, "equation": each.equation, "unit": each.unit, "value": each.value}
+            for k, (name, each) in named
+        ]
 
     def to_frame(self) -> pd.DataFrame:
         """A pandas data frame: index theta_b (0 to l - 1), columns equation, value (NaN while unknown), unit.

@@ -21,20 +21,26 @@ FORMAT = 4
 
 def kernels_to_json(kernels: Mapping[str, Kernel]) -> str:
     """The text of kernels in their order; constants read back bit for bit."""
-    entries = [
-        {
-            "function": kernel.function.name,
-            "theta": kernel.theta,
-            "lowering": kernel.lowering,
-            "single": _program_to_plain(kernel.single),
-            "batch": None if kernel.batch is kernel.single else _program_to_plain(kernel.batch),
-            "before": None if kernel.before is None else _program_to_plain(kernel.before),
-            "limbs": None if kernel.limbs is None else _limbs_to_plain(kernel.limbs),
-            "places": kernel.places,
-        }
-        for kernel in kernels.values()
-    ]
-    return json.dumps({"format": FORMAT, "kernels": entries}, separators=(",", ":"), allow_nan=False)
+    # One kernel at a time: lists of all of a large robot's instructions together take more memory than its kernels.
+    entries = ",".join(_text(_kernel_to_plain(kernel)) for kernel in kernels.values())
+    return f'{{"format":{FORMAT},"kernels":[{entries}]}}'
+
+
+def _text(plain: Any) -> str:
+    return json.dumps(plain, separators=(",", ":"), allow_nan=False)
+
+
+def _kernel_to_plain(kernel: Kernel) -> dict[str, Any]:
+    return {
+        "function": kernel.function.name,
+        "theta": kernel.theta,
+        "lowering": kernel.lowering,
+        "single": _program_to_plain(kernel.single),
+        "batch": None if kernel.batch is kernel.single else _program_to_plain(kernel.batch),
+        "before": None if kernel.before is None else _program_to_plain(kernel.before),
+        "limbs": None if kernel.limbs is None else _limbs_to_plain(kernel.limbs),
+        "places": kernel.places,
+    }
 
 
 def kernels_from_json(text: str, functions: Mapping[str, Signature]) -> dict[str, Kernel]:

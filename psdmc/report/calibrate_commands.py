@@ -33,7 +33,7 @@ from psdmc.model.load import load, model_of
 from psdmc.model.store import save
 from psdmc.progress import Progress, silent
 from psdmc.report.calibrate_plots import excitation_figure
-from psdmc.report.calibrate_report import write_report
+from psdmc.report.calibrate_report import require_free_numbers, write_report
 from psdmc.robot.derivable import require_axes
 
 
@@ -92,13 +92,15 @@ def calibrate_command(
     """Calibrate a model, or its file, from a campaign or from logs.
 
     output     the calibrated model file, which emit-c takes
-    report     an HTML page, with the numbers as JSON beside it
+    report     an HTML page, with the numbers as JSON beside it, which replaces no file but another report's
     actuators  a folder for C: friction and motors
     loaded     further logs, recorded with the known load `load_on`: 'MASS,X,Y,Z' or a load's file
     keep       whether model and C are written even where the verdict is `not usable`
     validation  plain logs that are held out as a whole
     naming     topic and joint names of plain logs
     """
+    if report is not None:
+        require_free_numbers(report)
     known = model_of(model)
     if actuators is not None:
         require_actuators_folder(known, actuators)

@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from psdmc.atomic import write_together
+from psdmc.atomic import refuse_foreign_file, write_together
 from psdmc.backends.c.render import environment
 from psdmc.calibration.motions.excite import Excitation
 from psdmc.model.calibrated import WEAK, Calibrated, Verdict, code_of
@@ -31,6 +31,9 @@ CAPTIONS = {
     "Inertial": "What gravity and friction leave of the fast motion's torque, against the inertial model (figure 5).",
     "All": "The whole torque of the fast motion.",
 }
+
+NUMBERS_MARK = '"base_parameters": [\n  {\n   "name": "theta_b[0]"'
+"""What the JSON beside every page holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +90,13 @@ def write_report(
     text = json.dumps(document(record), indent=1) + "\n"
     write_together(page.parent, {page.name: report_html(record, found, truth), numbers.name: text})
     return page, numbers
+
+
+def require_free_numbers(page: str | Path) -> None:
+    """InputError if the JSON beside a page would replace a file that is no report's."""
+    numbers = Path(page).with_suffix(".json")
+    remedy = f"give --report another name, or move {numbers}: the report's numbers go there"
+    refuse_foreign_file(numbers, NUMBERS_MARK, remedy)
 
 
 def report_html(record: Calibrated, found: Excitation | None = None, truth: TruthView | None = None) -> str:

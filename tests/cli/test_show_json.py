@@ -36,6 +36,7 @@ def test_a_model_is_all_there_with_all_digits(model: DynamicsModel, tmp_path: Pa
     assert isinstance(parameters, list)
     assert [joint["name"] for joint in joints] == list(model.joint_names)
     assert [each["index"] for each in parameters] == list(range(model.l))
+    assert [each["name"] for each in parameters] == list(model.base_parameters.labels)
     assert [each["equation"] for each in parameters] == [b.equation for b in model.base_parameters]
     assert model.theta_b is not None
     np.testing.assert_array_equal([each["value"] for each in parameters], model.theta_b)

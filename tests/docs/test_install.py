@@ -34,7 +34,7 @@ def told(command: str) -> set[str]:
     """Distributions that `pip install COMMAND` brings beside psdmc's own."""
     found: set[str] = set(named(PROJECT["dependencies"]))
     for word in command.replace("'", "").split():
-        extras = re.fullmatch(r"psdmc\[([\w,]+)\]", word)
+        extras = re.fullmatch(r"(?:psdmc|\.)\[([\w,]+)\]", word)
         found |= (
             {name for extra in extras[1].split(",") for name in named(EXTRAS[extra])}
             if extras
@@ -85,7 +85,8 @@ def test_extras_that_documents_name_exist() -> None:
 @pytest.mark.parametrize("path", slow_but_for(NOTEBOOKS[:1], NOTEBOOKS), ids=lambda path: path.stem)
 def test_what_is_told_to_install_is_enough_for_a_notebook(path: Path) -> None:
     command = re.search(
-        r"`pip install ('psdmc\[[^`]*jupyterlab)`", (ROOT / "examples" / "README.md").read_text("utf-8")
+        r"pip install ('(?:psdmc|\.)\[[^`\n]*jupyterlab)",
+        (ROOT / "examples" / "README.md").read_text("utf-8"),
     )
     assert command
     brought = told(command[1])
@@ -95,3 +96,19 @@ def test_what_is_told_to_install_is_enough_for_a_notebook(path: Path) -> None:
         for name in imported(source) - set(sys.stdlib_module_names) - {"psdmc"}:
             needs.add("pin" if name == "pinocchio" else distributions[name][0].lower())
         assert needs <= brought
+
+
+def test_no_system_is_claimed_that_tests_do_not_run_on() -> None:
+    """The metadata name Linux alone, and a page that names macOS says somewhere that it was not tried."""
+    systems = [word for word in PROJECT["classifiers"] if word.startswith("Operating System")]
+    assert systems == ["Operating System :: POSIX :: Linux"]
+    pages = [
+        ROOT / "README.md",
+        *(page for page in (ROOT / "docs").rglob("*.md") if page.parent.name != "decisions"),
+    ]
+    named = {page.name: page.read_text(encoding="utf-8") for page in pages}
+    named = {name: text for name, text in named.items() if "macOS" in text}
+    assert "install.md" in named
+    assert [
+        name for name, text in named.items() if not re.search(r"macOS[^.|]* not (tested|tried)", text)
+    ] == []

@@ -282,7 +282,7 @@ def test_the_command_says_what_it_read_back(arm: DynamicsModel, tmp_path: Path, 
 
 
 def test_outputs_that_would_overwrite_something(arm: DynamicsModel, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the MJCF goes there"):
+    with pytest.raises(InputError, match="psdmc writes the MJCF to this file"):
         psdmc.export_urdf(arm, tmp_path / "robot.xml", mjcf=True)
     with pytest.raises(InputError, match="No such file or directory"):
         psdmc.export_urdf(arm, tmp_path / "missing" / "robot.urdf")
@@ -319,3 +319,19 @@ def test_an_mjcf_with_armature_is_written(tmp_path: Path) -> None:
 
     assert found.readings[0].error < 1e-12
     assert ":drive" not in found.urdf.read_text()
+
+
+def test_the_mjcf_beside_replaces_no_file_of_the_users(arm: DynamicsModel, tmp_path: Path) -> None:
+    mine = tmp_path / "back.xml"
+    mine.write_text("<mujoco/>", encoding="utf-8")
+
+    with pytest.raises(InputError, match=r"back\.xml: psdmc did not write this file") as refused:
+        psdmc.export_urdf(arm, tmp_path / "back.urdf", mjcf=True)
+
+    assert "--no-mjcf" in str(refused.value.hint)
+    assert not (tmp_path / "back.urdf").exists()
+    assert psdmc.export_urdf(arm, tmp_path / "back.urdf", mjcf=False).mjcf is None
+    assert mine.read_text(encoding="utf-8") == "<mujoco/>"
+    mine.unlink()
+    for _ in range(2):  # its own it replaces
+        assert psdmc.export_urdf(arm, tmp_path / "back.urdf", mjcf=True).mjcf == mine

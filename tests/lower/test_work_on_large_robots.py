@@ -13,8 +13,9 @@ from random_trees import RandomTree
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics import motion
 from psdmc.functions import RECIPES
-from psdmc.lower import search
+from psdmc.lower import limb_search, search
 from psdmc.lower.branches import limbs_in
+from psdmc.lower.carrier_columns import STATES, _sampled_columns
 from psdmc.lower.factored import Arrangement, trace_dynamics
 from psdmc.lower.limb_frames import possible_groups
 from psdmc.lower.limb_search import LimbSearch
@@ -23,6 +24,7 @@ from psdmc.lower.tableau import Tableau
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.cost import cost
 from psdmc.robot.coordinates import Coordinate
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 from psdmc.target.native import COSTS
 
 ARM, FINGERS, FINGER = 2, 2, 2
@@ -83,9 +85,13 @@ def test_a_finger_that_no_exchange_makes_accurate_is_given_up_after_the_search_s
     assert taken in measured
 
 
+@pytest.mark.parametrize(
+    ("name", "many"), [("OPERATIONS", COUNT), ("OPERATIONS_OF_LARGE", COUNT - 1)], ids=["usual", "large"]
+)
 def test_choices_are_compared_on_so_many_operations_and_the_found_ones_first(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, name: str, many: int
 ) -> None:
+    monkeypatch.setattr(search, "MANY_JOINTS", many)
     found, start = searched()
     recipe = RECIPES["coriolis_matrix"]
     start = replace(start, choices=replace(start.choices, fold=True))
@@ -99,16 +105,52 @@ def test_choices_are_compared_on_so_many_operations_and_the_found_ones_first(
     monkeypatch.setattr(search, "cost_of_dynamics", counted)
     found._costs.clear()
     (*programs,) = found.rearrangements(recipe, start)
+    assert many == COUNT or len(programs) == 1
     every = len(traced)
     longest = max(cost(program).total for program in programs)
     for limit, least in ((0, 1), (2.5 * longest, 2)):
         traced.clear()
         found._costs.clear()
-        monkeypatch.setattr(search, "OPERATIONS", limit)
+        monkeypatch.setattr(search, name, limit)
 
         assert list(found.rearrangements(recipe, start))
         assert traced[0].choices == start.choices
         assert least <= len(traced) <= max(1, limit / (0.8 * longest)) < every
+
+
+@pytest.mark.parametrize("many", [COUNT, COUNT - 1], ids=["usual", "large"])
+def test_exchanges_in_lanes_are_fewer_from_so_many_joints_on(
+    monkeypatch: pytest.MonkeyPatch, many: int
+) -> None:
+    monkeypatch.setattr(limb_search, "MANY_JOINTS", many)
+    monkeypatch.setattr(limb_search, "BUDGET", 7)
+    monkeypatch.setattr(limb_search, "BUDGET_OF_LARGE", 3)
+    found, start = searched()
+    one = LimbSearch(found, RECIPES["inverse_dynamics"], COSTS)
+    tried: list[Arrangement] = []
+    monkeypatch.setattr(one, "_expected", lambda best, candidate: tried.append(candidate) or np.inf)
+
+    one._descended(one._weighed(start, possible_groups(start.reframed.frames)[0]))
+
+    assert len(tried) == (7 if many == COUNT else 3)
+
+
+def test_samples_of_a_large_robot_have_twice_as_many_rows_as_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, start = searched(mimic=True)
+    frames = start.reframed.frames
+    columns, rates = PARAMETERS_PER_LINK * COUNT, found.robot.sizes.nv
+
+    rows = len(_sampled_columns(start.reframed))
+
+    assert 2 * columns <= rows < 2 * columns + rates < STATES * rates
+    assert (
+        len(
+            _sampled_columns(
+                replace(start.reframed, frames=frames[:1], link_frames=start.reframed.link_frames[:1])
+            )
+        )
+        == STATES * 6
+    )
 
 
 def test_an_exchange_in_one_finger_is_weighed_on_that_finger_of_each_hand() -> None:
@@ -117,10 +159,10 @@ def test_an_exchange_in_one_finger_is_weighed_on_that_finger_of_each_hand() -> N
     groups = possible_groups(start.reframed.frames)[0]
     (arms,) = groups
     assert [len(limb) for limb in arms] == [ARM + HAND] * 2
-    limb_search = LimbSearch(found, RECIPES["inverse_dynamics"], COSTS)
+    one = LimbSearch(found, RECIPES["inverse_dynamics"], COSTS)
     kept = Counter(
         len(found.branches.changed(RECIPES["inverse_dynamics"], start, each, groups) or PARENTS)
-        for each in limb_search._exchanged(start, groups)
+        for each in one._exchanged(start, groups)
     )
 
     assert kept[1 + 2 * (ARM + FINGER)] >= kept.total() / 2

@@ -20,7 +20,7 @@ from psdmc.program.passes.fuse_sums import fuse_sums
 from psdmc.program.passes.merge_duplicates import merge_duplicates
 from psdmc.program.passes.schedule import live_values, schedule
 from psdmc.program.pipeline import optimize
-from psdmc.program.program import Op, Program
+from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.text import parse, show
 
 Outputs = Callable[[Program], np.ndarray]
@@ -335,6 +335,24 @@ def test_optimizing_saves_and_keeps_outputs_up_to_rounding(some_program: Program
 
     np.testing.assert_allclose(outputs(after), outputs(some_program), rtol=1e-11, atol=1e-11)
     assert cost(after).total <= cost(drop_unused(some_program)).total
+
+
+@pytest.mark.parametrize(("long", "rounds"), [(201, 1), (203, 10)])
+def test_a_long_program_ends_with_a_round_that_saves_little(
+    monkeypatch: pytest.MonkeyPatch, long: int, rounds: int
+) -> None:
+    """A round that saves one operation of 200: the last one of a long PROGRAM, one of LONGEST of a short one."""
+
+    def save_one(program: Program) -> Program:
+        return Program(program.body[:-1], program.outputs[:-1])
+
+    sums = [Instr(Op.ADD, (0, 1)), *(Instr(Op.ADD, (1, k)) for k in range(2, 201))]
+    body = (Instr(Op.LOAD, slot=Slot("q", 0)), Instr(Op.LOAD, slot=Slot("q", 1)), *sums)
+    program = Program(body, tuple((Slot("tau", k), k) for k in range(202)))
+    monkeypatch.setattr(pipeline, "ROUND", (save_one,))
+    monkeypatch.setattr(pipeline, "LONG", long)
+
+    assert cost(pipeline.shortened(program)).add == 200 - rounds
 
 
 def test_the_pipeline_names_the_pass_that_broke_a_rule(monkeypatch: pytest.MonkeyPatch):

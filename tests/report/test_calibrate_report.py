@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.verdict.record import Calibration
+from psdmc.errors import InputError
 from psdmc.model.calibrated import (
     JointFigures,
     JointQuality,
@@ -26,7 +27,8 @@ from psdmc.model.calibrated import (
     Verdict,
 )
 from psdmc.model.grounds import Ground
-from psdmc.report.calibrate_report import report_html, write_report
+from psdmc.report.calibrate_commands import calibrate_command
+from psdmc.report.calibrate_report import report_html, require_free_numbers, write_report
 
 X = np.linspace(0.0, 1.0, 50)
 SAMPLE = Sample("a", "time [s]", X, np.sin(X), np.sin(X) + 0.01, X > 0.8)
@@ -41,9 +43,9 @@ def record() -> Calibration:
         joint_names=("a",),
         model=None,  # type: ignore[arg-type]
         parameters=(
-            ParameterRow("theta_1", "gravity", 7.4174, 0.01, "kg", "m1 + mx1/a1 <i>", True),
+            ParameterRow("theta_b[0]", "gravity", 7.4174, 0.01, "kg", "m1 + mx1/a1 <i>", True),
             ParameterRow(
-                "theta_2",
+                "theta_b[1]",
                 "inertial",
                 0.25,
                 float("inf"),
@@ -83,11 +85,11 @@ def test_each_parameter_has_the_file_s_value_beside_the_found_one(record: Calibr
     known, unknown = record.parameters
     page = report_html(replace(record, parameters=(replace(known, file=6.25), unknown)))
 
-    row = re.search(r"<tr><td>theta_1</td>.*?</tr>", page)
+    row = re.search(r"<tr><td>theta_b\[0\]</td>.*?</tr>", page)
     assert row is not None
     cells = [html.unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row[0])]
-    assert cells[:7] == ["theta_1", "6.25", "7.4174", "0.01", "0.13%", "kg", "m1 + mx1/a1 <i>"]
-    assert "<tr><td>theta_2</td><td>–</td><td>0.25</td>" in page
+    assert cells[:7] == ["theta_b[0]", "6.25", "7.4174", "0.01", "0.13%", "kg", "m1 + mx1/a1 <i>"]
+    assert "<tr><td>theta_b[1]</td><td>–</td><td>0.25</td>" in page
 
 
 def test_accuracy_is_labelled_held_out(record: Calibration):
@@ -146,6 +148,19 @@ def test_the_numbers_stand_beside_it_as_json(record: Calibration, tmp_path: Path
 
     assert data["base_parameters"][1]["std"] is None
     assert data["quality"]["All"]["a"]["held_out"]["r2"] == 0.9876
+
+
+def test_the_numbers_replace_no_file_of_the_users(record: Calibration, tmp_path: Path) -> None:
+    mine = tmp_path / "page.json"
+    mine.write_text('{"base_parameters": []}', encoding="utf-8")
+
+    with pytest.raises(InputError, match=r"page\.json: psdmc did not write this file") as refused:
+        calibrate_command(tmp_path / "none.npz", [], tmp_path / "out.npz", tmp_path / "page.html")
+
+    assert "--report" in str(refused.value.hint)
+    mine.unlink()
+    write_report(record, tmp_path / "page.html")
+    require_free_numbers(tmp_path / "page.html")  # its own it replaces
 
 
 def test_the_verdict_comes_first_with_its_figures(record: Calibration, tmp_path: Path):

@@ -13,6 +13,7 @@ from psdmc.backends.c.function_view import FunctionView
 from psdmc.backends.c.info import JointInfo, PackageInfo
 from psdmc.backends.c.names import identifier
 from psdmc.backends.c.options import EmitOptions
+from psdmc.model.parameter_table import BaseParameters
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 
@@ -46,9 +47,7 @@ def manifest(
         "real": options.c_real,
         "lanes": options.lanes,
         "joints": [_joint(joint) for joint in info.joints],
-        "base_parameters": [
-            {"equation": p.equation, "unit": p.unit, "value": p.value} for p in info.parameters
-        ],
+        "base_parameters": BaseParameters(info.parameters).plain(),
         "functions": [_function(function) for function in functions],
         "files": {path: digest(text) for path, text in files.items()},
     }

@@ -126,7 +126,13 @@ def test_the_manifest_says_what_is_in_the_package() -> None:
         "effort_unit": "N m",
         "limits": limits,
     }
-    assert [p["unit"] for p in content["base_parameters"]] == ["kg m^2", "kg m"]
+    first, second = content["base_parameters"]
+    assert (first["index"], first["name"], first["unit"]) == (0, f"theta_b[0] {first['equation']}", "kg m^2")
+    assert (second["index"], second["name"], second["unit"]) == (
+        1,
+        f"theta_b[1] {second['equation']}",
+        "kg m",
+    )
     assert content["files"] == {
         path: hashlib.sha256(text.encode()).hexdigest()
         for path, text in files.items()
