@@ -42,6 +42,7 @@ MENU = {
         "how-to/payload",
         "how-to/frames",
         "how-to/cmake",
+        "how-to/rust",
         "how-to/embedded",
         "how-to/precision-and-simd",
         "how-to/batch",

@@ -4,7 +4,7 @@ stage        in                                         out
 robot        robot file, options                        LoadedRobot: a Mechanism and where it comes from
 derivation   Mechanism                                  DynamicsModel: E, P, theta_b, certificate (the MODEL)
 lower        DynamicsModel, names of functions, costs   Kernels: each function as a PROGRAM for one state and for lanes
-emit         Kernels, PackageInfo, ReferenceStates      PackageView, then the text of each file of the C package
+backends     Emission: Kernels, facts, reference states the text of each file of a package, in C or another language
 toolchain    PackageView                                shared library with its Interface, then CompiledRobot
 """
 
@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from weakref import WeakValueDictionary
 
 from psdmc.backends.c.adapters import chosen, with_needed
-from psdmc.backends.c.info import package_info
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.c.package_files import package_files
-from psdmc.backends.c.reference_load import reference_load
-from psdmc.backends.c.reference_states import reference_states
-from psdmc.backends.c.write import Changes, require_own_folder, write_package
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.protocol import Emission, back_end
+from psdmc.backends.reference_load import reference_load
+from psdmc.backends.reference_states import reference_states
+from psdmc.backends.write import Changes, require_own_folder, write_package
 from psdmc.errors import InputError
 from psdmc.lower.admitted import require
 from psdmc.lower.kernels import Lowering, lower, wanted
@@ -163,19 +163,52 @@ def emit_c(
     limits; leave out forward_dynamics then. With `payload`, `bodies` or `friction` it is raised if the model's
     assumptions exclude a load or a body, or if the model has no friction.
     """
+    own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
+    return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
+
+
+def emit(
+    model: DynamicsModel | str | Path,
+    directory: str | Path,
+    backend: str,
+    lowering: Lowering = "auto",
+    functions: Sequence[str] | str | None = None,
+    real: Real | None = None,
+    name: str | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+    trig: Trig | None = None,
+    target: str | Target = NATIVE,
+    **own: Any,
+) -> Changes:
+    """Write the model's package in the language of a back end (psdmc.backends.protocol); returns what `emit_c` returns.
+
+    own  further options of `emit_c`, by the command line's names
+
+    InputError for an option that the back end does not have.
+    """
+    language = back_end(backend)
     require_own_folder(directory, force)
     model = model_of(model)
     options = _options(lowering, real, trig, target)
-    adapters = _names(adapters)
+    chosen_options = {"trig": trig, "target": options.target != NATIVE, **own}
+    for option in language.lacks:
+        if chosen_options.get(option):
+            raise InputError(
+                f"the back end {backend} has no --{option}", "leave it out, or emit C: psdmc emit-c"
+            )
+    adapters = _names(own.get("with", ()))
     if adapters and not options.target.hosted:
         raise InputError(
             f"target {options.target.name} has no shared libraries, which {adapters[0]} loads",
             "leave --with out, or emit another package for it",
         )
     more = chosen(adapters)
-    package = _package(model, lowering, functions, options, name, progress, payload, more, friction, bodies)
+    facts = (own.get("payload", False), more, own.get("friction", False), own.get("bodies", False))
+    emission = _emission(model, lowering, functions, options, name, progress, *facts)
+    files = language.files(emission)
     progress("writing")
-    return write_package(directory, package_files(package), force)
+    return write_package(directory, files, force)
 
 
 @overload
@@ -321,7 +354,13 @@ def _again(request: _Request) -> CompiledRobot[Any]:
     return _ROBOTS.get(request.key) or request.compiled()
 
 
-def _package(
+def _package(*given: Any) -> PackageView:
+    """The C package of what `_emission` takes."""
+    made = _emission(*given)
+    return package_view(made.info, made.kernels, made.options, made.references, made.adapters)
+
+
+def _emission(
     model: DynamicsModel,
     lowering: Lowering,
     functions: Sequence[str] | str | None,
@@ -332,7 +371,7 @@ def _package(
     adapters: Sequence[str] = (),
     friction: bool = False,
     bodies: bool = False,
-) -> PackageView:
+) -> Emission:
     wide = model.nq > model.nv
     names = wanted(with_needed(wanted(functions, model.mechanism), adapters, wide), model.mechanism)
     require(model, names)
@@ -346,7 +385,7 @@ def _package(
     references = reference_states(model, names)
     if payload:
         references = replace(references, load=reference_load(model))
-    return package_view(info, kernels, options, references, adapters)
+    return Emission(info, kernels, options, references, tuple(adapters))
 
 
 def _options(

@@ -150,18 +150,38 @@ def arcsine(value: Any) -> Any:
     return _rounded(np.arcsin, value)
 
 
-def angle_of(y: float, x: float) -> float:
-    """atan2 in rad, rounded as `sine`."""
-    return float(np.arctan2(np.longdouble(y), np.longdouble(x)))
+def angle_of(y: Any, x: Any) -> Any:
+    """atan2 of floats or arrays in rad, as `sine`."""
+    return _rounded(np.arctan2, y, x)
 
 
-def _rounded(function: Any, value: Any) -> Any:
+def exponential(value: Any) -> Any:
+    """exp of a float or an array, as `sine`."""
+    return _rounded(np.exp, value)
+
+
+def hyperbolic_tangent(value: Any) -> Any:
+    """tanh of a float or an array, as `sine`."""
+    return _rounded(np.tanh, value)
+
+
+def logarithm(value: Any) -> Any:
+    """Natural logarithm of a float or an array, as `sine`."""
+    return _rounded(np.log, value)
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """base^exponent of floats or arrays, as `sine`."""
+    return _rounded(np.power, base, exponent)
+
+
+def _rounded(function: Any, *values: Any) -> Any:
     if _any_order.get():
-        return function(value)
-    if isinstance(value, float):
-        return float(function(np.longdouble(value)))
-    given = np.asarray(value)
-    found = function(given.astype(np.longdouble))
-    if given.dtype == np.longdouble:
+        return function(*values)
+    if all(isinstance(value, float) for value in values):
+        return float(function(*map(np.longdouble, values)))
+    given = [np.asarray(value) for value in values]
+    found = function(*(each.astype(np.longdouble) for each in given))
+    if any(each.dtype == np.longdouble for each in given):
         return found
-    return found.astype(np.float64) if given.ndim else float(found)
+    return found.astype(np.float64) if found.ndim else float(found)

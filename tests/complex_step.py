@@ -21,7 +21,19 @@ _FUNCTIONS: dict[Op, Callable[..., np.ndarray]] = {
     Op.SIN: np.sin,
     Op.COS: np.cos,
     Op.SQRT: np.sqrt,
+    Op.ABS: lambda a: np.where(a.real < 0, -a, a),
+    Op.MIN: lambda a, b: np.where(a.real < b.real, a, b),
+    Op.MAX: lambda a, b: np.where(a.real > b.real, a, b),
+    Op.SELECT: lambda a, b, x, y: np.where(a.real < b.real, x, y),
+    Op.EXP: np.exp,
+    Op.TANH: np.tanh,
+    Op.ATAN2: lambda y, x: np.arctan2(y.real, x.real) + 1j * _turn(y, x),
 }
+
+
+def _turn(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """By how much the angle of (x, y) changes along the imaginary parts."""
+    return (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2)
 
 
 def slopes_along(

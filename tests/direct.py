@@ -43,7 +43,7 @@ def declarations(package: PackageView) -> str:
         lines += [prototype.text for prototype in kernel.prototypes.values()]
     lines += [prototype.text for prototype in package.payload.prototypes] if package.payload else []
     lines += [package.bodies.prototype.text] if package.bodies else []
-    lines += [package.friction_prototype.text] if package.info.friction else []
+    lines += [package.friction.prototype.text] if package.friction else []
     return "".join(f"{line};\n" for line in lines)
 
 

@@ -13,7 +13,7 @@ DIGITS = 50
 STEP = 16
 """Minus the decimal exponent of the step: its square is what a difference misses by."""
 
-_MP: dict[Op, Callable[..., mpmath.mpf]] = {
+MP: dict[Op, Callable[..., mpmath.mpf]] = {
     Op.ADD: lambda a, b: a + b,
     Op.SUB: lambda a, b: a - b,
     Op.MUL: lambda a, b: a * b,
@@ -22,7 +22,17 @@ _MP: dict[Op, Callable[..., mpmath.mpf]] = {
     Op.SIN: mpmath.sin,
     Op.COS: mpmath.cos,
     Op.SQRT: mpmath.sqrt,
+    Op.ABS: abs,
+    Op.MIN: min,
+    Op.MAX: max,
+    Op.SELECT: lambda a, b, x, y: x if a < b else y,
+    Op.EXP: mpmath.exp,
+    Op.TANH: mpmath.tanh,
+    Op.LOG: mpmath.log,
+    Op.POW: mpmath.power,
+    Op.ATAN2: mpmath.atan2,
 }
+"""Every operation, by mpmath."""
 
 
 def values(program: Program, point: Mapping[str, list[mpmath.mpf]], of: str, size: int) -> list[mpmath.mpf]:
@@ -34,7 +44,7 @@ def values(program: Program, point: Mapping[str, list[mpmath.mpf]], of: str, siz
         elif instr.value is not None:
             found.append(mpmath.mpf(instr.value))
         else:
-            found.append(_MP[instr.op](*(found[a] for a in instr.args)))
+            found.append(MP[instr.op](*(found[a] for a in instr.args)))
     out = [mpmath.mpf(0)] * size
     for slot, index in program.outputs:
         if slot.vector == of:

@@ -48,7 +48,7 @@ def made_up_record() -> Calibration:
         NumberRow(joint.name, name, value * (1.0 + OFF * STD), STD * value, unit)
         for joint in plant().joints
         for name, unit in UNITS.items()
-        for value in [float(getattr(joint, name))]
+        for value in [joint.friction.get(name, joint.torque_constant)]
     ]
     return Calibration(
         robot="denso_wall",

@@ -8,7 +8,7 @@ import numpy as np
 
 from psdmc.program.check import check
 from psdmc.program.interpret import interpret
-from psdmc.program.program import ARITY, Instr, Op, Program, Slot
+from psdmc.program.program import Instr, Op, Program, Slot
 
 SEEDS = range(30)
 _SIZES = {"tau": 3}
@@ -19,11 +19,14 @@ def random_program(seed: int, length: int = 60) -> Program:
     choose = random.Random(seed)
     body = [Instr(Op.LOAD, slot=Slot(vector, i)) for vector in ("q", "qd") for i in range(3)]
     body += [Instr(Op.CONST, value=value) for value in (0.0, 1.0, -1.0, 2.5, -0.3)]
-    weights = {Op.ADD: 5, Op.SUB: 5, Op.MUL: 8, Op.NEG: 2, Op.SIN: 1, Op.COS: 1}
+    rare = {
+        op: 1 for op in Op if op.arity and op not in (Op.DIV, Op.SQRT, Op.EXP, Op.LOG, Op.POW)
+    }  # these overflow or are NaN
+    weights = rare | {Op.ADD: 10, Op.SUB: 10, Op.MUL: 16, Op.NEG: 4, Op.SIN: 2, Op.COS: 2}
     for _ in range(length):
         op = choose.choices(list(weights), list(weights.values()))[0]
         recent = range(max(0, len(body) - 20), len(body))
-        args = tuple(choose.choice([*range(11), *recent]) for _ in range(ARITY[op]))
+        args = tuple(choose.choice([*range(11), *recent]) for _ in range(op.arity))
         # sums of products would overflow when squared again and again: products take one small factor
         if op is Op.MUL:
             args = (args[0], choose.randrange(11))

@@ -16,16 +16,17 @@ PACKAGE = Path(__file__).parent.parent / "psdmc"
 MAY_IMPORT = {
     "robot": set(),
     "dynamics": {"robot"},
-    "model": {"robot", "dynamics"},
+    "model": {"robot", "dynamics", "friction"},
     "links": {"robot", "dynamics", "model"},
     "derivation": {"robot", "dynamics", "model"},
     "target": set(),
     "program": {"target"},
+    "friction": {"program"},
     "recipes": {"robot", "dynamics", "model", "program"},
     "functions": {"robot", "dynamics", "model", "program", "recipes"},
     "verification": {"robot", "dynamics", "model", "program", "recipes", "functions"},
     "lower": {"robot", "dynamics", "model", "program", "recipes", "functions", "target"},
-    "backends": {"robot", "program", "model", "recipes", "functions", "target"},
+    "backends": {"robot", "program", "friction", "model", "recipes", "functions", "target"},
     "toolchain": {"robot", "backends", "program", "functions", "target"},
 }
 MAY_IMPORT["model_functions"] = set(MAY_IMPORT) - {"links", "derivation", "verification"}
@@ -33,7 +34,7 @@ LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {
     "bench": LEFT_OF_TOOLS | {"lower"},
     "calibration": LEFT_OF_TOOLS,
-    "export": {"robot", "dynamics", "model", "links"},
+    "export": {"robot", "dynamics", "friction", "model", "links"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
     "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
@@ -50,6 +51,7 @@ OUTSIDE = {
     "derivation": {"numpy", "scipy"},
     "verification": {"numpy"},
     "program": {"numpy"},
+    "friction": {"numpy"},
     "recipes": {"numpy"},
     "functions": {"numpy", "pinocchio"},
     "lower": {"numpy", "scipy"},
@@ -104,7 +106,7 @@ ROOMS = {
         },  # paths that it is given: 0117
     },
     "lower": {"expanded": set()},
-    "backends": {"c": set()},
+    "backends": {room: {path.stem for path in (PACKAGE / "backends").glob("*.py")} for room in ("c", "rust")},
 }
 """Rooms within a stage; files of the stage's own folder may import every room."""
 
@@ -350,6 +352,32 @@ def test_no_file_but_the_targets_names_machines():
 
     assert set(named) == {f"templates/{name}" for name in MAY_NAME_MACHINES}
     assert any(machines(path) for path in target.glob("*.py")), "the words are not those that targets use"
+
+
+C_TEXT = re.compile(
+    r"#include|#define|const (real|double|float)\b|\b(double|float|real|char) \*|size_t|static inline|SPLAT"
+    r"|\bvoid [a-z]|/\*|\w\);$",
+    re.MULTILINE,
+)
+WRITE_C = {
+    "backends/c": "the back end of C",
+    "toolchain": "compiles",
+    "bench/rivals": "other programs' C and C++ around theirs and psdmc's",
+    "calibration/identify/lugre.py": "a compiled simulation of its own",
+}
+"""Where C text is, and why."""
+
+
+def test_no_file_but_the_back_end_of_c_writes_c():
+    named = {
+        path.relative_to(PACKAGE).as_posix()
+        for _, path in modules()
+        if any(C_TEXT.search(text) for text in said(path))
+    }
+
+    assert [name for name in sorted(named) if not name.startswith(tuple(WRITE_C))] == []
+    assert all(any(name.startswith(place) for name in named) for place in WRITE_C)
+    assert len([name for name in named if name.startswith("backends/c")]) > 5
 
 
 WEIGHING = ("lower", "program", "backends", "toolchain")

@@ -45,7 +45,6 @@ DECISIONS = {
     "derivation/from_callable.py": "an independent derivation that only tests run",
     "model/mass_check.py": "signs of eigenvalues, printed on the console",
     "model/payload.py": "the sign of a determinant",
-    "model/linear_friction.py": "a calibration's friction, which no model file of derive has",
     "functions/regressor_slotine_li.py": "Pinocchio's side of a comparison",
     "functions/frame_velocity_derivatives.py": "Pinocchio's side of a comparison",
     "lower/carriers.py": "thresholds with margins of decades",
@@ -53,7 +52,7 @@ DECISIONS = {
     "lower/reframe.py": "thresholds with margins of decades",
     "lower/common_normals.py": "thresholds with margins of decades",
     "lower/accuracy.py": "errors that are compared with limits",
-    "backends/c/reference_states.py": "condition numbers, which order states after rounding",
+    "backends/reference_states.py": "condition numbers, which order states after rounding",
 }
 """Files that use such functions for decisions with slack, or for another program's side of a comparison."""
 

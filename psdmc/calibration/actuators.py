@@ -1,24 +1,28 @@
-"""C code for LuGre friction and motors of a calibrated robot, beside that for its rigid bodies."""
+"""C code for friction with a state and for motors of a calibrated robot, beside that for its rigid bodies."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from psdmc.backends.c.names import identifier
 from psdmc.backends.c.render import render
-from psdmc.calibration.identify.lugre import PARAMETERS, Lugre, LugreView
+from psdmc.calibration.identify.state_friction import PARAMETERS, StateLawView
+from psdmc.calibration.logs.log import Array
 from psdmc.errors import InputError
+from psdmc.friction.state import STATE_LAW
 from psdmc.model.calibrated import Calibrated, by_joint
 
 
 @dataclass(frozen=True, slots=True)
-class ActuatorView(LugreView):
+class ActuatorView(StateLawView):
     """The data of the templates. Every joint has friction; torque constants (N m/A) may be missing, all or none."""
 
     robot: str = "robot"
     joint_names: tuple[str, ...] = ()
-    friction: tuple[Lugre, ...] = ()
+    friction: tuple[Array, ...] = ()
     torque_constants: tuple[float, ...] = field(default=())
 
     @property
@@ -38,8 +42,17 @@ class ActuatorView(LugreView):
         return len(self.joint_names)
 
     @property
+    def about(self) -> str:
+        """The law, in a sentence."""
+        return STATE_LAW.about
+
+    @property
+    def headings(self) -> tuple[str, ...]:
+        return PARAMETERS
+
+    @property
     def friction_rows(self) -> list[list[str]]:
-        return [[self.number(value) for value in joint.as_array().tolist()] for joint in self.friction]
+        return [[self.number(value) for value in joint.tolist()] for joint in self.friction]
 
     @property
     def constant_row(self) -> list[str]:
@@ -61,12 +74,12 @@ def actuator_files(view: ActuatorView) -> dict[str, str]:
 def calibrated_actuators(
     robot: str, joint_names: Sequence[str], found: Calibrated, real: str = "double"
 ) -> ActuatorView:
-    """From what a calibration found; InputError where it has no LuGre friction."""
+    """From what a calibration found; InputError where it has no friction with a state."""
     values = by_joint(found.friction)
     missing = [joint for joint in joint_names if any((joint, name) not in values for name in PARAMETERS)]
     if missing:
         raise InputError(
-            f"{robot}: no LuGre friction was identified for joint(s) {', '.join(missing)}",
+            f"{robot}: no friction with a state was identified for joint(s) {', '.join(missing)}",
             "calibrate with friction runs of every joint; friction of one log's fit is in `psdmc emit-c --friction`",
         )
     constants = {row.joint: row.value for row in found.motors}
@@ -74,6 +87,8 @@ def calibrated_actuators(
         real=real,
         robot=robot,
         joint_names=tuple(joint_names),
-        friction=tuple(Lugre(*(values[joint, name] for name in PARAMETERS)) for joint in joint_names),
+        friction=tuple(
+            STATE_LAW.require(np.array([values[joint, name] for name in PARAMETERS])) for joint in joint_names
+        ),
         torque_constants=tuple(constants[joint] for joint in joint_names) if constants else (),
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import Estimate
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_names
+from psdmc.calibration.identify.linear_problem import names_of
 from psdmc.calibration.identify.load_fit import LOAD, LOAD_NAMES, LoadFit, fit_load
 from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
 from psdmc.calibration.identify.physical_load import about_centre, nearest_load
@@ -81,9 +81,7 @@ def identify_payload(
     given = torque_constants or (known_constants if one_quantity(checked_logs) == "current" else None)
     motors = motors_of_logs(model.joint_names, checked_logs, given)
     progress("fitting the load")
-    same_law = friction is not None and friction.shape[1] == len(
-        friction_names(settings.exponents, settings.offset)
-    )
+    same_law = friction is not None and friction.shape[1] == len(names_of(settings.terms))
     found = fit_load(
         model,
         regressor or ChainRegressor(model),
@@ -109,11 +107,9 @@ def _of_calibration(
     found = delivered(model)
     std = np.where(np.isfinite(kept.std), kept.std, 0.0)
     law = found.prediction
-    if law.law != "linear":
+    if not law.is_linear:
         step = step_of(law.steps["inertial"])
         return std, replace(LinearOptions(), filter=step.filter), None, found.constants or None
-    names = friction_names(law.exponents, law.offset)
-    friction = np.array([[found.friction[joint, name] for name in names] for joint in model.joint_names])
     options = LinearOptions(
         filter=step_of(law.steps["all"]).filter,
         exponents=law.exponents,
@@ -121,6 +117,8 @@ def _of_calibration(
         offset=law.offset,
         coupling=law.coupling,
     )
+    names = names_of(options.terms)
+    friction = np.array([[found.friction[joint, name] for name in names] for joint in model.joint_names])
     return std, options, friction, found.constants or None
 
 

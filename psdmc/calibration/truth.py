@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.identify.lugre import PARAMETERS
+from psdmc.calibration.identify.state_friction import PARAMETERS
 from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.plant.virtual_robot import VirtualRobot
 from psdmc.errors import InputError
@@ -68,7 +68,7 @@ def compare(record: Calibrated, true_model: DynamicsModel, robot: VirtualRobot) 
     friction = {
         name: max(
             (
-                _relative(row.value, getattr(joints[row.joint], name))
+                _relative(row.value, joints[row.joint].friction[name])
                 for row in record.friction
                 if row.name == name
             ),

@@ -11,7 +11,7 @@ from psdmc.cli.calibrating import calibrate
 from psdmc.cli.campaigning import excite, simulate
 from psdmc.cli.exporting import export_urdf
 from psdmc.cli.loads import payload
-from psdmc.cli.pipeline import build, cache, check, derive, emit_c
+from psdmc.cli.pipeline import build, cache, check, derive, emit, emit_c
 from psdmc.cli.showing import show
 from psdmc.cli.starting import doctor, new
 from psdmc.version import psdmc_version
@@ -47,6 +47,7 @@ COMMANDS = (
     (show, "print a model or a robot file"),
     (check, "compare a model with Pinocchio and MuJoCo"),
     (emit_c, "write a model's C package"),
+    (emit, "write a model's package in another language"),
     (build, "build a package and run its self-test"),
     (bench, "measure the speed of a model's code and of other programs"),
     (excite, "plan the motions of a calibration"),

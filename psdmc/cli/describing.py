@@ -43,13 +43,14 @@ def require_none(flags: Sequence[str]) -> None:
 
 def fit_choice(cutoff: float | None, split: str | None, friction: Sequence[str] | None) -> FitChoice:
     """The options of the linear fit that the command line gives; InputError where one is none."""
-    from psdmc.calibration.description.table_fit import FitChoice, friction_terms_of, split_of
+    from psdmc.calibration.description.table_fit import FitChoice, split_of
+    from psdmc.friction.terms import EXAMPLE, options_of
 
     exponents, offset = None, None
     if friction:
-        terms = friction_terms_of(names(friction))
+        terms = options_of(names(friction))
         if isinstance(terms, str):
-            raise InputError(f"--friction: {terms}", "write --friction coulomb,viscous,offset")
+            raise InputError(f"--friction: {terms}", f"write --friction {EXAMPLE}")
         exponents, offset = terms
     shares = numbers([split] if split else None, "--split", SPLIT_HINT)
     chosen = None if shares is None else split_of(shares)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Callable
+from functools import wraps
+from inspect import Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -22,6 +25,9 @@ if TYPE_CHECKING:
     from psdmc.model.dynamics_model import DynamicsModel
 
 CHECK_FAILED_STATUS = 5
+
+BACK_ENDS = ("c", "rust")
+"""Those of psdmc.backends.protocol, which loads slowly; a test compares."""
 
 PLAIN_VALUE = re.compile(r"[\w\s.,:/+\-\[\]]*")
 """Words, paths, numbers and lists of them."""
@@ -242,8 +248,16 @@ def check(
     say_what_a_model_is_for(model, found)
 
 
-def emit_c(
+def emit(
     model: ModelFile,
+    backend: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help=f"language of the package: {' or '.join(BACK_ENDS)}",
+            autocompletion=lambda: list(BACK_ENDS),
+        ),
+    ] = BACK_ENDS[0],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="folder to write; default: the model's name"),
@@ -275,7 +289,9 @@ def emit_c(
     ] = None,
     name: Annotated[
         str | None,
-        typer.Option(help="name of the robot in C, the prefix of all symbols; default: the model's"),
+        typer.Option(
+            help="name of the robot in the code, in C the prefix of all symbols; default: the model's"
+        ),
     ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="write into a folder with other files, and replace edited files")
@@ -304,37 +320,36 @@ def emit_c(
         ),
     ] = NATIVE.name,
 ) -> None:
-    """Write a model's C package: header, sources, build files, self-test."""
+    """Write a model's package in a language of choice: sources, build files, self-test."""
     from psdmc import compiler
     from psdmc.backends.c.adapters import lacking
-    from psdmc.backends.c.names import identifier
-    from psdmc.backends.c.write import require_own_folder
+    from psdmc.backends.protocol import back_end
+    from psdmc.backends.write import require_own_folder
     from psdmc.cli.one_line import one_line
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction
     from psdmc.model.load import load
 
+    language = back_end(backend)
     folder = output or Path(model.stem)
     require_own_folder(folder, force)
     found = load(model)
     wanted = names(functions) if functions else None
     with steps() as progress:
-        changed = compiler.emit_c(
+        changed = compiler.emit(
             found,
             folder,
+            backend,
             lowering,  # type: ignore[arg-type]
             wanted,
             real,  # type: ignore[arg-type]
-            trig,  # type: ignore[arg-type]
             name,
             force,
             progress,
-            payload,
-            names(adapters),
+            trig,  # type: ignore[arg-type]
             target,
-            friction,
-            bodies,
+            **{"payload": payload, "with": names(adapters), "friction": friction, "bodies": bodies},
         )
     written = len(changed) - len(changed.removed)
     print(f"{folder}: {written} files written" if changed else f"{folder}: nothing changed")
@@ -345,12 +360,13 @@ def emit_c(
     for before, now in changed.renamed:
         print(f"note: {before} of the old package is now called {now}")
     asked = name or found.mechanism.name
-    in_c = identifier(asked)
-    print(f"{folder / 'include' / in_c / in_c}.h: the header, #include <{in_c}/{in_c}.h>")
-    if in_c != asked:
-        print(f"note: the C name of '{one_line(asked)}' is {in_c}")
+    written_as = language.identifier(asked)
+    file, use = language.entry(written_as)
+    print(f"{folder / file}: {use}")
+    if written_as != asked:
+        print(f"note: the {language.language} name of '{one_line(asked)}' is {written_as}")
     elif output is None and asked != folder.name:
-        print(f"note: the prefix of C names is {asked}; --name changes it")
+        print(f"note: the {language.named} is {asked}; --name changes it")
     for reason in lacking(found.mechanism, names(adapters)):
         work = ", ".join(kernels.wanted(wanted, found.mechanism))
         print(f"note: {reason} (the C code is not affected); CasADi can call, without derivatives: {work}")
@@ -358,7 +374,26 @@ def emit_c(
         print(f"note: {note}")
     for what in beyond_friction(found):
         print(f"note: not in the package, though calibrated: {what}; add its torque to inverse dynamics'")
-    say_next("build", folder)
+    say_next_line(language.next(quoted(folder)))
+
+
+def _without_backend(command: Callable[[], None]) -> Callable[..., None]:
+    """The command `emit` for C, under the name and with the words of `command`."""
+    kept = [each for each in signature(emit, eval_str=True).parameters.values() if each.name != "backend"]
+
+    @wraps(command)
+    def run(**options: Any) -> None:
+        emit(backend="c", **options)
+
+    run.__signature__ = Signature(kept)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in kept}
+    del run.__wrapped__
+    return run
+
+
+@_without_backend
+def emit_c() -> None:
+    """Write a model's C package: header, sources, build files, self-test."""
 
 
 def build(
@@ -380,7 +415,7 @@ def build(
 
 def _after_building(package: Path) -> str:
     """The command that puts a built package to use: installed for its user; compiled for the board that it is made for."""
-    from psdmc.backends.c.own_files import target_of
+    from psdmc.backends.own_files import target_of
 
     target = PRESETS.get(target_of(package) or "")
     if target is not None and target.tools:

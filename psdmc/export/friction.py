@@ -6,13 +6,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from psdmc.model.calibrated import viscous_name
+from psdmc.friction.joints import rows_of
+from psdmc.friction.law import Row
+from psdmc.friction.laws import LAWS
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Joint
 
 ORDINARY_SPEED = 1.0
-"""rad/s (m/s) up to which a viscous law is made a line where the joint has no speed limit."""
+"""rad/s (m/s) up to which friction is made a line where the joint has no speed limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,7 @@ class JointFriction:
 def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
     """Friction by joint name, of joints for which the model was calibrated; empty where it was not.
 
-    Of LuGre friction the Coulomb force and the line nearest to the viscous law remain; of a linear fit all but the offset.
+    Each law says which constant and which line are nearest to it, if any.
     """
     calibrated = model.calibrated
     if calibrated is None:
@@ -41,10 +43,12 @@ def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
         if row.joint in joints and math.isfinite(row.value):
             found.setdefault(row.joint, {})[row.name] = row.value
     law = calibrated.prediction
-    exponents, matrix = ((), ()) if law is None else (law.exponents, law.coupling)
+    word, laws, matrix = ("", LAWS, ()) if law is None else (law.law, law.laws, law.coupling)
     coupled = _coupled(matrix, model.joint_names)
     return {
-        name: JointFriction(0.0, 0.0, (COUPLED,)) if name in coupled else _of(values, joints[name], exponents)
+        name: JointFriction(0.0, 0.0, (COUPLED,))
+        if name in coupled
+        else _of(rows_of(values, word, laws), joints[name])
         for name, values in found.items()
     }
 
@@ -63,33 +67,20 @@ def _coupled(matrix: Sequence[Sequence[float]], names: Sequence[str]) -> set[str
     }
 
 
-def _of(values: Mapping[str, float], joint: Joint, exponents: Sequence[float]) -> JointFriction:
-    constant, lost = values.get("coulomb", 0.0), []
-    if "stiffness" in values:
-        terms = [(values.get("viscous", 0.0), values.get("viscous_exponent", 1.0))]
-        lost += ["the Stribeck effect and bristles of LuGre friction"]
-    else:
-        terms = [
-            (value, d) for d in exponents or (1.0,) if (value := values.get(viscous_name(d))) is not None
-        ]
+def _of(rows: Sequence[Row], joint: Joint) -> JointFriction:
+    constant, damping, lost = 0.0, 0.0, []
     top = joint.limits.speed if math.isfinite(joint.limits.speed) else ORDINARY_SPEED
-    damping = sum(value * _line(d, top) for value, d in terms)
-    if any(d != 1.0 and value for value, d in terms):
-        lost.append(
-            f"a viscous law that is no line (the line nearest to it up to {top:.3g} {joint.type.position_unit}/s is)"
-        )
-    if any(name.startswith(("stribeck_", "load_friction", "coulomb_asymmetry")) for name in values):
-        lost.append("Stribeck effect, asymmetry and load dependence of friction")
-    if values.get("offset"):
-        lost.append("the constant torque (offset)")
+    for term, p in rows:
+        if term.law.line is None:
+            lost += [f"{term.law.about.rstrip('.')} ({term.law.name})"] if any(p) else []
+            continue
+        own = term.law.line(p, term.number or 0.0, top)
+        constant, damping = constant + own[0], damping + own[1]
+        if own[2] and any(p):
+            lost.append(f"{own[2]} (up to {top:.3g} {joint.type.position_unit}/s a line stands for it)")
     if constant < 0.0 or damping < 0.0:
         lost.append("friction that is negative")
     return JointFriction(max(constant, 0.0), max(damping, 0.0), tuple(lost))
-
-
-def _line(exponent: float, top: float) -> float:
-    """The slope s for which s v is the least-squares line to v^exponent over 0 to `top`."""
-    return 1.0 if exponent == 1.0 else 3.0 / (exponent + 2.0) * top ** (exponent - 1.0)
 
 
 def lost_notes(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
@@ -106,6 +97,6 @@ def calibrated_friction_notes(found: Mapping[str, JointFriction]) -> tuple[str, 
     if not found:
         return ()
     return (
-        f"<dynamics> of {len(found)} joints: the calibration's Coulomb friction and damping",
+        f"<dynamics> of {len(found)} joints: the calibration's friction, as a constant and damping",
         *lost_notes(found),
     )

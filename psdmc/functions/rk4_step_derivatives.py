@@ -12,12 +12,25 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.manifold import coordinate_rates, rates_bent, restored, tangent
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.slices import leading
-from psdmc.functions import forward_dynamics_derivatives, rk4_step
+from psdmc.functions import forward_dynamics_derivatives as accelerations
+from psdmc.functions import rk4_step
+from psdmc.program.regions import (
+    Call,
+    Column,
+    For,
+    Reader,
+    Region,
+    Regions,
+    Slice,
+    drop_unread,
+    run,
+    straight,
+)
 from psdmc.program.signature import Signature
 from psdmc.recipes.coordinate_maps import CoordinateMaps
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
-from psdmc.recipes.steps import DT, A, B, step_on_arrays
+from psdmc.recipes.steps import A, B, step_on_arrays, stepped
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 
@@ -25,104 +38,199 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 STEP = rk4_step.RECIPE
-ACCELERATIONS = forward_dynamics_derivatives.RECIPE
+ACCELERATIONS = accelerations.RECIPE
 
-Rows = list[list[Scalar]]
+REACH = (0.5, 0.5, 1.0, 0.0)
+"""Share of the step from the start to the next stage; behind the last one there is none."""
+
+WEIGHT = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
+
 Stage = tuple[Any, Any, Any, Any]
 """At a state: qdd, and its derivatives by q, qd and tau."""
 
 
 def trace(g: Ingredients) -> Outputs:
-    """The arithmetic in one line; in C it is a loop over four calls of forward dynamics' derivatives."""
-    (dt,), pivots = g.inputs[DT.name], []
+    """The regions written out: forward dynamics' derivatives four times, and what they are multiplied with."""
+    nq, nv = len(g.inputs["q"]), len(g.still)
 
-    def at(q: Sequence[Scalar], qd: Sequence[Scalar]) -> Stage:
-        found = forward_dynamics_derivatives.multiplied(
-            replace(g, inputs={**g.inputs, "q": list(q), "qd": list(qd)})
-        )
-        pivots.append(found["pivot"])
-        return found["qdd"], found["dqdd_dq"], found["dqdd_dqd"], found["dqdd_dtau"]
+    def call(_: str, given: list[list[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
+        q, qd, tau = given[0][:nq], given[1][:nv], given[2][:nv]
+        found = accelerations.multiplied(replace(g, inputs={**g.inputs, "q": q, "qd": qd, "tau": tau}))
+        blocks = [[x for row in found[name] for x in row] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau")]
+        return [list(found["qdd"]), *blocks], list(found["pivot"])
 
-    n = len(g.still)
-    q_next, qd_next, slopes = _stepped(g.frames, g.inputs["q"], g.inputs["qd"], dt, at)
-    return {
-        "q_next": q_next,
-        "qd_next": qd_next,
-        "A": [row[: 2 * n] for row in slopes],
-        "B": [row[2 * n :] for row in slopes],
-        "pivot": pivots,
-    }
+    sizes = {"q_next": nq, "qd_next": nv, "A": 4 * nv * nv, "B": 2 * nv * nv}
+    found, pivots = run(regions(g.frames), g.inputs, sizes, call)
+    return {**found, "pivot": pivots}
 
 
-def _start(n: int) -> Rows:
-    """(2 n, 3 n) derivatives of q and qd by q, qd and tau."""
-    return [[1.0 if i == j else 0.0 for j in range(3 * n)] for i in range(2 * n)]
-
-
-def _stepped(
-    frames: Sequence[Frame],
-    q: list[Scalar],
-    qd: list[Scalar],
-    dt: Scalar,
-    at: Callable[[Any, Any], Stage],
-) -> tuple[list[Scalar], list[Scalar], Rows]:
+def regions(frames: Sequence[Frame]) -> Regions:
     """The state after dt and its derivatives: both are the start and a sixth of the stages' slopes, 1, 2, 2, 1 times.
 
     Slopes are those of q's coordinates and of their derivatives; these are along the tangent of q between stages.
+
+    here, there     q and qd of a stage, and
+    by_q, by_v      nv x 3 nv, their derivatives by q, qd and tau, those of q along its tangent
+    rate, turn      nq + nv and nq + nv x 3 nv, slopes of q's coordinates and of qd, and of their derivatives by the same
+    start           the derivatives of coordinates and qd at the start
+    total, totals   sums of slopes
     """
-    nq, n, start = len(q), len(qd), [*q, *qd]
-    by = _start(n)
-    unit = [*_by_column(lambda way: coordinate_rates(frames, q, way), by[:n]), *by[n:]]
-    rates: list[list[Scalar]] = []
-    turns: list[Rows] = []
+    nq, nv = (sum(getattr(frame.joint, size) for frame in leading(frames)) for size in ("nq", "nv"))
+    width, rows = 3 * nv, nq + nv
 
-    def moved(part: Scalar, rate: Sequence[Scalar], turn: Rows) -> tuple[list[Scalar], list[Scalar], Rows]:
-        state = [x + part * own for x, own in zip(start, rate, strict=True)]
-        rows = [_added(row, part, own) for row, own in zip(unit, turn, strict=True)]
-        along = _by_column(lambda way: tangent(frames, state[:nq], way), rows[:nq])
-        return restored(frames, state[:nq]), state[nq:], [*along, *rows[nq:]]
+    def begun(read: Reader) -> dict[str, Column]:
+        q, qd = read("q", nq), read("qd", nv)
+        own = {"q0": q, "here": q, "v0": qd, "there": qd, "load": read("tau", nv), "step": read("dt", 1)}
+        return {name: Column(values) for name, values in own.items()}
 
-    here, there = q, qd
-    for part in (0.5 * dt, 0.5 * dt, dt, None):
-        qdd, by_q, by_qd, by_tau = at(here, there)
-        rates.append([*coordinate_rates(frames, here, there), *qdd])
-        turns.append([*_coordinates(frames, here, there, by), *_chained(by_q, by_qd, by_tau, by, n)])
-        if part is not None:
-            here, there, by = moved(part, rates[-1], turns[-1])
-    sixth = (1.0 / 6.0) * dt
-    return moved(sixth, _weighted(rates), [_weighted(rows) for rows in zip(*turns, strict=True)])
+    def started(read: Reader) -> dict[str, Column]:
+        return {"start_k": Column(coordinate_rates(frames, read("here", nq), read("unit", nv, width)), width)}
+
+    def rated(read: Reader) -> dict[str, Column]:
+        return {"rate": Column(coordinate_rates(frames, read("here", nq), read("there", nv)))}
+
+    def turned(read: Reader) -> dict[str, Column]:
+        q, qd = read("here", nq), read("there", nv)
+        own = coordinate_rates(frames, q, read("by_v_k", nv, width))
+        bent = rates_bent(frames, q, qd, read("by_q_k", nv, width))
+        return {"turn_k": Column([x + y for x, y in zip(own, bent, strict=True)], width)}
+
+    def chained(read: Reader) -> dict[str, Column]:
+        by_q = zip(read("to_q_i", nv), read("by_q_k", nv, width), strict=True)
+        by_v = zip(read("to_v_i", nv), read("by_v_k", nv, width), strict=True)
+        products = [a * b for a, b in (*by_q, *by_v)]
+        return {"entry": Column([sum(products[1:], products[0])])}
+
+    chain = For(
+        nv,
+        (
+            Slice("row", "turn", nq * width, width),
+            *(Slice(f"{name}_i", name, 0, nv) for name in ("to_q", "to_v", "to_tau")),
+        ),
+        (
+            For(
+                width,
+                (Slice("entry", "row"), Slice("by_q_k", "by_q"), Slice("by_v_k", "by_v")),
+                (straight(chained),),
+            ),
+            _added(nv, Slice("entry", "row", 2 * nv), Slice("other", "to_tau_i")),
+        ),
+    )
+    stage = (
+        Call(
+            ACCELERATIONS.name,
+            (("here", 0), ("there", 0), ("load", 0)),
+            (("rate", nq), ("to_q", 0), ("to_v", 0), ("to_tau", 0)),
+            nv,
+        ),
+        straight(rated),
+        For(
+            width,
+            (Slice("turn_k", "turn"), Slice("by_q_k", "by_q"), Slice("by_v_k", "by_v")),
+            (straight(turned),),
+        ),
+        chain,
+        _added(rows, Slice("entry", "total"), Slice("other", "rate"), "weight_k"),
+        _added(rows * width, Slice("entry", "totals"), Slice("other", "turn"), "weight_k"),
+        *_moved(frames, nq, nv, "rate", "turn", "reach_k"),
+    )
+    body = (
+        straight(begun),
+        _filled("by_q", nv * width),
+        _filled("by_v", nv * width),
+        _diagonal(nv, Slice("entry", "by_q", 0, width + 1)),
+        _diagonal(nv, Slice("entry", "by_v", nv, width + 1)),
+        _filled("start", rows * width),
+        For(nv, (Slice("start_k", "start"), Slice("unit", "by_v", nv)), (straight(started),)),
+        _diagonal(nv, Slice("entry", "start", nq * width + nv, width + 1)),
+        _filled("total", rows),
+        _filled("totals", rows * width),
+        For(4, (Slice("reach_k", "reach"), Slice("weight_k", "weight")), stage),
+        *_moved(frames, nq, nv, "total", "totals"),
+        straight(lambda read: {"q_next": Column(read("here", nq)), "qd_next": Column(read("there", nv))}),
+        *(
+            _copied(nv, 2 * nv, (name, 0, width), ("A", k * 2 * nv * nv))
+            for k, name in enumerate(("by_q", "by_v"))
+        ),
+        *(
+            _copied(nv, nv, (name, 2 * nv, width), ("B", k * nv * nv))
+            for k, name in enumerate(("by_q", "by_v"))
+        ),
+    )
+    vectors = {"q0": nq, "here": nq, "x": nq, "v0": nv, "there": nv, "load": nv, "step": 1, "share": 1}
+    vectors |= dict.fromkeys(("rate", "total"), rows) | dict.fromkeys(("to_q", "to_v", "to_tau"), nv * nv)
+    matrices = dict.fromkeys(("by_q", "by_v"), nv * width) | dict.fromkeys(
+        ("start", "turn", "totals"), rows * width
+    )
+    return drop_unread(Regions(vectors | matrices, body, {"reach": REACH, "weight": WEIGHT}))
 
 
-def _coordinates(frames: Sequence[Frame], q: Sequence[Scalar], qd: Sequence[Scalar], by: Rows) -> Rows:
-    """Derivatives of the rates of q's coordinates by what the state's derivatives are by."""
-    n = len(qd)
-    own = _by_column(lambda way: coordinate_rates(frames, q, way), by[n:])
-    bent = _by_column(lambda way: rates_bent(frames, q, qd, way), by[:n])
-    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(own, bent, strict=True)]
+def _moved(
+    frames: Sequence[Frame], nq: int, nv: int, rate: str, turn: str, reach: str | None = None
+) -> tuple[Region, ...]:
+    """Where slopes lead from the start in a share of the step: a state, and its derivatives."""
+    width = 3 * nv
+
+    def moved(read: Reader) -> dict[str, Column]:
+        step = read("step", 1)[0]
+        share = step * read(reach, 1)[0] if reach else step
+        own = read(rate, nq + nv)
+        x = stepped(read("q0", nq), own[:nq], share)
+        there, here = stepped(read("v0", nv), own[nq:], share), restored(frames, x)
+        return {
+            name: Column(values)
+            for name, values in {"x": x, "here": here, "there": there, "share": [share]}.items()
+        }
+
+    def along(read: Reader) -> dict[str, Column]:
+        way = stepped(read("start_k", nq, width), read("turn_k", nq, width), read("share", 1)[0])
+        return {"by_q_k": Column(tangent(frames, read("x", nq), way), width)}
+
+    def pushed(read: Reader) -> dict[str, Column]:
+        return {"entry": Column(stepped(read("own", 1), read("other", 1), read("share", 1)[0]))}
+
+    first = nq * width
+    return (
+        straight(moved),
+        For(
+            width,
+            (Slice("by_q_k", "by_q"), Slice("start_k", "start"), Slice("turn_k", turn)),
+            (straight(along),),
+        ),
+        For(
+            nv * width,
+            (Slice("entry", "by_v"), Slice("own", "start", first), Slice("other", turn, first)),
+            (straight(pushed),),
+        ),
+    )
 
 
-def _by_column(function: Callable[[Sequence[Scalar]], Sequence[Scalar]], rows: Rows) -> Rows:
-    """The rows whose columns are the function's values of these rows' columns."""
-    return [list(row) for row in zip(*(function(column) for column in zip(*rows, strict=True)), strict=True)]
+def _filled(array: str, count: int) -> For:
+    """All entries are zero."""
+    return For(count, (Slice("entry", array),), (straight(lambda read: {"entry": Column([0.0])}),))
 
 
-def _chained(by_q: Rows, by_qd: Rows, by_tau: Rows, by: Rows, n: int) -> Rows:
-    """Derivatives of the accelerations by what the state's derivatives are by."""
-    found = []
-    for row_q, row_qd, row_tau in zip(by_q, by_qd, by_tau, strict=True):
-        row: list[Scalar] = [*[0.0] * (2 * n), *row_tau]
-        for factor, own in zip([*row_q, *row_qd], by, strict=True):
-            row = _added(row, factor, own)
-        found.append(row)
-    return found
+def _diagonal(count: int, entry: Slice) -> For:
+    """These entries are one."""
+    return For(count, (entry,), (straight(lambda read: {"entry": Column([1.0])}),))
 
 
-def _added(row: Sequence[Scalar], factor: Scalar, other: Sequence[Scalar]) -> list[Scalar]:
-    return [x + factor * y for x, y in zip(row, other, strict=True)]
+def _added(count: int, entry: Slice, other: Slice, factor: str | None = None) -> For:
+    """Each entry becomes its sum with another one, times a factor."""
+
+    def added(read: Reader) -> dict[str, Column]:
+        more = read("other", 1)[0]
+        return {"entry": Column([read("entry", 1)[0] + (more * read(factor, 1)[0] if factor else more)])}
+
+    return For(count, (entry, other), (straight(added),))
 
 
-def _weighted(slopes: Sequence[Sequence[Scalar]]) -> list[Scalar]:
-    return [(a + d) + 2.0 * (b + c) for a, b, c, d in zip(*slopes, strict=True)]
+def _copied(rows: int, columns: int, source: tuple[str, int, int], target: tuple[str, int]) -> For:
+    """A block of a matrix (its array, first entry and width), as a matrix (array and first entry)."""
+    (array, first, width), (name, start) = source, target
+    copy = straight(lambda read: {"entry": Column(read("other", 1))})
+    inner = For(columns, (Slice("entry", "into"), Slice("other", "row")), (copy,))
+    return For(rows, (Slice("into", name, start, columns), Slice("row", array, first, width)), (inner,))
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
@@ -195,4 +303,5 @@ RECIPE = Recipe(
     "aba, computeABADerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    regions=regions,
 )

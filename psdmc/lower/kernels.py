@@ -152,12 +152,12 @@ class _Lowered:
         return packed(self.kernel(dense, theta), recipe.signature, columns, places)
 
     def _made(self, recipe: Recipe, theta: bool) -> Kernel:
-        if recipe.signature.calls and self.model.nv > TRACED:
-            return Kernel(recipe.signature, theta, NOTHING, NOTHING, "factored")
-        if recipe.signature.calls:
-            arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
-            program = trace_dynamics(recipe, arranged, self._search(theta).robot)
-            return Kernel(recipe.signature, theta, program, program, "factored")
+        if recipe.regions is not None:
+            regions, program = recipe.regions(self.geometry.unmoved.frames), NOTHING
+            if self.model.nv <= TRACED:
+                arranged = self._arrangement(RECIPES[recipe.shares or recipe.name], theta)
+                program = trace_dynamics(recipe, arranged, self._search(theta).robot)
+            return Kernel(recipe.signature, theta, program, program, "factored", regions=regions)
         candidates: list[Kernel] = []
         expanded = self._expanded(recipe, theta) if self._may_expand(recipe) else None
         if expanded is not None:

@@ -18,7 +18,7 @@ from psdmc.program.limb_cost import StageCost, traced_stage_costs
 from psdmc.program.limb_program import LimbGroup, Spread
 from psdmc.program.program import Op, Program, Slot
 from psdmc.program.signature import Quantity
-from psdmc.program.trace import Symbol, Tracer, constants_of
+from psdmc.program.trace import Symbol, Tracer, arguments_of, constants_of
 from psdmc.recipes.recipe import ByTheta, Recipe
 from psdmc.robot.limbs import Limbs
 
@@ -122,7 +122,7 @@ class _Trace:
             elif op is Op.LOAD:
                 kinds.append(self.vectors.get(a.vector, -1))
             else:
-                kinds.append(-1 if op is Op.CONST else kinds[a])
+                kinds.append(max((kinds[each] for each in arguments_of(steps[k])), default=-1))
         return kinds[index]
 
     def recorded(self) -> Mapping[Slot, Scalar]:

@@ -269,4 +269,4 @@ def _constant(chain: Mechanism, i: int, rotation: Array) -> Array:
 
 
 def _angle_about_z(rotation: Array) -> float:
-    return angle_of(rotation[1, 0], rotation[0, 0])
+    return float(angle_of(rotation[1, 0], rotation[0, 0]))

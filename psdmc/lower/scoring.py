@@ -27,7 +27,11 @@ class Scoring:
         """Operations with the target's weights, plus trigonometry."""
         calls, costs = math.ceil(c.sincos / self.angles_per_sincos), self.costs
         operations = c.total - costs.fused * c.fused + costs.neg * c.neg + costs.div * c.div
-        return operations + costs.sincos * calls + costs.angle * c.sincos
+        states = (
+            costs.angles_per_sincos // self.angles_per_sincos
+        )  # of one vector, which the C library takes one by one
+        chosen = costs.choice * c.choice + costs.call * states * c.call
+        return operations + costs.sincos * calls + costs.angle * c.sincos + chosen
 
 
 def for_one_state(costs: Costs) -> Scoring:

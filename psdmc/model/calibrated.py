@@ -10,13 +10,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.friction.law import Law, Term
+from psdmc.friction.laws import LAWS
+from psdmc.friction.own import laws_of
+from psdmc.friction.terms import every_joint_s, named
 from psdmc.model.grounds import Delay, Ground, OrInf
 from psdmc.robot.mechanism import frozen_array
 
 Array = NDArray[np.float64]
 OrNaN = float
 """A number that may not exist: NaN, null in files."""
-Law = Literal["linear", "lugre"]
+LINEAR = "linear"
+"""The law of friction that is a sum of linear terms."""
 Matrix = tuple[tuple[float, ...], ...]
 """C of q_joint = C q_motor; empty: every motor drives its own joint."""
 Word = Literal["usable", "usable, with doubts", "not usable"]
@@ -79,7 +84,7 @@ class ParameterRow:
 class NumberRow:
     """A number of one joint (or of the spring of that name) with its standard deviation.
 
-    parameters  that belong to a friction term: `exponent` of |v|^d, `speed` of Stribeck's exp(-(v / speed)^2)
+    parameters  the number of a friction term that its name states: `exponent` of |v|^d, `speed` of exp(-(v / speed)^2)
     seen        whether the data determine it
     visibility  what the data show of it: a Remark, empty if that is not known
     """
@@ -156,16 +161,16 @@ class StepUsed:
 class Prediction:
     """Numbers of the prediction that are neither theta_b nor a row of friction or motors.
 
-    law         of friction: linear (Coulomb, viscous terms, offset), or LuGre
+    law         of friction: "linear" (a sum of terms), or the name of a law with a state
     steps       by step: "all" of one log, else motor, gravity, friction, inertial
-    sign_speed  rad/s over which Coulomb friction changes sign, linear law
-    exponents   of the viscous terms, linear law;  offset  whether each joint has one
+    sign_speed  rad/s over which friction changes sign, linear law
+    exponents   of the terms of every joint, linear law;  offset  whether each joint has one
     coupling    of the motors, whose the friction then is, linear law
-    runs        constants of the friction runs by joint, LuGre
-    columns     tables of springs and further friction, linear law (calibration's read_columns)
+    runs        constants of the friction runs by joint, law with a state
+    columns     tables of springs and further friction with users' own laws, linear law (calibration's read_columns)
     """
 
-    law: Law
+    law: str
     steps: Mapping[str, StepUsed]
     sign_speed: float = 0.0
     exponents: tuple[float, ...] = ()
@@ -173,6 +178,21 @@ class Prediction:
     runs: Mapping[str, FrictionRunConstants] = field(default_factory=dict)
     coupling: Matrix = ()
     columns: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_linear(self) -> bool:
+        return self.law == LINEAR
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Linear friction of every joint; ValueError where an exponent is out of range."""
+        return every_joint_s(self.exponents, self.offset)
+
+    @property
+    def laws(self) -> dict[str, Law]:
+        """The laws that values may be of: psdmc's, and the user's own that the tables hold; ValueError where these are
+        damaged."""
+        return LAWS | laws_of(self.columns.get("friction", {}).get("laws", ()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,7 +320,7 @@ class Calibrated:
 
     parameters  base parameters in the model's order: l of them
     motors      torque constants
-    friction    seven per joint, or Coulomb, viscous and further terms, and offset
+    friction    values of each joint's friction law or terms
     steps       table 3's columns, computed from the model file's content
     warnings    a user should read; Remarks where a rule depends on one
     facts       plain figures for people: ranks, condition numbers, singular values
@@ -361,22 +381,8 @@ def by_joint(rows: Iterable[NumberRow]) -> dict[tuple[str, str], float]:
 
 
 def parameters_of(name: str) -> dict[str, float]:
-    """The numbers in the name of a friction term: viscous, viscous^1.5, stribeck_0.1; ValueError for a name that no fit
-    gives."""
-    if name.startswith(STRIBECK) and name != "stribeck_velocity":
-        speed = float(name.removeprefix(STRIBECK))
-        if not 0.0 < speed < math.inf or f"{STRIBECK}{speed!r}" != name:
-            raise ValueError(f"a Stribeck velocity is {name!r}")
-        return {"speed": speed}
-    if name.startswith("viscous^"):
-        return {"exponent": float(name.removeprefix("viscous^"))}
-    return {}
-
-
-STRIBECK = "stribeck_"
-"""Before a Stribeck velocity in the name of a term."""
-
-
-def viscous_name(exponent: float) -> str:
-    """The name of the term |v|^exponent: viscous alone is the one that grows with the speed itself."""
-    return "viscous" if exponent == 1.0 else f"viscous^{exponent:g}"
+    """The number that the name of a friction term states, by what it is: an exponent, a speed."""
+    term, _ = named(name, LAWS) or (None, 0)
+    if term is None or term.number is None or term.law.number is None or term.number == term.law.number.usual:
+        return {}
+    return {term.law.number.key.removesuffix("s"): term.number}

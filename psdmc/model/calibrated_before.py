@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from psdmc.friction.terms import with_present_names
 from psdmc.model import json_values as json
-from psdmc.model.calibrated import IDENTIFIED, parameters_of, viscous_name
+from psdmc.model.calibrated import IDENTIFIED, parameters_of
 
 MOST = 1_000_000
-"""Largest number of rows of a table; a campaign's friction has seven per joint."""
+"""Largest number of rows of a table; a campaign's friction has a few per joint."""
 KINDS = {"reasons": "against", "suspects": "suspected", "doubts": "doubted"}
 """Keys of a verdict's grounds, and its fields."""
 
@@ -86,22 +87,11 @@ def _row(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _named_by_exponents(old: Mapping[str, Any]) -> Sequence[dict[str, Any]]:
-    """Rows of friction, viscous terms called by their exponents. psdmc 0.1 called the first one viscous, whatever its
-    exponent."""
+    """Rows of friction with the present names of terms."""
     rows = _rows(old, "friction")
     law = json.record(old.get("prediction") or {}, "the calibration's prediction")
     exponents = [json.number(each, "an exponent") for each in _entries({"exponents": [], **law}, "exponents")]
-    if not exponents or viscous_name(exponents[0]) in [row.get("name") for row in rows]:
-        return rows
-    first = exponents[0]
-    units = {"Nms/rad": f"Nm (s/rad)^{first:g}", "Ns/m": f"N (s/m)^{first:g}"}
-    renamed = {"viscous": viscous_name(first), "viscous^1": "viscous"}
-    return [
-        row | {"name": renamed[row["name"]], "unit": units.get(str(row.get("unit", "")), row.get("unit", ""))}
-        if json.text(row.get("name"), "a name of the calibration") in renamed
-        else row
-        for row in rows
-    ]
+    return with_present_names(rows, exponents)
 
 
 def _prediction(value: object) -> dict[str, Any]:

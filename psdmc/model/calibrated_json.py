@@ -9,8 +9,10 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from psdmc.friction.terms import WITH_STATE
 from psdmc.model import json_values as json
 from psdmc.model.calibrated import (
+    LINEAR,
     Array,
     Calibrated,
     FrictionRunConstants,
@@ -311,22 +313,27 @@ def _step(name: str, rows: object) -> StepQuality:
 
 def _prediction_of(value: object) -> Prediction:
     law = _text(value, "law")
-    if law not in ("linear", "lugre"):
-        raise ValueError(f"the calibration's law of friction is {law!r}, expected 'linear' or 'lugre'")
+    if law not in (LINEAR, *WITH_STATE):
+        expected = " or ".join(map(repr, (LINEAR, *WITH_STATE)))
+        raise ValueError(f"the calibration's law of friction is {law!r}, expected {expected}")
     coupling = _list(value, "coupling")
     size = len(coupling)
     matrix = json.numbers(coupling, "the calibration's coupling", *([size, size] if size else [0]))
     exponents = _list(value, "exponents")
-    return Prediction(
-        law="linear" if law == "linear" else "lugre",
+    columns = plain(_record(value, "columns"))
+    json.record(columns.get("friction", {}), "the calibration's table of friction")
+    found = Prediction(
+        law=law,
         steps={name: _used(step) for name, step in _record(value, "steps").items()},
         sign_speed=_finite(value, "sign_speed"),
         exponents=tuple(json.number(each, "an exponent") for each in exponents),
         offset=json.flag(_part(value, "offset"), "the calibration's offset"),
         runs={joint: _of(FrictionRunConstants, each) for joint, each in _record(value, "runs").items()},
         coupling=tuple(tuple(row) for row in matrix.tolist()),
-        columns=plain(_record(value, "columns")),
+        columns=columns,
     )
+    _ = found.terms, found.laws  # neither can be damaged from here on
+    return found
 
 
 def _used(step: object) -> StepUsed:

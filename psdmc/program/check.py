@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from psdmc.errors import InternalError
-from psdmc.program.program import ARITY, Instr, Op, Program
+from psdmc.program.program import Instr, Op, Program
 
-_WITH_TWO = frozenset(op for op, count in ARITY.items() if count == 2)
-_WITH_ONE = frozenset(op for op, count in ARITY.items() if count == 1)
+_WITH_TWO = frozenset(op for op in Op if op.arity == 2)
 
 
 def check(program: Program, after: str = "tracing") -> Program:
@@ -38,15 +37,13 @@ def _is_sound(i: int, instr: Instr) -> bool:
         return value is not None and math.isfinite(value) and slot is None and not args
     if slot is not None or value is not None:
         return False
-    if len(args) == 2:
-        return op in _WITH_TWO and 0 <= args[0] < i and 0 <= args[1] < i
-    return len(args) == 1 and op in _WITH_ONE and 0 <= args[0] < i
+    return len(args) == op.arity and all(0 <= a < i for a in args)
 
 
 def _fault(i: int, instr: Instr) -> str:
     """The rule that instruction i breaks, as text."""
     op, args, slot, value = instr
-    if len(args) != ARITY[op]:
+    if len(args) != op.arity:
         return f"t{i} = {op.value} has {len(args)} arguments"
     if args and (min(args) < 0 or max(args) >= i):
         return f"t{i} uses a value that is not defined before it"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from psdmc.program.operations import Unit
 from psdmc.program.program import Op, Program
 
-_ADD, _SUB, _MUL, _DIV, _NEG, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SIN, Op.COS
-_SQRT = Op.SQRT
+_ADD, _SUB, _MUL, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.SIN, Op.COS
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +20,8 @@ class Cost:
     fused   multiplications that a fused multiply-add can absorb: used once, by an addition or subtraction, each of which
             absorbs one
     sincos  distinct angles whose sine or cosine is taken
+    choice  minima, maxima, magnitudes and selections
+    call    elementary functions of the C library
     """
 
     mul: int
@@ -26,6 +30,8 @@ class Cost:
     neg: int
     sincos: int
     fused: int
+    choice: int = 0
+    call: int = 0
 
     @property
     def total(self) -> int:
@@ -34,13 +40,16 @@ class Cost:
 
     def __str__(self) -> str:
         extra = f" + {self.div} div" if self.div else ""
-        return f"{self.mul} mul + {self.add} add{extra} + {self.sincos} sincos"
+        further = ((self.choice, "choice"), (self.call, "call"))
+        more = "".join(f" + {count} {word}" for count, word in further if count)
+        return f"{self.mul} mul + {self.add} add{extra} + {self.sincos} sincos{more}"
 
 
 def cost(program: Program) -> Cost:
     """Operations of the PROGRAM by kind; `fused` counts the sums of which a term is a product without another use."""
     body, uses = program.body, program.uses()
-    mul = add = div = neg = fused = 0
+    mul = add = fused = 0
+    others: list[Op] = []
     angles: set[int] = set()
     for op, args, _, _ in body:
         if op is _MUL:
@@ -49,10 +58,15 @@ def cost(program: Program) -> Cost:
             add += 1
             a, b = args
             fused += (uses[a] == 1 and body[a][0] is _MUL) or (uses[b] == 1 and body[b][0] is _MUL)
-        elif op is _DIV or op is _SQRT:
-            div += 1
-        elif op is _NEG:
-            neg += 1
         elif op is _SIN or op is _COS:
             angles.add(args[0])
-    return Cost(mul, add, div, neg, len(angles), fused)
+        elif args:
+            others.append(op)
+    return counted(others, mul, add, len(angles), fused)
+
+
+def counted(others: Iterable[Op], mul: int, add: int, sincos: int, fused: int) -> Cost:
+    """The cost of so many products, sums and angles, and of other operations by their units."""
+    units = Counter(op.unit for op in others)
+    rest = (units[Unit.DIV], units[Unit.NEG], sincos, fused, units[Unit.CHOICE], units[Unit.CALL])
+    return Cost(mul, add, *rest)

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.program.program import Op, Program
-from psdmc.reproducible import cosine, sine
+from psdmc.program.program import Program, Slot
 
 Array = NDArray[np.float64]
-
-_FUNCTIONS: dict[Op, Callable[..., Array]] = {
-    Op.ADD: np.add,
-    Op.SUB: np.subtract,
-    Op.MUL: np.multiply,
-    Op.DIV: np.divide,
-    Op.NEG: np.negative,
-    Op.SIN: sine,
-    Op.COS: cosine,
-    Op.SQRT: np.sqrt,
-}
 
 
 def interpret(program: Program, inputs: Mapping[str, Array], sizes: Mapping[str, int]) -> dict[str, Array]:
@@ -31,15 +20,27 @@ def interpret(program: Program, inputs: Mapping[str, Array], sizes: Mapping[str,
     """
     given = {name: np.asarray(array, dtype=np.float64) for name, array in inputs.items()}
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in given.values())) if given else ()
-    values: list[Array] = []
-    for instr in program.body:
-        if instr.slot is not None:
-            values.append(given[instr.slot.vector][..., instr.slot.index])
-        elif instr.value is not None:
-            values.append(np.float64(instr.value))  # type: ignore[arg-type]
-        else:
-            values.append(_FUNCTIONS[instr.op](*(values[a] for a in instr.args)))
+
+    def load(slot: Slot) -> Array:
+        return given[slot.vector][..., slot.index]
+
     out = {name: np.zeros((*shape, size)) for name, size in sizes.items()}
-    for slot, index in program.outputs:
-        out[slot.vector][..., slot.index] = values[index]
+    for slot, value in evaluated(program, load, np.float64):
+        out[slot.vector][..., slot.index] = value
     return out
+
+
+def evaluated(
+    program: Program, load: Callable[[Slot], Any], constant: Callable[[float], Any] = float
+) -> list[tuple[Slot, Any]]:
+    """The outputs of a PROGRAM on any scalars: numbers, arrays or symbols."""
+    values: list[Any] = []
+    for op, args, slot, value in program.body:
+        if args:
+            given = [values[a] for a in args]
+            values.append(op.numbers(*given) if op.written else op(*given))
+        elif slot is not None:
+            values.append(load(slot))
+        elif value is not None:
+            values.append(constant(value))
+    return [(slot, values[index]) for slot, index in program.outputs]

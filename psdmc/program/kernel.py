@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from psdmc.program.limb_program import LimbProgram, unpacked
 from psdmc.program.program import Program
+from psdmc.program.regions import Regions
 from psdmc.program.signature import Signature
 
 
@@ -15,7 +16,7 @@ class Kernel:
 
     function  which quantities it reads and writes
     theta     whether it also reads theta_b, the base parameters, at run time
-    single    arithmetic in an order for one state; empty for a loop of calls
+    single    arithmetic in an order for one state; empty where `regions` are too long to be written out
     batch     arithmetic in an order for one state per SIMD lane; may be the same object
     lowering  how it was made: 'expanded' or 'factored'
     before    where the function's products are multiplied in loops: the arithmetic in front of them, for one state and for
@@ -23,6 +24,7 @@ class Kernel:
     places    of a function that packs a matrix: (row, column) of each entry that it puts out
     limbs     the same for one state, limbs of equal structure in the lanes of vectors, for machines whose vectors make it
               worth while; None: none do
+    regions   the same as loops and calls, which the C is made of; None: it is made of the straight lines
     """
 
     function: Signature
@@ -33,6 +35,7 @@ class Kernel:
     before: Program | None = None
     limbs: LimbProgram | None = None
     places: tuple[tuple[int, int], ...] = ()
+    regions: Regions | None = None
 
     def __post_init__(self) -> None:
         inputs = set(self.inputs)

@@ -10,12 +10,12 @@ from psdmc.errors import InternalError
 from psdmc.program.check import check
 from psdmc.program.kernel import Kernel
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Spread, Stage
+from psdmc.program.operations import BY_WORD
 from psdmc.program.program import Instr, Op, Program, Slot
+from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight
 from psdmc.program.signature import Signature
 
-_OPERATIONS = {op.value: op for op in Op}
-
-FORMAT = 4
+FORMAT = 5
 """Version of the text's form."""
 
 
@@ -40,6 +40,7 @@ def _kernel_to_plain(kernel: Kernel) -> dict[str, Any]:
         "before": None if kernel.before is None else _program_to_plain(kernel.before),
         "limbs": None if kernel.limbs is None else _limbs_to_plain(kernel.limbs),
         "places": kernel.places,
+        "regions": None if kernel.regions is None else _regions_to_plain(kernel.regions),
     }
 
 
@@ -65,7 +66,45 @@ def _kernel_from_plain(entry: Mapping[str, Any], functions: Mapping[str, Signatu
     limbs = None if entry["limbs"] is None else _limbs_from_plain(entry["limbs"])
     places = tuple((row, column) for row, column in entry["places"])
     function, theta, lowering = functions[entry["function"]], entry["theta"], entry["lowering"]
-    return Kernel(function, theta, single, batch, lowering, before, limbs, places)
+    regions = None if entry["regions"] is None else _regions_from_plain(entry["regions"])
+    return Kernel(function, theta, single, batch, lowering, before, limbs, places, regions)
+
+
+def _regions_to_plain(body: Regions) -> dict[str, Any]:
+    return {
+        "arrays": dict(body.arrays),
+        "constants": dict(body.constants),
+        "regions": list(map(_region_to_plain, body.regions)),
+    }
+
+
+def _region_to_plain(region: Region) -> dict[str, Any]:
+    if isinstance(region, Straight):
+        return {"straight": _program_to_plain(region.program)}
+    if isinstance(region, Call):
+        return {
+            "call": region.function,
+            "given": region.given,
+            "found": region.found,
+            "pivots": region.pivots,
+        }
+    slices = [[each.name, each.array, each.first, each.stride] for each in region.slices]
+    return {"count": region.count, "slices": slices, "regions": list(map(_region_to_plain, region.regions))}
+
+
+def _regions_from_plain(plain: Any) -> Regions:
+    constants = {name: tuple(map(float, values)) for name, values in plain["constants"].items()}
+    return Regions(plain["arrays"], tuple(map(_region_from_plain, plain["regions"])), constants)
+
+
+def _region_from_plain(plain: Any) -> Region:
+    if "straight" in plain:
+        return Straight(_program_from_plain(plain["straight"]))
+    if "call" in plain:
+        given, found = (tuple((name, first) for name, first in plain[key]) for key in ("given", "found"))
+        return Call(plain["call"], given, found, plain["pivots"])
+    slices = tuple(Slice(*each) for each in plain["slices"])
+    return For(plain["count"], slices, tuple(map(_region_from_plain, plain["regions"])))
 
 
 def _limbs_to_plain(limbs: LimbProgram) -> dict[str, Any]:
@@ -111,7 +150,7 @@ def _program_from_plain(plain: Any) -> Program:
         return slots.setdefault((vector, index), Slot(vector, index))
 
     def instruction(word: str, *rest: Any) -> Instr:
-        op = _OPERATIONS[word]
+        op = BY_WORD[word]
         if op is Op.LOAD:
             return Instr(op, slot=slot_of(*rest))
         return Instr(op, value=float(rest[0])) if op is Op.CONST else Instr(op, rest)

@@ -56,6 +56,15 @@ class Lanes:
         """Sine and cosine of angles in rad."""
         return lanes(self.group, list(map(sin, self.values))), lanes(self.group, list(map(cos, self.values)))
 
+    def operated(self, operation: Callable[..., float], arguments: Sequence[Scalar]) -> Scalar:
+        """An operation's value limb by limb; NotImplemented beside a symbol."""
+        if not all(isinstance(each, Lanes | float | int) for each in arguments):
+            return NotImplemented
+        columns = [
+            each.values if isinstance(each, Lanes) else [float(each)] * len(self.values) for each in arguments
+        ]
+        return lanes(self.group, [float(operation(*row)) for row in zip(*columns, strict=True)])
+
     def _with(self, other: float | Lanes, operation: Callable[[float, float], float]) -> float | Lanes:
         if isinstance(other, Lanes):
             if other.group != self.group:

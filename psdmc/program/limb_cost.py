@@ -10,13 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from psdmc.errors import InternalError
-from psdmc.program.cost import Cost, cost
+from psdmc.program.cost import Cost, cost, counted
 from psdmc.program.limb_program import LimbGroup, LimbProgram
 from psdmc.program.program import Op, Slot
-from psdmc.program.trace import Step
+from psdmc.program.trace import Step, arguments_of
 
-_ADD, _SUB, _MUL, _DIV, _NEG = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG
-_LOAD, _CONST, _SQRT = Op.LOAD, Op.CONST, Op.SQRT
+_LOAD, _CONST, _MUL = Op.LOAD, Op.CONST, Op.MUL
+_ADD, _SUB, _SIN, _COS = Op.ADD, Op.SUB, Op.SIN, Op.COS
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +39,15 @@ def stage_costs(limbs: LimbProgram) -> Iterator[StageCost]:
     """Of a function that is cut into stages."""
     groups = {group.number: group for group in limbs.groups}
     for stage in limbs.stages:
-        counted = cost(stage.program)
+        own_cost = cost(stage.program)
         if stage.group is None:
-            yield StageCost(None, counted, 0, 0)
+            yield StageCost(None, own_cost, 0, 0)
             continue
         group = groups[stage.group]
         own = {group.constant, group.kept} | {slot.vector for slot, _ in group.inputs}
         shared = sum(slot.vector not in own for slot in stage.program.inputs())
         sums = sum(slot.vector == group.partial for slot, _ in stage.program.outputs)
-        yield StageCost(stage.group, counted, shared, sums)
+        yield StageCost(stage.group, own_cost, shared, sums)
 
 
 def traced_stage_costs(
@@ -83,8 +83,9 @@ def _needed(
             if i in partial_of:
                 partials.append(partial_of[i])
                 needed[partial_of[i]] = 1
-        elif op is not _CONST:
-            needed[a] = 1
+        else:
+            for argument in arguments_of(steps[i]):
+                needed[argument] = 1
     return needed, partials
 
 
@@ -92,14 +93,14 @@ def _needed(
 class _Stage:
     """Counts of a stage.
 
+    others  its operations but products, sums and sines
     added   arguments of its sums and differences
     angles  whose sine or cosine is taken
     shared  core's values that it reads
     """
 
     mul: int = 0
-    div: int = 0
-    neg: int = 0
+    others: list[Op] = field(default_factory=list)
     sums: int = 0
     added: list[tuple[int, int]] = field(default_factory=list)
     angles: set[int] = field(default_factory=set)
@@ -145,27 +146,23 @@ class _Count:
             self.is_free[i] = 1
         elif op is _LOAD:
             self._load(i, a)
-        elif b is None:
-            place = self.place[i] = self.place[a]
-            stage = self._stage(place)
-            self._read(a, place)
-            if op is _NEG:
-                stage.neg += 1
-            elif op is _SQRT:
-                stage.div += 1
-            else:
-                stage.angles.add(a)
         else:
-            place = self.place[i] = self._meeting(self.place[a], self.place[b])
+            arguments = arguments_of(step)
+            place = self.place[arguments[0]]
+            for argument in arguments[1:]:
+                place = self._meeting(place, self.place[argument])
+            self.place[i] = place
             stage = self._stage(place)
-            self._read(a, place)
-            self._read(b, place)
+            for argument in arguments:
+                self._read(argument, place)
             if op is _MUL:
                 stage.mul += 1
-            elif op is _DIV:
-                stage.div += 1
-            else:
+            elif op is _ADD or op is _SUB:
                 stage.added.append((a, b))
+            elif op is _SIN or op is _COS:
+                stage.angles.add(a)
+            else:
+                stage.others.append(op)
 
     def _load(self, i: int, slot: Slot) -> None:
         summed = self.partial_of.get(i)
@@ -216,8 +213,8 @@ class _Count:
     def _cost(self, place: int) -> StageCost:
         stage, group = self.stages[place], place % self.kinds
         fused = sum(self._absorbs(a, place) or self._absorbs(b, place) for a, b in stage.added)
-        counted = Cost(stage.mul, len(stage.added), stage.div, stage.neg, len(stage.angles), fused)
-        return StageCost(group - 1 if group else None, counted, len(stage.shared), stage.sums)
+        own = counted(stage.others, stage.mul, len(stage.added), len(stage.angles), fused)
+        return StageCost(group - 1 if group else None, own, len(stage.shared), stage.sums)
 
     def _absorbs(self, value: int, place: int) -> bool:
         """Whether a value is a product that nothing else in its stage uses."""

@@ -4,38 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import NamedTuple
 
-
-class Op(StrEnum):
-    """Operations of a PROGRAM's instructions; their words are those of its text form."""
-
-    LOAD = "load"
-    CONST = "const"
-    ADD = "add"
-    SUB = "sub"
-    MUL = "mul"
-    DIV = "div"
-    NEG = "neg"
-    SIN = "sin"
-    COS = "cos"
-    SQRT = "sqrt"
-
-
-ARITY = {
-    Op.LOAD: 0,
-    Op.CONST: 0,
-    Op.ADD: 2,
-    Op.SUB: 2,
-    Op.MUL: 2,
-    Op.DIV: 2,
-    Op.NEG: 1,
-    Op.SIN: 1,
-    Op.COS: 1,
-    Op.SQRT: 1,
-}
-COMMUTATIVE = frozenset({Op.ADD, Op.MUL})
+from psdmc.program.operations import Op as Op
 
 
 class Slot(NamedTuple):
@@ -61,7 +32,10 @@ class Instr(NamedTuple):
         args = self.args
         if not args:
             return self
-        moved = (new_index[args[0]], new_index[args[1]]) if len(args) == 2 else (new_index[args[0]],)
+        if len(args) == 2:
+            moved: tuple[int, ...] = (new_index[args[0]], new_index[args[1]])
+        else:
+            moved = tuple([new_index[a] for a in args])
         return self if moved == args else operation(self.op, moved)
 
     def canonical(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
@@ -71,7 +45,7 @@ class Instr(NamedTuple):
         if len(args) != 2:
             return self.renumbered(new_index)
         first, second = new_index[args[0]], new_index[args[1]]
-        if first > second and self.op in COMMUTATIVE:
+        if first > second and self.op.operation.commutative:
             first, second = second, first
         moved = (first, second)
         return self if moved == args else operation(self.op, moved)

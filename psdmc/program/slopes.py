@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from psdmc.errors import InternalError
-from psdmc.program.program import Op
 from psdmc.program.trace import Number, Symbol, Tracer
 from psdmc.program.turned_pairs import TurnedPairs
 
@@ -88,22 +87,10 @@ class _Sources:
             yield turned.angle, turned.slope
             yield from turned.parts
             return
-        op, a, b = self.tracer.steps[index]
-        if op in (Op.ADD, Op.SUB):
-            yield from ((a, 1.0), (b, 1.0 if op is Op.ADD else -1.0))
-        elif op is Op.MUL:
-            yield from ((a, self._value(b)), (b, self._value(a)))
-        elif op is Op.DIV:
-            reciprocal = 1.0 / self._value(b)
-            yield from ((a, reciprocal), (b, -(self._value(index) * reciprocal)))
-        elif op is Op.NEG:
-            yield a, -1.0
-        elif op is Op.SQRT:
-            yield a, 0.5 / self._value(index)
-        elif op is Op.SIN:
-            yield a, self._value(a).sincos()[1]
-        elif op is Op.COS:
-            yield a, -self._value(a).sincos()[0]
+        arguments = self.tracer.arguments(index)
+        if arguments:
+            op, symbols = self.tracer.steps[index][0], map(self._value, arguments)
+            yield from zip(arguments, op.operation.partials(self._value(index), *symbols), strict=True)
 
     def _value(self, index: int) -> Symbol:
         return Symbol(self.tracer, index)

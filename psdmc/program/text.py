@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from psdmc.program.program import ARITY, Instr, Op, Program, Slot
+from psdmc.program.operations import BY_WORD
+from psdmc.program.program import Instr, Op, Program, Slot
 
 _SLOT = re.compile(r"([A-Za-z_]\w*)\[(\d+)\]")
 
@@ -45,14 +46,14 @@ def parse(text: str) -> Program:
 
 
 def _instruction(words: list[str], names: dict[str, int]) -> Instr:
-    op = Op(words[0])
+    op = BY_WORD[words[0]]
     if op is Op.LOAD:
         return Instr(op, slot=_slot(words[1]))
     if op is Op.CONST:
         return Instr(op, value=float(words[1]))
     args = tuple(names[word] for word in words[1:])
-    if len(args) != ARITY[op]:
-        raise ValueError(f"{op.value} takes {ARITY[op]} arguments")
+    if len(args) != op.arity:
+        raise ValueError(f"{op.value} takes {op.arity} arguments")
     return Instr(op, args)
 
 

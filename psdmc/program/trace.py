@@ -10,12 +10,11 @@ which become instructions only in `finish`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import compress
 from typing import Any
 
-from psdmc.program.cost import Cost
+from psdmc.program.cost import Cost, counted
 from psdmc.program.lanes import Lanes
 from psdmc.program.program import Instr, Op, Program, Slot, operation
 
@@ -24,10 +23,21 @@ Constant = Number | Lanes
 """What is known when code is generated: a number, or one for each limb of a group."""
 
 Step = tuple[Op, Any, Any]
-"""An instruction while it is recorded: its operation and two arguments; of a load the slot, of a constant the value."""
+"""An instruction while it is recorded: its operation and its argument or two; of more arguments their tuple, of a load the
+slot, of a constant the value."""
 
 _ADD, _SUB, _MUL, _DIV, _NEG, _SIN, _COS = Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SIN, Op.COS
-_LOAD, _CONST, _SQRT = Op.LOAD, Op.CONST, Op.SQRT
+_LOAD, _CONST = Op.LOAD, Op.CONST
+
+
+def arguments_of(step: Step) -> tuple[int, ...]:
+    """The indices of the values that a step is computed from."""
+    op, a, b = step
+    if b is not None:
+        return (a, b)
+    if op is _LOAD or op is _CONST:
+        return ()
+    return a if type(a) is tuple else (a,)
 
 
 Outputs = Sequence[tuple[Slot, "Symbol | Constant"]]
@@ -104,10 +114,7 @@ class Tracer:
 
     def arguments(self, index: int) -> tuple[int, ...]:
         """The indices of the values that a step is computed from."""
-        op, a, b = self.steps[index]
-        if b is not None:
-            return (a, b)
-        return () if op is _LOAD or op is _CONST else (a,)
+        return arguments_of(self.steps[index])
 
     def finish(self, outputs: Outputs) -> Program:
         """The PROGRAM that stores the given values; a negative one costs a negation. Steps that no output needs are left
@@ -119,11 +126,12 @@ class Tracer:
             needed[index] = True
         for i in range(len(steps) - 1, -1, -1):
             if needed[i]:
-                op, a, b = steps[i]
+                _, a, b = steps[i]
                 if b is not None:
                     needed[a] = needed[b] = True
-                elif op is not _LOAD and op is not _CONST:
-                    needed[a] = True
+                else:
+                    for argument in arguments_of(steps[i]):
+                        needed[argument] = True
         places = [0] * len(steps)
         body: list[Instr] = []
         for i in compress(range(len(steps)), needed):
@@ -138,8 +146,9 @@ class Tracer:
         steps, uses = self.steps, [0] * len(self.steps)
         for _, index in stored:
             uses[index] += 1
-        mul = div = neg = fused = 0
+        mul = fused = 0
         sums: list[Step] = []
+        others: list[Op] = []
         angles: set[int] = set()
         for used, step in zip(reversed(uses), reversed(steps), strict=True):
             if not used:  # by what lies behind: it has been counted
@@ -150,22 +159,21 @@ class Tracer:
                 uses[b] += 1
                 if op is _MUL:
                     mul += 1
-                elif op is _DIV:
-                    div += 1
-                else:
+                elif op is _ADD or op is _SUB:
                     sums.append(step)
-            elif op is not _LOAD and op is not _CONST:
-                uses[a] += 1
-                if op is _NEG:
-                    neg += 1
-                elif op is _SQRT:
-                    div += 1
                 else:
+                    others.append(op)
+            elif op is not _LOAD and op is not _CONST:
+                for argument in arguments_of(step):
+                    uses[argument] += 1
+                if op is _SIN or op is _COS:
                     angles.add(a)
+                else:
+                    others.append(op)
         for _, a, b in sums:
             if (uses[a] == 1 and steps[a][0] is _MUL) or (uses[b] == 1 and steps[b][0] is _MUL):
                 fused += 1
-        return Cost(mul, len(sums), div, neg, len(angles), fused)
+        return counted(others, mul, len(sums), len(angles), fused)
 
     def stored(self, outputs: Outputs) -> list[tuple[Slot, int]]:
         """The outputs with the indices of their values, recorded where they are constants or negative."""
@@ -173,14 +181,32 @@ class Tracer:
         for slot, value in outputs:
             if isinstance(value, Lanes):
                 value = self.constant(value)
-            if not isinstance(value, Symbol):
-                index = self.magnitude(float(value) + 0.0)
-            elif value.negative:
-                index = self.record((_NEG, value.index, None))
+            if isinstance(value, Symbol):
+                stored.append((slot, self._unsigned(value)))
             else:
-                index = value.index
-            stored.append((slot, index))
+                stored.append((slot, self.magnitude(float(value) + 0.0)))
         return stored
+
+    def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
+        """An operation that symbols have no operator for; of numbers a constant, where it is finite."""
+        given = [each if isinstance(each, Symbol) else self.constant(each) for each in arguments]
+        known = [value for each in given if isinstance(value := each.constant_value(), float)]
+        if len(known) == len(given):
+            folded = op.of_numbers(known)
+            if folded is not None:
+                return self.constant(folded)
+        negative = bool(op.operation.parity) and given[0].negative
+        if negative:
+            given[0] = -given[0]
+        indices = [self._unsigned(each) for each in given]
+        if op.operation.commutative:
+            indices.sort()
+        first, second = indices if op.arity == 2 else (indices[0] if op.arity == 1 else tuple(indices), None)
+        return Symbol(self, self.record((op, first, second)), negative and op.operation.parity == "odd")
+
+    def _unsigned(self, value: Symbol) -> int:
+        """The index of a value with its sign; a negative one costs a negation."""
+        return self.record((_NEG, value.index, None)) if value.negative else value.index
 
 
 def _instruction(step: Step, places: Sequence[int]) -> Instr:
@@ -189,7 +215,11 @@ def _instruction(step: Step, places: Sequence[int]) -> Instr:
         return operation(op, (places[a], places[b]))
     if op is _LOAD:
         return Instr(op, slot=a)
-    return Instr(op, value=a) if op is _CONST else operation(op, (places[a],))
+    return (
+        Instr(op, value=a)
+        if op is _CONST
+        else operation(op, tuple([places[each] for each in arguments_of(step)]))
+    )
 
 
 class Symbol:
@@ -259,11 +289,11 @@ class Symbol:
 
     def root(self) -> Symbol:
         """The square root; of a constant a constant."""
-        known = self.constant_value()
-        if known is not None and not isinstance(known, Lanes):
-            return self.tracer.constant(math.sqrt(known))
-        index = self.tracer.record((_NEG, self.index, None)) if self.negative else self.index
-        return Symbol(self.tracer, self.tracer.record((_SQRT, index, None)))
+        return self.tracer.operated(Op.SQRT, (self,))
+
+    def operated(self, op: Op, arguments: Sequence[Symbol | Constant]) -> Symbol:
+        """The value of an operation on symbols and constants, of which this is one."""
+        return self.tracer.operated(op, arguments)
 
     @property
     def slot(self) -> Slot | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,6 +13,7 @@ from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.dynamics.slices import first_rates
 from psdmc.dynamics.structure import Places
+from psdmc.program.regions import Regions
 from psdmc.program.signature import Signature
 from psdmc.robot.mechanism import Array, Mechanism, NamedFrame, Placement
 
@@ -146,6 +147,8 @@ class Recipe:
     benched      whether `make bench` measures it
     packs        the matrix some of whose entries it puts out: its own function is lowered, and the other entries are left
                  out. Its `trace`, and the values of `pinocchio`, are that function's
+    regions      its body as regions, which the C is made of; its `trace` is those regions written out. None: the C is the
+                 straight line
     """
 
     signature: Signature
@@ -168,6 +171,7 @@ class Recipe:
     default_where_wide: bool = False
     benched: bool = False
     packs: Packing | None = None
+    regions: Callable[[Sequence[Frame]], Regions] | None = None
 
     def __post_init__(self) -> None:
         if self.needs is None and self.signature.positive is not None:

@@ -27,7 +27,7 @@ from psdmc.report.truth_tables import TruthView
 CAPTIONS = {
     "Motor": "Torque of the known load, and what the calibrated motors say of the current that it adds (figure 2).",
     "Gravity": "Torque averaged over both directions, against the gravity model (figure 3).",
-    "Friction": "Friction of each joint alone, against LuGre (figure 4).",
+    "Friction": "Friction of each joint alone, against its law (figure 4).",
     "Inertial": "What gravity and friction leave of the fast motion's torque, against the inertial model (figure 5).",
     "All": "The whole torque of the fast motion.",
 }

@@ -97,7 +97,8 @@ def _joints(record: Calibrated, robot: VirtualRobot) -> str:
     lines = []
     for k, joint in enumerate(robot.joints):
         lines.append([joint.name, "found", *(joint_number(found.get((joint.name, name))) for name in names)])
-        lines.append(["", "truth", *(f"{getattr(joint, name):.4g}" for name in names)])
+        true = {"torque_constant": joint.torque_constant, **joint.friction}
+        lines.append(["", "truth", *(f"{true[name]:.4g}" for name in names)])
         lines.append(["", "paper", *(f"{published.PARAMETERS[name][k]:.4g}" for name in names)])
     return table(head, lines)
 

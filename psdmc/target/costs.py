@@ -11,6 +11,8 @@ class Latency:
 
     fused   of a multiply-add; where there is none, of a product and a sum
     sincos  of the inline sine and cosine
+    choice  of a comparison and of what it chooses
+    call    of an elementary function of the C library
     """
 
     load: int
@@ -20,6 +22,8 @@ class Latency:
     div: int
     neg: int
     sincos: int
+    choice: int
+    call: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +34,8 @@ class Costs:
     div, neg            weight of a division, of a change of sign
     fused               weight that a multiply-add saves on its product and its sum
     sincos              weight of one inline sincos, which serves `angles_per_sincos` angles
+    choice              weight of a minimum, maximum, magnitude or selection
+    call                weight of an elementary function of the C library: in lanes one for each state
     angle               weight of each further angle: to put it in and to take sine and cosine out
     angles_per_sincos   in code for one state; 1 where the target has no vectors
     registers           for reals; used where `spills_wait`
@@ -52,6 +58,8 @@ class Costs:
     neg: float
     fused: float
     sincos: float
+    choice: float
+    call: float
     angle: float
     angles_per_sincos: int
     registers: int

@@ -7,11 +7,13 @@ from psdmc.target.target import FORMS, Target
 from psdmc.target.vectors import WIDEST_FIRST
 
 COSTS = Costs(
-    latency=Latency(load=5, add=3, mul=3, fused=4, div=13, neg=1, sincos=60),
+    latency=Latency(load=5, add=3, mul=3, fused=4, div=13, neg=1, sincos=60, choice=5, call=60),
     div=8.0,
     neg=0.1,
     fused=0.5,
     sincos=30.0,
+    choice=2.0,
+    call=40.0,
     angle=1.0,
     angles_per_sincos=8,
     registers=32,

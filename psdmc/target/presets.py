@@ -19,9 +19,10 @@ X86_64_V2 = replace(
     host_flags=(),
     costs=replace(
         COSTS,
-        latency=Latency(load=5, add=3, mul=5, fused=8, div=20, neg=1, sincos=80),
+        latency=Latency(load=5, add=3, mul=5, fused=8, div=20, neg=1, sincos=80, choice=5, call=90),
         fused=0.0,
         sincos=40.0,
+        call=60.0,
         angles_per_sincos=2,
         registers=16,
     ),
@@ -57,7 +58,7 @@ AARCH64 = replace(
     host_flags=(),
     costs=replace(
         COSTS,
-        latency=Latency(load=5, add=2, mul=3, fused=4, div=15, neg=2, sincos=60),
+        latency=Latency(load=5, add=2, mul=3, fused=4, div=15, neg=2, sincos=60, choice=4, call=60),
         angles_per_sincos=2,
     ),
 )
@@ -87,11 +88,13 @@ CORTEX_M4F = replace(
     flags=("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"),
     costs=replace(
         SCALAR.costs,
-        latency=Latency(load=3, add=2, mul=2, fused=4, div=15, neg=2, sincos=120),
+        latency=Latency(load=3, add=2, mul=2, fused=4, div=15, neg=2, sincos=120, choice=4, call=150),
         div=14.0,
         neg=1.0,
         fused=0.0,
         sincos=100.0,
+        choice=3.0,
+        call=150.0,
         registers=32,
         spills_wait=True,
     ),
@@ -107,11 +110,13 @@ CORTEX_M7 = replace(
     flags=("-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-d16", "-mfloat-abi=hard"),
     costs=replace(
         CORTEX_M4F.costs,
-        latency=Latency(load=3, add=3, mul=4, fused=7, div=30, neg=1, sincos=120),
+        latency=Latency(load=3, add=3, mul=4, fused=7, div=30, neg=1, sincos=120, choice=4, call=150),
         div=20.0,
         neg=0.5,
         fused=0.5,
         sincos=80.0,
+        choice=3.0,
+        call=150.0,
         registers=16,
     ),
 )

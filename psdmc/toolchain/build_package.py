@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at
-from psdmc.backends.c.own_files import edited_files
+from psdmc.backends.own_files import edited_files
 from psdmc.errors import InputError, ToolchainError
 from psdmc.progress import Progress, silent
 from psdmc.toolchain.build_progress import told

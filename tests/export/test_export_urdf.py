@@ -18,6 +18,7 @@ import psdmc
 from psdmc.cli.boundary import run
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
 from psdmc.errors import InputError
+from psdmc.friction.laws import LAWS
 from psdmc.links.physical_links import NoSuchLinks
 from psdmc.model.calibrated import by_joint
 from psdmc.model.calibrated_json import from_json
@@ -260,15 +261,17 @@ def test_friction_of_a_linear_fit_is_in_dynamics_and_its_offset_is_said(
     written = psdmc.export_urdf(model, tmp_path / "back.urdf")
     dynamics = {j.get("name"): j.find("dynamics") for j in ET.parse(written.urdf).getroot().findall("joint")}
     assert dynamics["slide"].attrib == {"damping": "0.25", "friction": "1.5"}
-    assert any("the constant torque (offset): joint 'slide'" in note for note in written.notes)
+    assert any("in either direction (offset): joint 'slide'" in note for note in written.notes)
 
 
 def test_the_line_nearest_to_a_viscous_law_that_is_none() -> None:
     """By numbers: the least-squares slope through the origin of 2 v^0.5 over 0 to 3 rad/s."""
-    from psdmc.export.friction import _line
-
+    line = LAWS["viscous"].line
+    assert line is not None
     v = np.linspace(0.0, 3.0, 200_001)
-    assert _line(0.5, 3.0) == pytest.approx(np.sum(v * np.sqrt(v)) / np.sum(v * v), rel=1e-5)
+    constant, slope, lost = line([2.0], 0.5, 3.0)
+    assert (constant, lost != "") == (0.0, True)
+    assert slope / 2.0 == pytest.approx(np.sum(v * np.sqrt(v)) / np.sum(v * v), rel=1e-5)
 
 
 def test_the_command_says_what_it_read_back(arm: DynamicsModel, tmp_path: Path, capsys) -> None:

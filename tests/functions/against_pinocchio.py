@@ -15,9 +15,9 @@ from random_chains import Oracle, random_chain
 from robots_at_hand import Subject, drawn, subject
 from unoptimised import compiled
 
-from psdmc.backends.c.info import package_info
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
 from psdmc.functions import DEFAULT, RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.interpret import interpret

@@ -10,8 +10,8 @@ from fixtures import digest
 from mutate_package import OUTSIDE
 from outcome import BrokenRule
 
-from psdmc.backends.c.own_files import JOURNAL, MANIFEST, edited_files
-from psdmc.backends.c.write import write_package
+from psdmc.backends.own_files import JOURNAL, MANIFEST, edited_files
+from psdmc.backends.write import write_package
 
 EARLIER = {"Makefile": "old:\n", "src/b.c": "/* old b.c */\n", "src/stale.c": "/* stale */\n"}
 NEW = {
@@ -46,7 +46,7 @@ def package(data: bytes, folder: Path, deep: bool) -> None:
             file = folder / name
             if not file.is_file() or file.read_text(encoding="utf-8") != text:
                 said = f"{name} is no longer what it was"
-                raise BrokenRule("TouchedOthers", f"psdmc/backends/c/write.py:{name}", said)
+                raise BrokenRule("TouchedOthers", f"psdmc/backends/write.py:{name}", said)
 
 
 def _write(folder: Path) -> None:

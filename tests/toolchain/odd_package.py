@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from psdmc.backends.c.info import JointInfo, PackageInfo
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.c.reference_states import ReferenceStates
+from psdmc.backends.info import JointInfo, PackageInfo
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.reference_states import ReferenceStates
 from psdmc.model.equations import BaseParameter
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Positive, Q, Quantity, Signature

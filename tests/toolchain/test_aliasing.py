@@ -11,8 +11,8 @@ from direct import Direct, shared_library, states
 from slow_cases import slow_but_for
 from traced import SIZES, L, N, arm, arm_kernels, arm_package
 
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package_files import package_files
+from psdmc.backends.options import EmitOptions
 
 KERNELS = arm_kernels()
 AS_LONG_AS_AN_INPUT = [

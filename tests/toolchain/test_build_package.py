@@ -16,10 +16,10 @@ from traced import arm_kernels, arm_package, arm_references
 from unoptimised import wrapper
 
 import psdmc
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.c.reference_states import ReferenceStates
-from psdmc.backends.c.write import write_package
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.reference_states import ReferenceStates
+from psdmc.backends.write import write_package
 from psdmc.errors import InputError, ToolchainError
 from psdmc.toolchain.build_package import UNFINISHED, build_package
 

@@ -14,9 +14,9 @@ from direct import write_sources
 from slow_cases import slow_but_for
 from traced import arm_package
 
-from psdmc.backends.c.info import package_info
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import package_view
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower, wanted
 from psdmc.program.kernel import Kernel

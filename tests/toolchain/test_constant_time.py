@@ -15,9 +15,9 @@ from direct import write_sources
 from limbed import package_of
 from slow_cases import slow_but_for
 
-from psdmc.backends.c.info import package_info
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower
 from psdmc.recipes.steps import DT

@@ -14,9 +14,9 @@ from direct import Direct, shared_library
 from limbed import FUNCTIONS, forced, kernels, limbed, package_of, shape
 from slow_cases import slow_but_for
 
-from psdmc.backends.c.info import package_info
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.info import package_info
+from psdmc.backends.options import EmitOptions
 from psdmc.derivation.derive import derive_model
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower

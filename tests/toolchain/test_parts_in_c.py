@@ -10,8 +10,8 @@ from direct import Direct, all_expected, error, shared_library, states
 from slow_cases import slow_but_for
 from traced import L, N, arm, arm_kernels, arm_package
 
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package_files import library_files
+from psdmc.backends.options import EmitOptions
 
 KERNELS = arm_kernels()
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]

@@ -13,11 +13,11 @@ from odd_package import odd_package as package
 from unoptimised import compiled as library
 from unoptimised import wrapper
 
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import package_view
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.c.reference_states import ReferenceStates
-from psdmc.backends.c.write import write_package
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.reference_states import ReferenceStates
+from psdmc.backends.write import write_package
 from psdmc.errors import InputError, InternalError
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Quantity

@@ -20,7 +20,7 @@ from traced import arm_package
 
 import psdmc
 from psdmc import compiler
-from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.options import EmitOptions
 from psdmc.errors import InputError, ToolchainError
 from psdmc.lower.kernels import lower
 from psdmc.model.dynamics_model import DynamicsModel

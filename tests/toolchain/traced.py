@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 
-from psdmc.backends.c.info import JointInfo, PackageInfo
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import PackageView, package_view
-from psdmc.backends.c.reference_states import ReferenceStates
+from psdmc.backends.info import JointInfo, PackageInfo
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.reference_states import ReferenceStates
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.frames import Frame, frame_at

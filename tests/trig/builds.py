@@ -14,7 +14,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from psdmc.backends.c.trig import Far, scalar_trig, trig_preamble, vector_trig
-from psdmc.backends.c.trig_numbers import Real
+from psdmc.backends.trig_numbers import Real
 from psdmc.target.vectors import WIDEST_FIRST
 from psdmc.toolchain.cache import cache_key, cached
 

@@ -1,4 +1,4 @@
-"""Where the numbers of psdmc/backends/c/trig_numbers.py come from; run as a script it prints them.
+"""Where the numbers of psdmc/backends/trig_numbers.py come from; run as a script it prints them.
 
 Remez' exchange in 60-digit arithmetic for the two polynomials of a sincos on [-pi/4, pi/4], in z = r^2,
 

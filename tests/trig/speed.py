@@ -11,7 +11,7 @@ from pathlib import Path
 
 from builds import Build, render_function, run
 
-from psdmc.backends.c.trig_numbers import Real
+from psdmc.backends.trig_numbers import Real
 
 CONTRACT = "-O3 -ffp-contract=fast"
 CASES: tuple[tuple[Real, Build], ...] = (

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from builds import Build, builds, compile_build, load, run
 
-from psdmc.backends.c.trig_numbers import NUMBERS, Real
+from psdmc.backends.trig_numbers import NUMBERS, Real
 
 WHOLE = os.environ.get("PSDMC_ACCURACY") == "whole"
 BLOCKS, LEAST = (160, 10_000_000) if WHOLE else (2, 100_000)

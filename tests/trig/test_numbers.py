@@ -1,4 +1,4 @@
-"""psdmc/backends/c/trig_numbers.py holds the numbers that minimax.py derives, and they are what the error bounds assume."""
+"""psdmc/backends/trig_numbers.py holds the numbers that minimax.py derives, and they are what the error bounds assume."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import minimax
 import mpmath as mp
 import pytest
 
-from psdmc.backends.c.trig_numbers import NUMBERS, Real, c_number, polynomial
+from psdmc.backends.c.trig_numbers import c_number, polynomial
+from psdmc.backends.trig_numbers import NUMBERS, Real
 from psdmc.target.vectors import VectorUnit
 
 EXACT_PARTS = {"double": 2, "float": 3}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from builds import Build, builds, compile_build, load, run
 
-from psdmc.backends.c.trig_numbers import NUMBERS, Real
+from psdmc.backends.trig_numbers import NUMBERS, Real
 
 pytestmark = pytest.mark.skipif(
     shutil.which("gcc") is None or platform.machine() != "x86_64", reason="needs gcc on x86-64"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.bodies import BodiesMap
-from psdmc.backends.c.options import CReal
+from psdmc.backends.bodies import BodiesMap
 from psdmc.backends.c.prototypes import Prototype, bodies_prototype
+from psdmc.backends.c.reals import CReal
 from psdmc.backends.c.tables import number
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from psdmc.backends.c.c_expr import UNIFORM_VECTORS, Expr, Names, combine, literal
+from psdmc.backends.c.c_expr import UNIFORM_VECTORS, Expr, Names, combine, is_call, literal
 from psdmc.backends.c.cleared import cleared, without_zeros
 from psdmc.backends.c.lines import (
     BETWEEN,
@@ -25,10 +25,9 @@ from psdmc.backends.c.lines import (
 from psdmc.backends.c.products import Entry, Multiplication, multiplication
 from psdmc.backends.c.store_groups import GROUP, StoreGroups
 from psdmc.program.angles import angle_groups, cone
+from psdmc.program.operations import Unit
 from psdmc.program.products import Product
 from psdmc.program.program import Op, Program, Slot
-
-_ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SQRT})
 
 
 def make_body(
@@ -54,7 +53,7 @@ def make_body(
     multiplied = tuple(multiplication(program, product, sizes) for product in products)
     stored = without_products(sizes, multiplied)
     sections = sections_of(program, stored, suffix, stores_early, in_groups, multiplied, uniform)
-    return Body(sections, unread(program, inputs), multiplied, has_roots(program))
+    return Body(sections, unread(program, inputs), multiplied, calls_of(program))
 
 
 def without_products(sizes: Mapping[str, int], products: Sequence[Multiplication]) -> dict[str, int]:
@@ -69,9 +68,9 @@ def unread(program: Program, inputs: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in inputs if name not in read)
 
 
-def has_roots(program: Program) -> bool:
-    """Whether the PROGRAM takes square roots."""
-    return any(instr.op is Op.SQRT for instr in program)
+def calls_of(program: Program) -> frozenset[Op]:
+    """The PROGRAM's operations that are macros."""
+    return frozenset(instr.op for instr in program if is_call(instr.op))
 
 
 def sections_of(
@@ -152,7 +151,11 @@ class _Writer:
         return tuple(lines)
 
     def _has_own_line(self, i: int) -> bool:
-        return self.names.named[i] and self.program.body[i].op in _ARITHMETIC
+        return self.names.named[i] and self._is_computed(i)
+
+    def _is_computed(self, i: int) -> bool:
+        op, args, _, _ = self.program.body[i]
+        return bool(args) and op.unit is not Unit.SINCOS
 
     def _stores_of(self, i: int) -> list[Line]:
         return [line for slot in self.stores[i] for line in self._store(slot, i)]
@@ -224,8 +227,10 @@ class _Writer:
     def _operation(self, i: int) -> Expr:
         instr = self.program.body[i]
         operands = [self._value(a) for a in instr.args]
-        if instr.op is Op.SQRT:
-            return Expr(f"SQRT({spread(operands[0].text, self.names.uniform[instr.args[0]])})")
+        if is_call(instr.op):
+            uniform = (self.names.uniform[a] for a in instr.args)
+            texts = (spread(each.text, same) for each, same in zip(operands, uniform, strict=True))
+            return Expr(f"{instr.op.upper()}({', '.join(texts)})")
         return combine(instr.op, operands)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from psdmc.backends.c.reals import rounded_out
+from psdmc.program.operations import Unit
 from psdmc.program.program import Instr, Op, Program
 
 DEEPEST = 4
@@ -64,7 +65,7 @@ def _is_uniform(instr: Instr, known: list[bool], shared: Collection[str]) -> boo
     op, args, slot, _ = instr
     if slot is not None:
         return slot.vector in shared
-    if op is Op.SIN or op is Op.COS or op is Op.SQRT:
+    if op.unit is Unit.SINCOS or is_call(op):
         return False
     return all(known[a] for a in args)
 
@@ -73,12 +74,17 @@ def _cut_deep_trees(program: Program, named: list[bool]) -> None:
     """Also name the values at which an expression would nest deeper than DEEPEST."""
     depth = [0] * len(program)
     for i, (op, args, _, _) in enumerate(program):
-        if not args or op is Op.SIN or op is Op.COS or op is Op.SQRT:
+        if not args or op.unit is Unit.SINCOS or is_call(op):
             continue
         for a in args:
             if depth[a] == DEEPEST:
                 named[a] = True
         depth[i] = 1 + max([0 if named[a] else depth[a] for a in args])
+
+
+def is_call(op: Op) -> bool:
+    """Whether the operation is a macro of its name: what C has no operator for, sines aside."""
+    return op.arity > 0 and not op.operation.written and op.unit is not Unit.SINCOS
 
 
 def literal(value: float, suffix: str) -> Expr:

@@ -1,56 +1,26 @@
-"""The robot in words, for the first lines of the header."""
+"""The robot and its C functions in words, for the first lines of the header."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 
 from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.info import JointInfo, PackageInfo
-from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.describe import facts, frame_lines
+from psdmc.backends.info import PackageInfo
+from psdmc.backends.options import EmitOptions
 from psdmc.program.signature import Signature
-from psdmc.robot.mechanism import BASE_FRAME
-from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 
 
 def description(
     info: PackageInfo, options: EmitOptions, functions: Sequence[FunctionView], with_frames: bool
 ) -> tuple[str, ...]:
-    """Joints, limits, gravity, parameters, model and options, one line each; untrusted names still
-    unescaped."""
-    gx, gy, gz = info.gravity
-    lines = [
-        f"Robot: {info.name}, {_extent(info)}",
-        f"Model: {info.model_hash or 'not hashed'}",
-        f"Options: {', '.join(f'{key}={value}' for key, value in option_items(info, options).items())}",
-        *_target(options.target),
-        "Units: SI. Positions rad (m), rates rad/s (m/s), torques N m (N) for revolute (prismatic) joints.",
-        f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the {info.base_frame}",
-        "",
-        "Joints, each behind those that carry it:" if info.is_tree else "Joints, from base to tip:",
-        *(f"  {i}  {line}" for i, line in enumerate(_joints(info))),
-        *(f"     {sentence}" for sentence in info.followers),
-        "",
-        "theta_b, base parameters in standard parameters about the file's link frames:",
-        *(f"  {i}  {parameter.equation}  [{parameter.unit}]" for i, parameter in enumerate(info.parameters)),
-        "",
-        *_arrays(info),
-        *_forms(options.target),
-    ]
+    """The robot's facts, then what arrays and the forms of functions are; untrusted names still unescaped."""
+    lines = [*facts(info, options), *_arrays(info), *_forms(options.target)]
     if any(len(function.signature.outputs) > 1 for function in functions):
         lines += ["Several outputs of one call must not overlap each other."]
     lines += [line for function in functions for line in _failure(function.signature, options.target)]
-    if with_frames:
-        lines += ["", "Frames, in the order of every array over them:"]
-        lines += [f"  {i}  {name}" for i, name in enumerate(info.frames)]
-    return tuple(lines)
-
-
-def _extent(info: PackageInfo) -> str:
-    if info.base_frame != BASE_FRAME:
-        return f"a floating base in the world ({info.base})"
-    return f"a tree on {info.base}" if info.is_tree else f"from {info.base} to {info.tip}"
+    return (*lines, *(frame_lines(info) if with_frames else ()))
 
 
 def _arrays(info: PackageInfo) -> tuple[str, ...]:
@@ -80,14 +50,6 @@ def _forms(target: Target) -> tuple[str, ...]:
     )
 
 
-def _target(target: Target) -> tuple[str, ...]:
-    """A chosen target, and how compilers build for it; empty for the default."""
-    if target == NATIVE:
-        return ()
-    flags = f"; compile with {' '.join(target.flags)}" if target.flags else ""
-    return (f"Target: {target.name}, {target.about}{flags}",)
-
-
 def _failure(function: Signature, target: Target) -> tuple[str, ...]:
     if function.positive is None:
         return ()
@@ -100,47 +62,3 @@ def _failure(function: Signature, target: Target) -> tuple[str, ...]:
         f"{function.name} returns 0, or 1 + {function.positive.which}, or (batch) 1 + the first",
         f"row that has one; the {function.positive.spoilt} of such a state are NaN.",
     )
-
-
-def uses_frames(functions: Iterable[FunctionView]) -> bool:
-    """Whether some of these functions is about the named frames."""
-    signatures = (function.signature for function in functions)
-    return any("frames" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
-
-
-def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
-    """The user's choices by name; the target only where it is not the default."""
-    target = {} if options.target == NATIVE else {"target": options.target.name}
-    return {"real": options.real, "trig": options.trig, **info.options, **target}
-
-
-def _joints(info: PackageInfo) -> Iterator[str]:
-    """A line for each joint, with its places in q and rates where these are not its number."""
-    if not info.is_wide:
-        yield from map(joint_line, info.joints)
-        return
-    q, v = 0, 0
-    for joint in info.joints:
-        yield f"{joint_line(joint)}; {_places('q', q, joint.nq)}, {_places('rates', v, joint.nv)}"
-        q, v = q + joint.nq, v + joint.nv
-
-
-def _places(vector: str, first: int, count: int) -> str:
-    return f"{vector}[{first}]" if count == 1 else f"{vector}[{first}..{first + count - 1}]"
-
-
-def joint_line(joint: JointInfo) -> str:
-    """A joint and its limits; unknown limits are left out."""
-    parts = [f"{joint.name} ({joint.kind}{': ' if joint.coordinates else ''}{joint.coordinates})"]
-    if math.isfinite(joint.lower) or math.isfinite(joint.upper):
-        parts.append(f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}")
-    for value, unit in (
-        (joint.speed, f"{joint.unit}/s"),
-        (joint.acceleration, f"{joint.unit}/s^2"),
-        (joint.effort, joint.effort_unit),
-    ):
-        if math.isfinite(value):
-            parts.append(f"{value:.9g} {unit}")
-    if joint.parent:
-        parts.append(f"on link {joint.parent}")
-    return ", ".join(parts)

@@ -6,9 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from psdmc.backends.c.operations import CallView
+from psdmc.backends.c.prototypes import Prototype, friction_prototype
 from psdmc.backends.c.reals import rounded_out
+from psdmc.backends.c.scalar_function import ScalarFunction, calls_in
 from psdmc.backends.c.tables import number
-from psdmc.model.linear_friction import Array, LinearFriction
+from psdmc.friction.joints import Friction
+from psdmc.friction.law import Array
 
 TOLERANCE = {"double": "1e-13", "float": "1e-5"}
 """Of the self-test, beside the largest friction: a few roundings of tanh and of powers."""
@@ -16,10 +20,35 @@ TOLERANCE = {"double": "1e-13", "float": "1e-5"}
 
 @dataclass(frozen=True, slots=True)
 class FrictionView:
-    """The numbers of `R_friction`, printed for one real type."""
+    """`R_friction`, printed for one real type."""
 
-    friction: LinearFriction
+    friction: Friction
+    robot: str
     real: str
+
+    @property
+    def prototype(self) -> Prototype:
+        return friction_prototype(self.robot, self.real, self.friction.by_position)
+
+    @property
+    def by_position(self) -> bool:
+        """Whether the function takes positions, too."""
+        return self.friction.by_position
+
+    @property
+    def one_joint(self) -> ScalarFunction:
+        suffix = "" if self.real == "double" else "f"
+        return ScalarFunction("joint_friction", self.friction.program(), ("q", "v"), suffix)
+
+    @property
+    def calls(self) -> tuple[CallView, ...]:
+        return calls_in([self.one_joint])
+
+    @property
+    def passed(self) -> str:
+        """Joint i's state behind its values."""
+        state = {"q": "q[i]", "v": "qd[i]"}
+        return "".join(f", {state[name]}" for name in self.one_joint.taken)
 
     @property
     def beyond(self) -> tuple[str, ...]:
@@ -27,86 +56,48 @@ class FrictionView:
         return self.friction.beyond
 
     @property
+    def headings(self) -> tuple[str, ...]:
+        """Names of the numbers per joint."""
+        return tuple(name for term in self.friction.terms for name in term.names)
+
+    @property
+    def formula(self) -> str:
+        """The law, for the header."""
+        terms = self.friction.terms
+        against = " + ".join(term.formula for term in terms if term.law.against)
+        return " + ".join(
+            (*((f"s ({against})",) if against else ()), *(t.formula for t in terms if not t.law.against))
+        )
+
+    @property
     def sign_speed(self) -> str:
         return number(self.friction.sign_speed, self.real)
 
     @property
-    def exponents(self) -> tuple[str, ...]:
-        return tuple(f"{d:g}" for d in self.friction.exponents)
-
-    @property
-    def powers(self) -> tuple[str, ...]:
-        """|v| to each exponent, in C."""
-        suffix = "" if self.real == "double" else "f"
-        by_pow = (f"pow{suffix}(speed, {number(d, self.real)})" for d in self.friction.exponents)
-        return tuple(
-            "speed" if d == 1.0 else "speed * speed" if d == 2.0 else text
-            for d, text in zip(self.friction.exponents, by_pow, strict=True)
-        )
-
-    @property
-    def stribeck(self) -> tuple[str, ...]:
-        """exp(-(v / v_s)^2) for each Stribeck velocity, in C."""
-        suffix = "" if self.real == "double" else "f"
-        each = (number(v, self.real) for v in self.friction.stribeck_speeds)
-        return tuple(f"exp{suffix}(-(v / {v}) * (v / {v}))" for v in each)
-
-    @property
-    def sizes(self) -> tuple[str, ...]:
-        """What the terms after Coulomb friction are multiplied by."""
-        return (*self.powers, *self.stribeck)
-
-    @property
-    def headings(self) -> tuple[str, ...]:
-        """Names of the numbers per joint."""
-        viscous = tuple(f"viscous (speed to the power {d})" for d in self.exponents)
-        peaks = tuple(f"Stribeck at speed {v:g}" for v in self.friction.stribeck_speeds)
-        return ("Coulomb", *viscous, *peaks, *(("asymmetry",) if self.uneven else ()), "constant")
-
-    @property
-    def law(self) -> str:
-        """The factor of tanh, for the header."""
-        viscous = "".join(f" + viscous |v|^{d}" for d in self.exponents)
-        peaks = "".join(f" + Stribeck exp(-(v / {v:g})^2)" for v in self.friction.stribeck_speeds)
-        return f"Coulomb{viscous}{peaks}"
-
-    @property
-    def uneven(self) -> bool:
-        """Whether Coulomb friction differs between the directions."""
-        return len(self.friction.asymmetry) > 0
-
-    @property
-    def width(self) -> int:
-        """Numbers per joint."""
-        return 2 + len(self.friction.exponents) + len(self.friction.stribeck_speeds) + self.uneven
-
-    @property
     def rows(self) -> tuple[str, ...]:
-        friction = self.friction
-        columns = [friction.coulomb, friction.viscous]
-        columns += [friction.stribeck] if friction.stribeck_speeds else []
-        columns += [friction.asymmetry] if self.uneven else []
-        return self._printed(np.column_stack([*columns, friction.offset]))
+        return self._printed(self.friction.values)
 
     @property
     def speeds(self) -> tuple[str, ...]:
-        """Of the self-test: rest, a tenth of the speed over which the sign changes, both ways beyond it, and the Stribeck
-        velocities."""
-        return self._printed(self._speeds)
+        """Of the self-test: rest, a tenth of the speed over which the sign changes, both directions beyond it, and the
+        numbers of laws that have some."""
+        return self._printed(self._states)
 
     @property
     def expected(self) -> tuple[str, ...]:
-        return self._printed(self.friction.torque(self._speeds))
+        """Friction at these, positions being equal to the speeds."""
+        return self._printed(self.friction.torque(self._states, self._states))
 
     @property
     def tolerance(self) -> str:
         return TOLERANCE[self.real]
 
     @property
-    def _speeds(self) -> Array:
-        n = len(self.friction.coulomb)
+    def _states(self) -> Array:
+        n = len(self.friction.values)
         ramp = np.linspace(0.5, 1.5, n) * np.where(np.arange(n) % 2, -1.0, 1.0)
-        shares = (0.0, 0.1 * self.friction.sign_speed, 1.0, -0.7, *self.friction.stribeck_speeds)
+        numbers = (term.number for term in self.friction.terms if term.number is not None)
+        shares = (0.0, 0.1 * self.friction.sign_speed, 1.0, -0.7, *numbers)
         rounded = [rounded_out(float(v), self.real) for v in np.outer(shares, ramp).reshape(-1)]
         return np.array(rounded).reshape(len(shares), n)
 

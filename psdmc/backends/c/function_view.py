@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.make_kernel_view import make_kernel_view, sizes_of
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.products import Multiplication
-from psdmc.errors import InternalError
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.protocol import functions_of
 from psdmc.program.kernel import Kernel
-from psdmc.program.signature import Signature, Sizes, in_order
+from psdmc.program.signature import Signature, Sizes
 from psdmc.robot.mechanism import BASE_FRAME
 
 
@@ -30,7 +30,12 @@ class FunctionView:
 
     @property
     def has_pivots(self) -> bool:
-        return any(kernel.pivot_order for kernel in self.kernels)
+        return any(kernel.pivot_order or (kernel.regions and kernel.positive) for kernel in self.kernels)
+
+    @property
+    def is_regions(self) -> bool:
+        """Whether it is made of loops and calls."""
+        return any(kernel.regions for kernel in self.kernels)
 
     @property
     def products(self) -> tuple[Multiplication, ...]:
@@ -65,17 +70,12 @@ def function_views(
 ) -> tuple[FunctionView, ...]:
     """The functions that `kernels` hold, in the order of their signatures, whatever the mapping's order. `base_frame`: what
     their meanings call it."""
-    wrong = [name for name, kernel in kernels.items() if name != kernel.name]
-    if wrong:
-        raise InternalError(f"kernel {wrong[0]!r} is filed under a name that is not its own")
-    functions = {kernel.function.name: kernel.function for kernel in kernels.values()}
     views = []
-    for function in in_order(tuple(functions.values())):
-        own = [kernels[name] for name in (function.name, f"{function.name}_theta") if name in kernels]
-        shown = tuple(make_kernel_view(kernel, sizes, robot, options) for kernel in own)
-        shape = _shape(function, sizes_of(own[0], sizes))
-        meaning = function.meaning.replace(BASE_FRAME, base_frame)
-        views.append(FunctionView(function.name, meaning, shape, function, shown))
+    for found in functions_of(kernels, base_frame):
+        function = found.signature
+        shown = tuple(make_kernel_view(kernel, sizes, robot, options) for kernel in found.kernels)
+        shape = _shape(function, sizes_of(found.kernels[0], sizes))
+        views.append(FunctionView(function.name, found.meaning, shape, function, shown))
     return tuple(views)
 
 

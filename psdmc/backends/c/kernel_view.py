@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from psdmc.backends.c.limbs import LimbsView
 from psdmc.backends.c.lines import Body
 from psdmc.backends.c.prototypes import Prototype
+from psdmc.backends.c.regions import RegionsView
 from psdmc.program.products import LARGE
 from psdmc.program.signature import Signature
 
@@ -45,6 +46,7 @@ class KernelView:
     positive     what must be positive and is not put out; None where there is no such thing
     pivot_order  its entries in the order in which they are found
     places       of a packed matrix: (row, column) of each entry
+    regions      loops and calls, in the place of all bodies; None where there are none
     """
 
     name: str
@@ -63,16 +65,12 @@ class KernelView:
     lowering: str
     limbs: LimbsView | None = None
     places: tuple[tuple[int, int], ...] = ()
+    regions: RegionsView | None = None
 
     @property
     def pivots_in_loop(self) -> bool:
         """Whether one state's pivots are looked at in a loop."""
         return len(self.pivot_order) >= LOOPED and self.pivot_order == tuple(range(len(self.pivot_order)))
-
-    @property
-    def called(self) -> str:
-        """Name of the kernel that its stages call, '' where it has a body."""
-        return f"{self.function.calls}{'_theta' if self.theta else ''}" if self.function.calls else ""
 
     @property
     def single_parts(self) -> str:

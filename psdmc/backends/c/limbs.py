@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from psdmc.backends.c.body import make_body
 from psdmc.backends.c.c_expr import literal
@@ -11,7 +11,7 @@ from psdmc.backends.c.lanes import TransposeStage, transpose_stage
 from psdmc.backends.c.limb_rows import FOUR
 from psdmc.backends.c.limb_stores import StoreView, store_views
 from psdmc.backends.c.lines import Body
-from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.options import EmitOptions
 from psdmc.program.cost import Cost, cost
 from psdmc.program.limb_program import CORE, LimbGroup, LimbProgram, Stage
 from psdmc.target.vectors import VectorUnit
@@ -269,7 +269,4 @@ def _after(stage: Stage, group: LimbGroup) -> Iterator[str]:
 
 def _whole_cost(limbs: LimbProgram) -> Cost:
     costs = [cost(stage.program) for stage in limbs.stages]
-    mul, add, div, neg, sincos, fused = (
-        sum(getattr(each, name) for each in costs) for name in ("mul", "add", "div", "neg", "sincos", "fused")
-    )
-    return Cost(mul, add, div, neg, sincos, fused)
+    return Cost(*(sum(getattr(each, part.name) for each in costs) for part in fields(Cost)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from psdmc.backends.c.products import Entry, Multiplication
-from psdmc.program.program import Slot
+from psdmc.program.program import Op, Slot
 
 KEPT, KEPT_REALS = "kept", "kept_reals"
 """Vectors between the parts of a long body: of values, and of those that are the same for all states."""
@@ -143,7 +143,7 @@ class Body:
 
     unused    vectors of the signature that the PROGRAM never reads
     products  done behind everything else
-    has_roots whether square roots are taken
+    calls     operations that are macros
     parts     functions that compute it, one after the other, where it is long; it has no sections of its own then
     kept      declarations of the vectors between them
     """
@@ -151,7 +151,7 @@ class Body:
     sections: tuple[Section, ...]
     unused: tuple[str, ...]
     products: tuple[Multiplication, ...] = ()
-    has_roots: bool = False
+    calls: frozenset[Op] = frozenset()
     parts: tuple[Part, ...] = ()
     kept: tuple[str, ...] = ()
 

@@ -5,18 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 from psdmc.backends.c.body import make_body
+from psdmc.backends.c.c_expr import is_call
 from psdmc.backends.c.kernel_view import KernelView, OutputView, VectorView
 from psdmc.backends.c.limbs import LimbsView, limbs_view
 from psdmc.backends.c.lines import Body
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.parts import body_in_parts, is_long
 from psdmc.backends.c.prototypes import AT_RUN_TIME, BAKED, Prototype, Variant, prototype
+from psdmc.backends.c.reals import c_real
+from psdmc.backends.c.regions import regions_view
 from psdmc.backends.c.store_groups import GROUP
+from psdmc.backends.options import EmitOptions
 from psdmc.errors import InternalError
 from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
 from psdmc.program.products import LARGE
-from psdmc.program.program import Program
+from psdmc.program.program import Op, Program
 from psdmc.program.signature import Quantity, Signature, Sizes
 
 
@@ -32,13 +35,16 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
             q.name,
             sizes.size(q),
             sizes.shape(q.axes),
-            has_lanes and not function.calls and _is_direct(q, sizes),
+            has_lanes and kernel.regions is None and _is_direct(q, sizes),
             () if kernel.is_loop_of_calls else _zero(q, kernel.single, sizes),
         )
         for q in function.outputs
     )
-    if function.calls:
+    suffix = "f" if c_real(options) == "float" else ""
+    regions = None
+    if kernel.regions is not None:
         single_body = lanes_body = Body((), ())
+        regions = regions_view(kernel.regions, kernel.inputs, robot, kernel.theta, suffix)
     else:
         single_body, lanes_body = _bodies(kernel, outputs, options, has_lanes)
     shared = single_body == lanes_body
@@ -62,6 +68,7 @@ def make_kernel_view(kernel: Kernel, sizes: Sizes, robot: str, options: EmitOpti
         lowering=kernel.lowering,
         limbs=_limbs(kernel, sizes, options),
         places=kernel.places,
+        regions=regions,
     )
 
 
@@ -102,7 +109,7 @@ TAKEN = {
         "NAME",
         "SPLAT",
         "SINCOS",
-        "SQRT",
+        *(op.upper() for op in Op if is_call(op)),
         "LANES",
         "WIDTH",
         "real",
@@ -156,5 +163,5 @@ def _is_direct(output: Quantity, sizes: Sizes) -> bool:
 def _prototypes(function: Signature, theta: bool, robot: str, options: EmitOptions) -> dict[str, Prototype]:
     """Prototypes by form, for the forms that the target has."""
     variants: tuple[Variant, ...] = AT_RUN_TIME if theta else BAKED
-    made = (prototype(function, variant, robot, options.c_real) for variant in variants)
+    made = (prototype(function, variant, robot, c_real(options)) for variant in variants)
     return dict(zip(options.target.forms, made, strict=False))

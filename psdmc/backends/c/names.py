@@ -6,12 +6,9 @@ or the comment that it is put into.
 
 from __future__ import annotations
 
-import hashlib
-import re
 from importlib import resources
 
-LONGEST = 63
-"""Characters of an identifier: what C99 lets a compiler limit internal names to."""
+from psdmc.backends.names import DEVICE, identifier_of, utf8
 
 LISTS = ("languages", "c_and_posix", "cmake", "libraries", "windows")
 """Files of reserved/: keywords of C and C++ and what compilers predefine for their platforms; everything that the C and
@@ -28,8 +25,6 @@ def _listed() -> frozenset[str]:
 
 
 RESERVED = _listed()
-DEVICE = re.compile(r"con|prn|aux|nul|conin|conout|com\d|lpt\d", re.IGNORECASE)
-"""Windows takes these for devices in any case of letters."""
 
 
 def is_reserved(word: str) -> bool:
@@ -38,20 +33,8 @@ def is_reserved(word: str) -> bool:
 
 
 def identifier(name: str) -> str:
-    """A C and C++ identifier for `name`: ASCII letters, digits and single underscores, never a word of RESERVED.
-
-    Names that are free identifiers already stay as they are; a reserved one gets robot_ before it; one that loses all
-    its characters, or is too long, ends with a digest of the original, so that different names stay apart.
-    """
-    cleaned = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
-    if not cleaned:
-        return f"robot_{_digest(name)}"
-    if cleaned[0].isdigit() or is_reserved(cleaned):
-        cleaned = f"robot_{cleaned}"
-    if len(cleaned) > LONGEST:
-        digest = _digest(name)
-        cleaned = f"{cleaned[: LONGEST - len(digest) - 1].rstrip('_')}_{digest}"
-    return cleaned
+    """A C and C++ identifier for `name`, never a word of RESERVED."""
+    return identifier_of(name, is_reserved)
 
 
 def c_string(text: str) -> str:
@@ -61,7 +44,7 @@ def c_string(text: str) -> str:
     """
     plain = {ord('"'): '\\"', ord("\\"): "\\\\", ord("?"): "\\?"}
     body = "".join(
-        plain.get(byte) or (chr(byte) if 32 <= byte < 127 else f"\\{byte:03o}") for byte in _utf8(text)
+        plain.get(byte) or (chr(byte) if 32 <= byte < 127 else f"\\{byte:03o}") for byte in utf8(text)
     )
     return f'"{body}"'
 
@@ -71,16 +54,8 @@ def c_comment(text: str) -> str:
 
     A '\\' could join lines, '/' beside '*' could open or close, '??' could be a trigraph: each is broken up.
     """
-    ascii_text = "".join(chr(byte) if 32 <= byte < 127 else f"<{byte:02x}>" for byte in _utf8(text))
+    ascii_text = "".join(chr(byte) if 32 <= byte < 127 else f"<{byte:02x}>" for byte in utf8(text))
     for dangerous, harmless in (("\\", "<5c>"), ("*/", "* /"), ("/*", "/ *"), ("??", "? ?")):
         while dangerous in ascii_text:
             ascii_text = ascii_text.replace(dangerous, harmless)
     return ascii_text
-
-
-def _utf8(text: str) -> bytes:
-    return text.encode("utf-8", errors="surrogatepass")
-
-
-def _digest(name: str) -> str:
-    return hashlib.sha256(_utf8(name)).hexdigest()[:8]

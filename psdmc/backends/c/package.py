@@ -8,25 +8,27 @@ from dataclasses import dataclass, replace
 
 from psdmc.backends.c.adapters import chosen
 from psdmc.backends.c.bodies_view import BodiesView
+from psdmc.backends.c.body import calls_of
 from psdmc.backends.c.cpp import CppClass, cpp_classes
-from psdmc.backends.c.describe import description, uses_frames
+from psdmc.backends.c.describe import description
 from psdmc.backends.c.friction import FrictionView
 from psdmc.backends.c.function_view import FunctionView, function_views
-from psdmc.backends.c.info import PackageInfo
 from psdmc.backends.c.kernel_view import KernelView
 from psdmc.backends.c.names import identifier
-from psdmc.backends.c.options import CReal, EmitOptions
+from psdmc.backends.c.operations import CallView, call_views
 from psdmc.backends.c.patterns import Pattern, patterns
 from psdmc.backends.c.payload_view import PayloadView
 from psdmc.backends.c.products import Shape
-from psdmc.backends.c.prototypes import Prototype, friction_prototype
-from psdmc.backends.c.reals import check_range
-from psdmc.backends.c.reference_states import ReferenceStates
+from psdmc.backends.c.reals import CReal, c_real, check_range
 from psdmc.backends.c.references import ReferenceView, reference_view
 from psdmc.backends.c.self_test import given_vectors, labels
 from psdmc.backends.c.self_test_view import SelfTestView
 from psdmc.backends.c.tables import Table, tables
 from psdmc.backends.c.vectors_view import VectorsView
+from psdmc.backends.describe import uses_frames
+from psdmc.backends.info import PackageInfo
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
 from psdmc.garbage import collecting_rarely
@@ -82,7 +84,7 @@ class PackageView:
 
     @property
     def real(self) -> CReal:
-        return self.options.c_real
+        return c_real(self.options)
 
     @property
     def lanes(self) -> int:
@@ -148,11 +150,7 @@ class PackageView:
     @property
     def friction(self) -> FrictionView | None:
         """The calibrated friction, where the package has its function."""
-        return FrictionView(self.info.friction, self.real) if self.info.friction else None
-
-    @property
-    def friction_prototype(self) -> Prototype:
-        return friction_prototype(self.robot, self.real)
+        return FrictionView(self.info.friction, self.robot, self.real) if self.info.friction else None
 
     @property
     def payload(self) -> PayloadView | None:
@@ -196,7 +194,7 @@ class PackageView:
     @property
     def fails_in_several(self) -> bool:
         """Whether some kernel that fails sets more than one vector of all joints to NaN."""
-        return any(kernel.positive and not kernel.fails_alone for kernel in self.kernels)
+        return any(k.positive and not (k.fails_alone and k.regions is None) for k in self.kernels)
 
     @property
     def products(self) -> tuple[Shape, ...]:
@@ -214,10 +212,23 @@ class PackageView:
         return any(kernel.single_body.has_clears or kernel.lanes_body.has_clears for kernel in self.kernels)
 
     @property
-    def has_roots(self) -> bool:
-        """Whether some kernel takes square roots."""
-        bodies = (body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body))
-        return any(body.has_roots for body in bodies)
+    def calls(self) -> tuple[CallView, ...]:
+        """Operations of some kernel that are macros."""
+        bodies = [body for kernel in self.kernels for body in (kernel.single_body, kernel.lanes_body)]
+        found = {op for body in bodies for op in body.calls}
+        found |= {op for kernel in self.kernels if kernel.regions for op in kernel.regions.calls}
+        return call_views(frozenset(found))
+
+    def limb_calls(self, count: int) -> tuple[CallView, ...]:
+        """Those of some stage of so many limbs."""
+        views = [kernel.limbs for kernel in self.kernels if kernel.limbs]
+        stages = [stage for view in views for stage in view.stages if stage.count == count]
+        return call_views(frozenset(op for stage in stages for op in stage.body.calls))
+
+    @property
+    def call_headers(self) -> tuple[str, ...]:
+        """Headers that say what they mean."""
+        return tuple(dict.fromkeys("operations.h" if call.has_header else "roots.h" for call in self.calls))
 
     @property
     def multiplies_lanes(self) -> bool:
@@ -239,7 +250,7 @@ class PackageView:
     @property
     def uses_frames(self) -> bool:
         """Whether some function is about the named frames."""
-        return uses_frames(self.functions) or bool(self.info.payload)
+        return uses_frames(function.signature for function in self.functions) or bool(self.info.payload)
 
 
 @collecting_rarely()
@@ -255,7 +266,8 @@ def package_view(
         raise InputError(f"{info.name}: no functions to emit", "choose at least one with --functions")
     if info.l == 0:
         raise InputError(f"{info.name}: the model has no base parameters", "give its links inertia")
-    check_range(info, kernels, options.c_real)
+    check_range(info, kernels, c_real(options))
+    _check_calls(info, kernels, options)
     if info.friction and options.trig == "freestanding":
         raise InputError(
             f"{info.name}: friction needs tanh, which is libm's, and the package is freestanding",
@@ -270,5 +282,16 @@ def package_view(
         given_vectors(package.kernels, package.dof),
         any(kernel.theta for kernel in package.kernels),
     )
-    view = reference_view(references, options.c_real, vectors, labels(package.kernels), takes_theta)
+    view = reference_view(references, c_real(options), vectors, labels(package.kernels), takes_theta)
     return replace(package, references=view)
+
+
+def _check_calls(info: PackageInfo, kernels: Mapping[str, Kernel], options: EmitOptions) -> None:
+    """InputError where a freestanding package would call the C library."""
+    for kernel in kernels.values() if options.trig == "freestanding" else ():
+        for call in call_views(calls_of(kernel.single)):
+            if call.is_library:
+                raise InputError(
+                    f"{info.name}: {kernel.name} needs {call.op}, which is libm's, and the package is freestanding",
+                    "emit it with --trig inline, or leave the function out",
+                )

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from psdmc.backends.c.adapters import ADAPTERS
 from psdmc.backends.c.function_view import FunctionView
-from psdmc.backends.c.manifest import manifest
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.render import render
+from psdmc.backends.describe import option_items
+from psdmc.backends.manifest import manifest
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
 
 
 def package_files(package: PackageView) -> dict[str, str]:
@@ -22,8 +28,38 @@ def package_files(package: PackageView) -> dict[str, str]:
             package.robot, package.real, package.kernels, package.info.nq > package.info.nv
         )
     files = {path: licensed(path, text) for path, text in files.items()}
-    files["manifest.json"] = manifest(package.robot, package.info, package.options, package.functions, files)
+    files["manifest.json"] = _manifest(package, files)
     return files
+
+
+def _manifest(package: PackageView, files: Mapping[str, str]) -> str:
+    own = {**_target(package.target), "real": package.real, "lanes": package.lanes}
+    functions = [_function(function) for function in package.functions]
+    return manifest(
+        package.robot, package.info, option_items(package.info, package.options), own, functions, files
+    )
+
+
+def _target(target: Target) -> dict[str, Any]:
+    """A target that was chosen: its name, and the flags that compilers take for it."""
+    return {} if target == NATIVE else {"target": {"name": target.name, "flags": list(target.flags)}}
+
+
+def _function(function: FunctionView) -> dict[str, Any]:
+    return {
+        "name": function.name,
+        "meaning": function.meaning,
+        "kernels": [
+            {
+                "name": kernel.name,
+                "lowering": kernel.lowering,
+                "cost": kernel.cost,
+                **({"cost_with_limbs_in_lanes": str(kernel.limbs.cost)} if kernel.limbs else {}),
+                "prototypes": [prototype.text for prototype in kernel.prototypes.values()],
+            }
+            for kernel in function.kernels
+        ],
+    }
 
 
 C_SUFFIXES = (".c", ".h", ".hpp", ".inc")
@@ -61,16 +97,19 @@ def library_files(package: PackageView) -> dict[str, str]:
     }
     if package.products:
         named["src/products.h"] = "products.h.jinja"
-    if package.has_roots:
-        named["src/roots.h"] = "roots.h.jinja"
+    named |= {f"src/{header}": f"{header}.jinja" for header in package.call_headers}
     files = {path: render(template, package=package) for path, template in named.items()}
     for vector in package.vectors.of_limbs:
-        files[f"src/{vector.name}.h"] = render("limbs.h.jinja", package=package, limbs=vector)
+        files[f"src/{vector.name}.h"] = render(
+            "limbs.h.jinja", package=package, limbs=vector, calls=package.limb_calls(vector.count)
+        )
     for function in package.functions:
         for unit in function.units:
-            files[f"src/{unit.name}.c"] = render(_template(package, unit), package=package, function=unit)
+            files[f"src/{unit.name}.c"] = render(
+                "regions.c.jinja" if unit.is_regions else "function.c.jinja", package=package, function=unit
+            )
         for kernel in function.kernels:
-            if kernel.called:
+            if kernel.regions:
                 continue
             bodies = {kernel.single_file: kernel.single_body, kernel.lanes_file: kernel.lanes_body}
             for file, body in bodies.items():
@@ -88,12 +127,6 @@ def library_files(package: PackageView) -> dict[str, str]:
     if package.info.friction:
         files["src/friction.c"] = render("friction.c.jinja", package=package)
     return files
-
-
-def _template(package: PackageView, function: FunctionView) -> str:
-    if not function.signature.calls:
-        return "function.c.jinja"
-    return "stages_wide.c.jinja" if package.info.is_wide else "stages.c.jinja"
 
 
 def _build_files(package: PackageView) -> tuple[tuple[str, str], ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from psdmc.backends.c.body import has_roots, sections_of, unread, without_products
+from psdmc.backends.c.body import calls_of, sections_of, unread, without_products
 from psdmc.backends.c.c_expr import Names
 from psdmc.backends.c.lines import KEPT, KEPT_REALS, Body, GroupStore, Part, Store, Zeros
 from psdmc.backends.c.products import Entry, Multiplication, multiplication
@@ -56,7 +56,7 @@ def body_in_parts(
         read = {slot.vector for slot in part.inputs()}
         parts.append(_part(names, read, in_groups, multiplied, Body(sections, ())))
     kept = (f"{'V' if vector == KEPT else 'real'} {vector}[{length}]" for vector, length in cut.kept.items())
-    return Body((), unread(program, inputs), multiplied, has_roots(program), tuple(parts), tuple(kept))
+    return Body((), unread(program, inputs), multiplied, calls_of(program), tuple(parts), tuple(kept))
 
 
 def _without_zeros(program: Program, sizes: Mapping[str, int]) -> tuple[Program, list[Zeros]]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.options import CReal
 from psdmc.backends.c.prototypes import Prototype, payload_prototypes
+from psdmc.backends.c.reals import CReal
 from psdmc.backends.c.tables import number
 
 

@@ -64,9 +64,11 @@ def bodies_prototype(robot: str, real: str) -> Prototype:
     return Prototype("void", f"{robot}_theta_from_bodies", (*given, f"{real} *theta_b"))
 
 
-def friction_prototype(robot: str, real: str) -> Prototype:
+def friction_prototype(robot: str, real: str, by_position: bool) -> Prototype:
     """The function of the joints' friction."""
-    return Prototype("void", f"{robot}_friction", (f"const {real} *qd", f"{real} *tau_f"))
+    given = ("q", "qd") if by_position else ("qd",)
+    arguments = (*(f"const {real} *{name}" for name in given), f"{real} *tau_f")
+    return Prototype("void", f"{robot}_friction", arguments)
 
 
 def _returns(function: Signature, variant: Variant) -> str:

@@ -5,10 +5,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from typing import Literal
 
-from psdmc.backends.c.info import PackageInfo
+from psdmc.backends.info import PackageInfo
+from psdmc.backends.options import EmitOptions
 from psdmc.errors import InputError
 from psdmc.program.kernel import Kernel
+
+CReal = Literal["double", "float"]
 
 LARGEST_FLOAT = math.ldexp(2.0 - 2.0**-23, 127)
 SMALLEST_FLOAT = math.ldexp(1.0, -149)
@@ -16,6 +20,11 @@ SMALLEST_FLOAT = math.ldexp(1.0, -149)
 
 TOO_LARGE = LARGEST_FLOAT + math.ldexp(1.0, 103)
 """From this number on, numbers round to infinity: half a last digit beyond the largest."""
+
+
+def c_real(options: EmitOptions) -> CReal:
+    """The package's real type in C."""
+    return "double" if options.real == "float64" else "float"
 
 
 def rounded_out(value: float, real: str) -> float:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.backends.c.reference_load import LoadView, load_view
-from psdmc.backends.c.reference_states import ReferenceStates
 from psdmc.backends.c.self_test import GivenVector
 from psdmc.backends.c.tables import number
+from psdmc.backends.reference_load import COM, INERTIA, MASS, ReferenceLoad
+from psdmc.backends.reference_states import ReferenceStates
+from psdmc.robot.inertia import six_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,16 @@ class ReferenceTable:
     name: str
     columns: int
     rows: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LoadView:
+    """The same as C text: mass, com, inertia (Ixx Ixy Iyy Ixz Iyz Izz), and the rows of `added`."""
+
+    mass: str
+    com: str
+    inertia: str
+    added: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +75,7 @@ def reference_view(
     known = tuple(label for label in labels if label in references.expected)
     expected = [_table(f"{label}_expected", references.expected[label], real) for label in known]
     theta_b = tuple(number(value, real) for value in references.theta_b.tolist()) if takes_theta else ()
-    load = None if references.load is None else load_view(references.load, real)
+    load = None if references.load is None else _load_view(references.load, real)
     count = len(next(iter(references.given.values())))
     return ReferenceView(count, (*given, *expected), known, theta_b, load)
 
@@ -73,3 +84,15 @@ def _table(name: str, array: NDArray[np.float64], real: str) -> ReferenceTable:
     rows: Sequence[Sequence[float]] = np.asarray(array, float).tolist()
     texts = tuple(", ".join(number(value, real) for value in row) for row in rows)
     return ReferenceTable(name, array.shape[1], texts)
+
+
+def _load_view(load: ReferenceLoad, real: str) -> LoadView:
+    """The load as C constants."""
+
+    def listed(values: NDArray[np.float64]) -> str:
+        return ", ".join(number(float(value), real) for value in values)
+
+    inertia = listed(np.asarray(six_of(INERTIA)))
+    return LoadView(
+        number(MASS, real), listed(np.array(COM)), inertia, tuple(listed(row) for row in load.added)
+    )

@@ -6,18 +6,9 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.prototypes import Prototype
-from psdmc.program.signature import TAU
-
-TOLERANCES = {"float64": "1e-10", "float32": "1e-3"}
-FORWARD_TOLERANCES = {"float64": "1e-7", "float32": "1e-1"}
-"""Relative to a joint's largest value: large enough for badly conditioned mass matrices, small enough to detect wrong
-code."""
-
-ROWS = ("6", "nv")
-"""First axes of outputs of which each row is compared relative to its own largest value; other outputs are compared
-relative to the largest of all entries."""
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.self_test import compared_by_row, given_name, tolerance
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +73,7 @@ def given_vectors(kernels: Iterable[KernelView], n: int) -> tuple[GivenVector, .
     """Inputs of all these kernels, by the reference states' names, each once."""
     return tuple(
         dict.fromkeys(
-            GivenVector(_given(kernel, v.name), v.size, v.size == n)
+            GivenVector(given_name(v.name, kernel.theta), v.size, v.size == n)
             for kernel in kernels
             for v in kernel.inputs
         )
@@ -101,16 +92,15 @@ def _label(kernel: KernelView, k: int) -> str:
 def _check(kernel: KernelView, k: int, n: int, options: EmitOptions, known: Collection[str]) -> SelfCheck:
     """The check of output number k; the kernel's other outputs are written to an array that is not compared."""
     quantity, output, label = kernel.function.outputs[k], kernel.outputs[k], _label(kernel, k)
-    rows = output.shape[0] if quantity.axes and quantity.axes[0] in ROWS else 1
+    rows = output.shape[0] if compared_by_row(quantity) else 1
     prototypes = kernel.prototypes
     theta = ["theta_b_given"] if kernel.theta else []
-    names = [_given(kernel, vector.name) for vector in kernel.inputs]
+    names = [given_name(vector.name, kernel.theta) for vector in kernel.inputs]
     each = [f"{given.name}_rows + row * {given.length}" for given in given_vectors([kernel], n)]
     batch, lanes = (
         ["count", *(f"{name}_rows" for name in names)],
         ["count", *(f"{name}_lanes" for name in names)],
     )
-    tolerances = FORWARD_TOLERANCES if kernel.positive else TOLERANCES
 
     def found(place: str) -> list[str]:
         return [place if i == k else f"unseen[{i}]" for i in range(len(kernel.outputs))]
@@ -125,15 +115,10 @@ def _check(kernel: KernelView, k: int, n: int, options: EmitOptions, known: Coll
         lanes=_call(prototypes["batch_soa"], [*lanes, *found("blocks")]) if "batch_soa" in prototypes else "",
         status=kernel.positive is not None,
         expected=f"{label}_expected" if label in known else "",
-        tolerance=tolerances[options.real],
+        tolerance=tolerance(kernel.function, options.real),
     )
 
 
 def _call(prototype: Prototype, arguments: list[str]) -> str:
     call = f"{prototype.symbol}({', '.join(arguments)})"
     return call if prototype.returns == "void" else f"status |= {call} != 0"
-
-
-def _given(kernel: KernelView, vector: str) -> str:
-    """The reference states' name of an input: torques have one with the compiled-in parameters and one with theta_b."""
-    return f"{vector}_theta" if kernel.theta and vector == TAU.name else vector

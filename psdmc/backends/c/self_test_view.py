@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from psdmc.backends.c.kernel_view import KernelView
-from psdmc.backends.c.options import EmitOptions
-from psdmc.backends.c.self_test import TOLERANCES, GivenVector, SelfCheck, given_vectors, self_checks
+from psdmc.backends.c.self_test import GivenVector, SelfCheck, given_vectors, self_checks
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.self_test import TOLERANCES
 
 
 @dataclass(frozen=True, slots=True)

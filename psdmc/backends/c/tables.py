@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from psdmc.backends.c.info import PackageInfo
 from psdmc.backends.c.names import c_string
 from psdmc.backends.c.reals import rounded_out
+from psdmc.backends.info import PackageInfo
 
 
 @dataclass(frozen=True, slots=True)

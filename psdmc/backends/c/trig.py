@@ -22,11 +22,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from psdmc.backends.c.trig_numbers import NUMBERS, Constants, Real, constants, plain_number
+from psdmc.backends.c.trig_numbers import Constants, constants, plain_number
+from psdmc.backends.trig_numbers import NUMBERS, Real
+from psdmc.target.target import Trig
 from psdmc.target.vectors import VectorUnit
 
 Far = Literal["libm", "nan"]
 """The result for an angle beyond the limit: libm's sine and cosine on a rare branch, or NaN (freestanding)."""
+
+
+def far_of(trig: Trig) -> Far:
+    """What becomes of angles beyond the inline sincos's range."""
+    return "nan" if trig == "freestanding" else "libm"
+
 
 SIGNED: dict[Real, str] = {"double": "long long", "float": "int"}
 """Signed integer as wide as a real, in C's spelling for GCC's builtins."""

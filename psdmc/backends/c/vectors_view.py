@@ -6,15 +6,17 @@ from dataclasses import dataclass
 
 from psdmc.backends.c.lanes import VectorWidth, vector_widths
 from psdmc.backends.c.limbs import LimbVector, limb_units, limb_vectors
-from psdmc.backends.c.options import EmitOptions
+from psdmc.backends.c.reals import c_real
 from psdmc.backends.c.trig import (
     ScalarTrig,
     TrigPreamble,
     VectorTrig,
+    far_of,
     scalar_trig,
     trig_preamble,
     vector_trig,
 )
+from psdmc.backends.options import EmitOptions
 from psdmc.target.vectors import FLOATS_STAY, HAS_VECTORS, LANE_BLOCK_BYTES
 
 
@@ -33,7 +35,7 @@ class VectorsView:
     @property
     def condition(self) -> str:
         """Preprocessor condition: the compiler has GCC's vector extension, and rounds as the sincos needs."""
-        is_double = self.options.c_real == "double"
+        is_double = c_real(self.options) == "double"
         return HAS_VECTORS if is_double else f"{HAS_VECTORS} && {FLOATS_STAY}"
 
     @property
@@ -54,7 +56,7 @@ class VectorsView:
     @property
     def preamble(self) -> TrigPreamble:
         """What the inline sines of all widths share."""
-        return trig_preamble(self.robot, self.options.c_real, self.options.far)
+        return trig_preamble(self.robot, c_real(self.options), far_of(self.options.trig))
 
     @property
     def sines(self) -> tuple[VectorTrig, ...]:
@@ -62,12 +64,14 @@ class VectorsView:
         units = dict.fromkeys(width.unit for width in self.widths)
         units |= dict.fromkeys(width.angles.unit for width in self.widths)
         units |= dict.fromkeys(limb_units(self.of_limbs, self.options))
-        return tuple(vector_trig(self.robot, self.options.c_real, unit, self.options.far) for unit in units)
+        return tuple(
+            vector_trig(self.robot, c_real(self.options), unit, far_of(self.options.trig)) for unit in units
+        )
 
     @property
     def scalar_sine(self) -> ScalarTrig:
         """The inline sincos of one angle."""
-        return scalar_trig(self.robot, self.options.c_real, self.options.far, short=not self.widths)
+        return scalar_trig(self.robot, c_real(self.options), far_of(self.options.trig), short=not self.widths)
 
     @property
     def sincos_types(self) -> tuple[tuple[str, str], ...]:

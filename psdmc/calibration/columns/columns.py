@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.columns.effect import Content, Effect, Motion, Unknown
-from psdmc.calibration.columns.kinds import kinds_of
+from psdmc.calibration.columns.flags import joints_of
+from psdmc.calibration.columns.kinds import KINDS
+from psdmc.calibration.columns.rubbing import rubbing
 from psdmc.calibration.columns.spring import Spring
 from psdmc.calibration.logs.log import Array
-from psdmc.calibration.logs.toml_tables import TomlTable, require_none, shown
+from psdmc.calibration.logs.toml_tables import TomlTable, is_number, require_none, shown
 from psdmc.calibration.logs.wording import quoted
+from psdmc.friction.law import Law, Term
+from psdmc.friction.own import laws_of, read_law
+from psdmc.friction.terms import KEYS, OPTIONAL
 from psdmc.robot.mechanism import Mechanism
 
 MOST_SPRINGS = 50
@@ -59,6 +65,11 @@ class Columns:
     def never_negative(self) -> NDArray[np.bool_]:
         return np.array([unknown.never_negative for unknown in self.unknowns], dtype=bool)
 
+    @property
+    def start(self) -> Array:
+        """(m,) values that are kept where the data do not show them."""
+        return np.array([unknown.start for unknown in self.unknowns])
+
     def values(self, motion: Motion) -> Array:
         """(N, n, m) motor torque per unit of each unknown, before any filter."""
         if not self.effects:
@@ -72,29 +83,34 @@ class Columns:
 
 
 def read_columns(
-    content: Mapping[str, Any], chain: Mechanism, where: str = "description", offsets: bool = True
+    content: Mapping[str, Any],
+    chain: Mechanism,
+    where: str = "description",
+    offsets: bool = True,
+    folder: Path | None = None,
 ) -> Columns:
     """The columns of a description's tables `springs` and `friction`; other keys are not looked at.
 
     where    the file, for messages
     offsets  whether plain friction has offsets unless the tables say otherwise
+    folder   of the Python files of users' own friction laws; None: no file is run, as for a model file's content
 
     InputError with the first faults.
     """
     faults: list[str] = []
     springs = _springs(content.get("springs", []), chain, faults)
-    rubbing, friction = _friction(content.get("friction", {}), chain, offsets, faults)
+    rubs, friction = _friction(content.get("friction", {}), chain, offsets, folder, faults)
     require_none(faults, where, HINT)
     kept = {"springs": content.get("springs"), "friction": friction}
-    plain = friction.get("offset", True) is True
-    return Columns((*springs, *rubbing), {key: value for key, value in kept.items() if value}, plain)
+    plain = friction.get(OPTIONAL.name, True) is True
+    return Columns((*springs, *rubs), {key: value for key, value in kept.items() if value}, plain)
 
 
 def _springs(value: object, chain: Mechanism, faults: list[str]) -> tuple[Effect, ...]:
     if not isinstance(value, list) or len(value) > MOST_SPRINGS:
         faults.append(f"springs: found {shown(value)}, expected [[springs]], at most {MOST_SPRINGS}")
         return ()
-    kinds, found, names = kinds_of("springs"), [], list[str]()
+    kinds, found, names = KINDS, [], list[str]()
     for k, entry in enumerate(value, start=1):
         where, own = f"spring {k}", list[str]()
         kind = (
@@ -122,26 +138,86 @@ def _is_text(entry: Mapping[str, Any], key: str) -> bool:
 
 
 def _friction(
-    value: object, chain: Mechanism, offsets: bool, faults: list[str]
+    value: object, chain: Mechanism, offsets: bool, folder: Path | None, faults: list[str]
 ) -> tuple[tuple[Effect, ...], Content]:
-    """The effects of [friction], and the table with what it says of offsets."""
-    kinds = kinds_of("friction")
-    content = TomlTable(value, "friction", tuple(kinds), faults).content
-    table = TomlTable(_with_offsets(content, chain, offsets), "friction", tuple(kinds), [])
+    """The effects of `friction`, and the table with what it says of offsets and the laws themselves. A text or a list of
+    texts names users' own laws, which all joints have."""
+    if isinstance(value, str) or (
+        isinstance(value, list) and value and all(isinstance(x, str) for x in value)
+    ):
+        value = {"laws": value if isinstance(value, list) else [value]}
+    given = value.get("laws", []) if isinstance(value, dict) else []
+    data = _own_laws(given, folder, faults)
+    own = laws_of(data)
+    laws = KEYS | own
+    content = dict(TomlTable(value, "friction", (*laws, "laws"), faults).content)
+    content |= {name: True for name in own if name not in content}
+    content = _with_offsets(content, laws, chain, offsets) | ({"laws": data} if data else {})
+    table = TomlTable(content, "friction", (*laws, "laws"), [])
     table.faults = faults
-    effects = [
-        effect for name, kind in kinds.items() if table.has(name) for effect in kind.read(table, chain)
-    ]
-    return tuple(effects), table.content
+    found = [_terms(law, table, chain) for name, law in laws.items() if table.has(name)]
+    return tuple(rubbing(terms, chain) for terms in found if terms), content
 
 
-def _with_offsets(content: Content, chain: Mechanism, offsets: bool) -> dict[str, Any]:
-    """Where some joints' friction is asymmetric and the table speaks of no offsets, the other joints have them: an asymmetry
-    and an offset differ near rest only. Offsets of all joints that plain friction has not are listed."""
-    given, said = content.get("asymmetric"), content.get("offset")
+def _own_laws(given: object, folder: Path | None, faults: list[str]) -> list[Any]:
+    """The plain values of users' own laws: of their files, or as a model file holds them."""
+    if not isinstance(given, list):
+        faults.append(f"friction: laws: found {shown(given)}, expected a list of Python files")
+        return []
+    odd = [shown(item) for item in given if not isinstance(item, dict) and not str(item).endswith(".py")]
+    files = [item for item in given if isinstance(item, str)]
+    if odd or (files and folder is None):
+        faults.append(
+            f"friction: found {[*odd, *map(shown, files)][0]}, expected a friction law's Python file"
+        )
+        return []
+    data = [read_law(folder / item) if folder and isinstance(item, str) else item for item in given]
+    try:
+        laws_of(data)
+    except ValueError as error:
+        faults.append(f"friction: laws: {error}")
+        return []
+    return data
+
+
+def _terms(law: Law, table: TomlTable, chain: Mechanism) -> list[tuple[int, Term]]:
+    """What [friction] says of a law: which joints have it, and with which numbers."""
+    value, where, number = table.content[law.name], f"{table.where}: {law.name}", law.number
+    if number is None:
+        joints = joints_of(value, where, chain, table.faults)
+        everyone_s = law is OPTIONAL and isinstance(value, bool)
+        return [] if everyone_s else [(k, Term(law)) for k in joints]
+    own = TomlTable(value, where, (number.key, "joints"), table.faults)
+    numbers = own.items(number.key)
+    if not 0 < len(numbers) <= number.most or not all(
+        is_number(v) and number.low <= v <= number.high for v in numbers
+    ):
+        own.faults.append(
+            f"{where}: {number.key}: found {shown(own.content.get(number.key, []))}, expected 1 to {number.most} numbers "
+            f"from {number.low:g} to {number.high:g} {number.unit}"
+        )
+        return []
+    terms = [Term(law, float(v)) for v in numbers]
+    if len({term.names for term in terms}) < len(terms):
+        own.faults.append(f"{where}: {number.key}: one of them twice")
+    joints = joints_of(own.content.get("joints", True), f"{where}: joints", chain, table.faults)
+    return [(k, term) for k in joints for term in terms]
+
+
+def _with_offsets(
+    content: Content, laws: Mapping[str, Law], chain: Mechanism, offsets: bool
+) -> dict[str, Any]:
+    """Where some joints have a law instead of an offset and the table speaks of no offsets, the other joints have them: an
+    asymmetry and an offset differ near rest only. Offsets of all joints that plain friction has not are listed."""
+    key = OPTIONAL.name
+    said = content.get(key)
     if said is True and not offsets:
-        return {**content, "offset": list(chain.joint_names)}
-    if said is not None or not offsets or not given or not isinstance(given, bool | list):
+        return {**content, key: list(chain.joint_names)}
+    instead = [content[name] for name, law in laws.items() if law.instead == key and content.get(name)]
+    instead = [value for value in instead if isinstance(value, bool | list)]
+    if said is not None or not offsets or not instead:
         return dict(content)
-    lacking = chain.joint_names if isinstance(given, bool) else given
-    return {**content, "offset": [name for name in chain.joint_names if name not in lacking]}
+    lacking = [
+        name for value in instead for name in (chain.joint_names if isinstance(value, bool) else value)
+    ]
+    return {**content, key: [name for name in chain.joint_names if name not in lacking]}

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import TomlTable
 from psdmc.robot.mechanism import Mechanism
-
-Section = Literal["springs", "friction"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +17,7 @@ class Unknown:
 
     never_negative  whether only values from zero on are possible: friction takes energy, a gas spring pushes
     within          name of another value of the same owner that its size may not exceed; "": none
+    start           where the data do not show it
     """
 
     owner: str
@@ -26,21 +25,23 @@ class Unknown:
     unit: str
     never_negative: bool = True
     within: str = ""
+    start: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """Rows of a motion. N rows, n joints.
 
-    q, qd       (N, n)  rad, rad/s (m, m/s)
-    speed       (N, n)  of what rubs: the joints', or where motors drive several joints, the motors'
-    sign_speed  rad/s over which friction changes sign: tanh(speed / sign_speed)
-    load        (N, n)  torque of the rigid bodies on what rubs, N m (N); None where no effect asks for it
-    onto        (n, n)  torques of what rubs @ onto are the joints'; None: they are these themselves
+    q, qd         (N, n)  rad, rad/s (m, m/s)
+    place, speed  (N, n)  of what rubs: the joints', or where motors drive several joints, the motors'
+    sign_speed    rad/s over which friction changes sign: tanh(speed / sign_speed)
+    load          (N, n)  torque of the rigid bodies on what rubs, N m (N); None where no effect asks for it
+    onto          (n, n)  torques of what rubs @ onto are the joints'; None: they are these themselves
     """
 
     q: Array
     qd: Array
+    place: Array
     speed: Array
     sign_speed: float
     load: Array | None = None
@@ -65,15 +66,14 @@ class Effect(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of effect: the file that it has in `kinds`.
+    """One kind of spring: the file that it has in `kinds`.
 
-    section  springs: a [[springs]] entry whose `kind` is the name; friction: the key of [friction] that has the name
-    keys     of a spring's entry, beside `kind` and `name`; none for friction
-    read     the effects of an entry: from its table, the robot, and what is not an entry's own. Faults go to the table's
+    name  the `kind` of a [[springs]] entry
+    keys  of the entry, beside `kind` and `name`
+    read  the effects of an entry: from its table and the robot. Faults go to the table's
     """
 
     name: str
-    section: Section
     keys: tuple[str, ...]
     read: Callable[[TomlTable, Mechanism], tuple[Effect, ...]]
 

@@ -1,36 +1,49 @@
-"""Friction terms of single joints."""
+"""Friction of single joints by terms of friction laws."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from psdmc.calibration.columns.effect import Motion, Unknown
 from psdmc.calibration.logs.log import Array
-
-Term = Callable[[Array, Array, Array], Array]
-"""Torque per unit of a value, of one joint's smooth sign, speed and load, (N,) each."""
+from psdmc.friction.law import At, Term
+from psdmc.robot.mechanism import Mechanism
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rubbing:
-    """Values of joints, each with its joint and its term.
+    """Terms, each of one joint, and all their values one after the other."""
 
-    joints   one for each unknown
-    by_load  whether a term depends on the rigid bodies' torque
-    """
-
+    terms: tuple[tuple[int, Term], ...]
     unknowns: tuple[Unknown, ...]
-    joints: tuple[int, ...]
-    terms: tuple[Term, ...]
-    by_load: bool = False
+
+    @property
+    def by_load(self) -> bool:
+        return any("load" in term.reads for _, term in self.terms)
 
     def columns(self, motion: Motion) -> Array:
-        found = np.zeros((*motion.speed.shape, len(self.unknowns)))
         load = np.zeros_like(motion.speed) if motion.load is None else motion.load
-        for k, (joint, term) in enumerate(zip(self.joints, self.terms, strict=True)):
-            speed = motion.speed[:, joint]
-            found[:, joint, k] = term(np.tanh(speed / motion.sign_speed), speed, load[:, joint])
+        sign = np.tanh(motion.speed / motion.sign_speed)
+        each = []
+        for joint, term in self.terms:
+            at = At(*(part[:, joint] for part in (motion.place, motion.speed, sign, load)))
+            each += [(joint, column) for column in term.columns(at)]
+        found = np.zeros((*motion.speed.shape, len(each)))
+        for k, (joint, column) in enumerate(each):
+            found[:, joint, k] = column
         return found if motion.onto is None else np.einsum("tmk,mj->tjk", found, motion.onto)
+
+
+def rubbing(terms: Sequence[tuple[int, Term]], chain: Mechanism) -> Rubbing:
+    """The effect of terms, each of one joint."""
+    unknowns = [
+        Unknown(chain.joint_names[joint], name, unit, value.low >= 0.0, value.within, value.start)
+        for joint, term in terms
+        for name, unit, value in zip(
+            term.names, term.units(chain.joints[joint].type.effort_unit), term.law.values, strict=True
+        )
+    ]
+    return Rubbing(tuple(terms), tuple(unknowns))

@@ -10,16 +10,14 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.low_pass import LARGEST_CUTOFF, SMALLEST_CUTOFF
 from psdmc.calibration.logs.toml_tables import TomlTable, shown
-from psdmc.calibration.logs.wording import listed, quoted
+from psdmc.calibration.logs.wording import listed
+from psdmc.friction.terms import expected_words, options_of
 
 KEYS = ("cutoff", "held_out", "blocks", "friction", "sign_speed")
 LARGEST_HELD_OUT = 0.9
 MOST_BLOCKS = 1000
 SLOWEST, FASTEST = 1e-6, 10.0
 """rad/s (m/s), of the speed over which friction changes sign."""
-LARGEST_EXPONENT = 4.0
-MOST_EXPONENTS = 4
-EXPECTED_FRICTION = "coulomb, viscous, viscous^EXPONENT (above 0, to 4), offset"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +26,7 @@ class FitChoice:
 
     cutoff      Hz
     split       share that is held out of each log for fitting, and blocks
-    exponents   of the viscous terms;  offset  whether each joint's torque has a constant
+    exponents   of the terms that grow with speed;  offset  whether each joint's torque has a constant
     sign_speed  rad/s (m/s)
     """
 
@@ -81,46 +79,13 @@ def _friction(table: TomlTable, faults: list[str]) -> tuple[tuple[float, ...], b
     words = table.items("friction")
     odd = [shown(word) for word in words if not isinstance(word, str)]
     if odd:
-        faults.append(f"fit: friction: found {listed(odd)}, expected {EXPECTED_FRICTION}")
+        faults.append(f"fit: friction: found {listed(odd)}, expected {expected_words()}")
         return (), False
-    found = friction_terms_of(words)
+    found = options_of(words)
     if isinstance(found, str):
         faults.append(f"fit: friction: {found}")
         return (), False
     return found
-
-
-def friction_terms_of(words: Sequence[str]) -> tuple[tuple[float, ...], bool] | str:
-    """Exponents of the viscous terms, and whether there is an offset, of names of terms; else what is wrong."""
-    exponents, offset = [], False
-    for word in words:
-        exponent = _exponent(word)
-        if word == "offset":
-            offset = True
-        elif exponent is not None:
-            exponents.append(exponent)
-        elif word != "coulomb":
-            return f"found {quoted(word)}, expected {EXPECTED_FRICTION}"
-    if "coulomb" not in words:
-        return "no coulomb, expected it among the terms: it is always fitted"
-    if len(set(words)) < len(words) or len(set(exponents)) < len(exponents):
-        return "a term twice, expected each once"
-    if len(exponents) > MOST_EXPONENTS:
-        return f"{len(exponents)} viscous terms, expected at most {MOST_EXPONENTS}"
-    if exponents and "viscous" not in words:
-        return "viscous^EXPONENT without viscous, expected both"
-    return tuple(sorted(exponents, key=lambda d: (d != 1.0, d))), offset
-
-
-def _exponent(word: str) -> float | None:
-    if word == "viscous":
-        return 1.0
-    head, _, number = word.partition("^")
-    try:
-        value = float(number)
-    except ValueError:
-        return None
-    return value if head == "viscous" and 0.0 < value <= LARGEST_EXPONENT else None
 
 
 def with_choice(options: LinearOptions, choice: FitChoice) -> LinearOptions:

@@ -20,9 +20,10 @@ def motion_of(
 ) -> Motion:
     """The motion for columns, of joints' positions, speeds and rigid torques (N, n): with a coupling, motors rub."""
     if coupling is None:
-        return Motion(q, qd, qd, sign_speed, load)
+        return Motion(q, qd, q, qd, sign_speed, load)
     of_motors = None if load is None else coupling.torque_of_motors(load)
-    return Motion(q, qd, coupling.to_motors(qd), sign_speed, of_motors, coupling.inverse)
+    place, speed = coupling.to_motors(q), coupling.to_motors(qd)
+    return Motion(q, qd, place, speed, sign_speed, of_motors, coupling.inverse)
 
 
 def extra_scale(chain: Mechanism, columns: Columns, sign_speed: float, sizes: Array) -> Array:

@@ -34,16 +34,16 @@ class FrictionResult:
 
 
 def calibrate_friction(
-    runs: Mapping[str, JointRun], lugre: FrictionOptions, start: FrictionResult | None = None
+    runs: Mapping[str, JointRun], options: FrictionOptions, start: FrictionResult | None = None
 ) -> FrictionResult:
-    """LuGre friction of every joint that has a run.
+    """Friction with a state of every joint that has a run.
 
     runs    by joint, as `prepared_runs` makes them
     start   an earlier pass, to start from instead of searching
     """
     earlier = start.joints if start is not None else {}
-    tasks = [(name, run, lugre, earlier.get(name)) for name, run in runs.items()]
-    found = {joint.joint: joint for joint in _fitted(tasks, lugre.workers)}
+    tasks = [(name, run, options, earlier.get(name)) for name, run in runs.items()]
+    found = {joint.joint: joint for joint in _fitted(tasks, options.workers)}
     warnings = tuple(
         f"joint {name}: friction parameter(s) not seen in the data: {', '.join(joint.unseen)}"
         for name, joint in found.items()

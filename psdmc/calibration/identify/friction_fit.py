@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from scipy import optimize
 
-from psdmc.calibration.identify.friction_run import JointRun, lugre_from
-from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
+from psdmc.calibration.identify.friction_run import JointRun
 from psdmc.calibration.identify.residuals import sample_correlation, widening
+from psdmc.calibration.identify.state_friction import PARAMETERS
 from psdmc.calibration.identify.steps import FrictionOptions
 from psdmc.calibration.logs.log import Array
+from psdmc.friction.state import STATE_LAW
 
 DELAY = 9
 FREE = {"lugre": tuple(range(10)), "coulomb_viscous": (0, 3, 7, 8, DELAY)}
@@ -41,7 +42,8 @@ UNSEEN_CURVATURE = 1e-13
 class JointFriction:
     """One joint's identified friction.
 
-    covariance   (7, 7)  in the order of lugre.PARAMETERS, of the fit alone, widened where residuals are correlated
+    friction     (7,)    the law's values, in the order of PARAMETERS
+    covariance   (7, 7)  of these, of the fit alone, widened where residuals are correlated
     unseen       names of parameters that the data do not determine
     inertia      kg m^2, of the joint in the run's pose, not negative
     offset       N m
@@ -51,7 +53,7 @@ class JointFriction:
     """
 
     joint: str
-    friction: Lugre
+    friction: Array
     covariance: Array
     unseen: tuple[str, ...]
     inertia: float
@@ -68,10 +70,8 @@ class JointFriction:
 
 def unknowns_of(found: JointFriction) -> Array:
     """(10,) the unknowns of a fit at its result: seven of LuGre as the fit has them, then inertia, offset and delay."""
-    f = found.friction
-    peak, log_speed, log_stiffness = f.static - f.coulomb, np.log(f.stribeck_velocity), np.log(f.stiffness)
-    seven = (f.coulomb, peak, log_speed, f.viscous, f.viscous_exponent, log_stiffness, f.damping)
-    return np.array([*seven, found.inertia, found.offset, found.delay])
+    own = [found.inertia, found.offset, found.delay]
+    return np.concatenate([STATE_LAW.unknowns(found.friction), own])
 
 
 def fit_joint(
@@ -223,12 +223,10 @@ def _put(p: Array, free: list[int], x: Array) -> Array:
 
 
 def _bounds(options: FrictionOptions) -> tuple[Array, Array]:
-    """Bounds: sigma_0, sigma_1, F_v, inertia >= 0, F_s >= F_c > 0, v_s > 0; the others keep the search within
-    reasonable numbers."""
+    """The law's, which keep the search within reasonable numbers, inertia >= 0, and the largest delay."""
     reach = options.largest_delay
-    low = [1e-9, 0.0, np.log(1e-5), 0.0, 0.05, np.log(1.0), 0.0, 0.0, -np.inf, -reach]
-    high = [np.inf, np.inf, np.log(1e2), np.inf, 3.0, np.log(1e9), np.inf, np.inf, np.inf, reach]
-    return np.array(low), np.array(high)
+    low, high = STATE_LAW.bounds
+    return np.append(low, [0.0, -np.inf, -reach]), np.append(high, [np.inf, np.inf, reach])
 
 
 def step_sizes(p: Array) -> Array:
@@ -245,22 +243,18 @@ def _covariance(jac: Array, residual: Array) -> Array:
     return np.asarray((directions * (variance / seen)) @ directions.T)
 
 
-def to_seven(friction: Lugre) -> Array:
-    """(7, 10) d lugre.PARAMETERS / d unknowns."""
-    turn = np.eye(7, 10)
-    turn[1, 0] = 1.0
-    turn[2, 2] = friction.stribeck_velocity
-    turn[5, 5] = friction.stiffness
-    return turn
+def to_seven(friction: Array) -> Array:
+    """(7, 10) d values / d unknowns."""
+    return np.hstack([STATE_LAW.slopes(friction), np.zeros((7, 3))])
 
 
 def _with_uncertainty(name: str, p: Array, spread: Array, options: FrictionOptions) -> JointFriction:
-    friction = lugre_from(p)
+    friction = STATE_LAW.from_unknowns(p[:7])
     turn = to_seven(friction)
     covariance = turn @ spread @ turn.T
-    relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction.as_array()), 1e-12)
+    relative = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(friction), 1e-12)
     unseen = [PARAMETERS[j] for j in range(7) if not relative[j] < options.unseen]
     no_peak = p[1] < 3.0 * float(np.sqrt(spread[1, 1]))  # F_s = F_c: v_s has no effect
-    if no_peak and "stribeck_velocity" not in unseen and options.law == "lugre":
-        unseen.append("stribeck_velocity")
+    if no_peak and PARAMETERS[2] not in unseen and options.law == "lugre":
+        unseen.append(PARAMETERS[2])
     return JointFriction(name, friction, covariance, tuple(unseen), float(p[7]), float(p[8]), float(p[9]))

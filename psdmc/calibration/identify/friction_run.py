@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.lugre import Lugre, friction_torque
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
+from psdmc.calibration.identify.state_friction import friction_torque
 from psdmc.calibration.identify.steps import FrictionRun, StepOptions
 from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import LowPass
 from psdmc.errors import InputError
+from psdmc.friction.state import STATE_LAW
 from psdmc.robot.mechanism import Mechanism
 
 MOST_KEPT = 12
@@ -54,7 +55,7 @@ class JointRun:
         if key not in self.kept:
             if len(self.kept) >= MOST_KEPT:
                 self.kept.clear()
-            self.kept[key] = friction_torque(lugre_from(p), self.qd, self.period)
+            self.kept[key] = friction_torque(STATE_LAW.from_unknowns(p[:7]), self.qd, self.period)
         return self.kept[key]
 
     def delayed(self, torque: Array, delay: float) -> Array:
@@ -63,11 +64,6 @@ class JointRun:
 
     def residual(self, p: Array, rows: NDArray[np.intp]) -> Array:
         return np.asarray((self.low_pass(self.torque(p)) - self.measured)[rows])
-
-
-def lugre_from(p: Array) -> Lugre:
-    """Seven parameters from unknowns: F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1."""
-    return Lugre(p[0], p[0] + p[1], float(np.exp(p[2])), p[3], p[4], float(np.exp(p[5])), p[6])
 
 
 def prepared(

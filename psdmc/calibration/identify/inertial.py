@@ -17,11 +17,11 @@ from psdmc.calibration.identify.friction import FrictionResult
 from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import GravityResult, gravity_split
 from psdmc.calibration.identify.least_squares import estimate
-from psdmc.calibration.identify.lugre import Lugre, friction_torque
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
+from psdmc.calibration.identify.state_friction import friction_torque
 from psdmc.calibration.identify.steps import InertialRun, StepOptions, judged
 from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Array
@@ -220,12 +220,12 @@ class _Late:
 def _friction_slopes(found: JointFriction, states: States, k: int, unmoved: Array) -> list[Array]:
     """d torque / d parameter for each of the seven, by one-sided differences that keep the bounds."""
     slopes = []
-    values, std = found.friction.as_array(), found.std
+    values, std = found.friction, found.std
     for j in range(7):
         step = FRICTION_STEP * min(std[j], 0.5 * abs(values[j])) or 1e-6 * max(abs(values[j]), 1e-6)
         moved = values.copy()
         moved[j] += step if j != 0 or values[0] + step <= values[1] else -step
-        changed = friction_torque(Lugre(*moved.tolist()), states.qd[:, k], states.period)
+        changed = friction_torque(moved, states.qd[:, k], states.period)
         slopes.append((changed - unmoved) / (moved[j] - values[j]))
     return slopes
 

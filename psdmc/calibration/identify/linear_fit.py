@@ -131,12 +131,13 @@ def _solved(
 def linear_prior(
     chain: Mechanism, model: Regressor, problem: LinearProblem, options: LinearOptions, theta_b: Array | None
 ) -> Prior:
-    """The file's theta_b, no friction and no springs; friction may be as large as its joint's torque at an ordinary
-    speed."""
+    """The file's theta_b, no springs, and friction where its laws start, which for psdmc's is zero; friction may be as large
+    as its joint's torque at an ordinary speed."""
     sizes = torque_sizes(problem.torque[~problem.held_out])
     rigid = base_parameter_scale(chain, model, sizes, theta_b)
     own = np.repeat(sizes, len(problem.friction))
     extra = extra_scale(chain, options.columns, options.sign_speed, sizes)
-    beside = np.zeros(len(own) + len(extra))
-    values = np.concatenate([np.zeros(problem.l) if theta_b is None else theta_b, beside])
+    plain = [value.start for term in problem.terms for value in term.law.values] * len(chain)
+    rigid_part = np.zeros(problem.l) if theta_b is None else theta_b
+    values = np.concatenate([rigid_part, np.array(plain), options.columns.start])
     return Prior(values, np.concatenate([rigid, own, extra]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from psdmc.calibration.columns.columns import Columns, read_columns
@@ -13,6 +14,8 @@ from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.log_survey import STRETCH_ROWS
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.stored_log import HELD_BYTES
+from psdmc.friction.law import Term
+from psdmc.friction.terms import every_joint_s
 from psdmc.model.calibrated import Matrix
 from psdmc.robot.mechanism import Mechanism
 
@@ -46,7 +49,13 @@ class LinearOptions:
     tables_from: str = "description"
     columns: Columns = field(default_factory=Columns)
 
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Friction of every joint."""
+        return every_joint_s(self.exponents, self.offset)
+
     def for_robot(self, chain: Mechanism) -> LinearOptions:
         """These with the columns that the tables mean; InputError names what is wrong in them."""
-        columns = read_columns(self.tables, chain, self.tables_from, self.offset)
+        folder = Path(self.tables_from).parent
+        columns = read_columns(self.tables, chain, self.tables_from, self.offset, folder)
         return replace(self, columns=columns, offset=self.offset and columns.plain_offsets)

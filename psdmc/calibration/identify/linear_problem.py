@@ -18,7 +18,7 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.model.calibrated import viscous_name
+from psdmc.friction.law import At, Term
 from psdmc.progress import Step
 from psdmc.robot.mechanism import Mechanism
 
@@ -27,6 +27,7 @@ from psdmc.robot.mechanism import Mechanism
 class LinearProblem:
     """The stacked rows of independent samples.
 
+    terms     of every joint's friction, which have f values
     rows      of the l + n f + m unknowns, N samples, with what the position sensors' noise alone would make of them
     torque    (N, n)  N m;  held_out (N,)
     columns   whose m values come last
@@ -37,13 +38,18 @@ class LinearProblem:
     torque: Array
     held_out: NDArray[np.bool_]
     l: int
-    friction: tuple[str, ...]
+    terms: tuple[Term, ...]
     columns: Columns = field(default_factory=Columns)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of the n f + m unknowns behind the base parameters, for messages."""
         return (*(f"{name} of {joint}" for joint, name in self.plain), *self.columns.names)
+
+    @property
+    def friction(self) -> tuple[str, ...]:
+        """f names of a joint's values, in order."""
+        return names_of(self.terms)
 
     @property
     def plain(self) -> tuple[tuple[str, str], ...]:
@@ -56,10 +62,10 @@ class LinearProblem:
 
     @property
     def never_negative(self) -> NDArray[np.bool_]:
-        """(l + n f + m,) true for friction other than offsets, which only takes energy and may not be negative, and for
-        extra columns that say so."""
-        own = np.array([name != "offset" for _, name in self.plain], dtype=bool)
-        return np.concatenate([np.zeros(self.l, dtype=bool), own, self.columns.never_negative])
+        """(l + n f + m,) true for friction that only takes energy and may not be negative, and for extra columns that say
+        so."""
+        own = [value.low >= 0.0 for term in self.terms for value in term.law.values] * len(self.chain)
+        return np.concatenate([np.zeros(self.l, dtype=bool), np.array(own), self.columns.never_negative])
 
     @property
     def limits(self) -> Array:
@@ -67,17 +73,15 @@ class LinearProblem:
         return limits_of(self.columns, self.plain, self.l)
 
 
-def friction_names(exponents: Sequence[float], offset: bool) -> tuple[str, ...]:
-    """Names of a joint's friction columns, in order."""
-    return ("coulomb", *(viscous_name(d) for d in exponents), *(("offset",) if offset else ()))
+def names_of(terms: Sequence[Term]) -> tuple[str, ...]:
+    """Names of a joint's values, in order."""
+    return tuple(name for term in terms for name in term.names)
 
 
-def friction_terms(qd: Array, sign_speed: float, exponents: Sequence[float], offset: bool) -> list[Array]:
-    """(N, n) each: the factors of the coefficients of Coulomb friction, the viscous terms and the offset, before the
-    filter."""
-    sign = np.tanh(qd / sign_speed)
-    terms = [sign, *(sign * np.abs(qd) ** d for d in exponents)]
-    return [*terms, np.ones_like(sign)] if offset else terms
+def friction_columns(terms: Sequence[Term], qd: Array, sign_speed: float) -> list[Array]:
+    """(N, n) each: torque per unit of each value, before the filter."""
+    at = At(v=qd, sign=np.tanh(qd / sign_speed))
+    return [np.broadcast_to(column, qd.shape) for term in terms for column in term.columns(at)]
 
 
 def linear_problem(
@@ -94,8 +98,8 @@ def linear_problem(
 
     carried  (l,)  base parameters of the load that friction depends on, where a column asks for it
     """
-    names = friction_names(options.exponents, options.offset)
-    width = l + len(chain) * len(names) + len(options.columns)
+    terms = options.terms
+    width = l + len(chain) * len(names_of(terms)) + len(options.columns)
     rows = KeptRows(len(chain), width, options.held_bytes)
     torques, outs, remarks = [], [], []
     for log in logs:
@@ -111,7 +115,7 @@ def linear_problem(
             progress(Step(f"linear fit: {log.name}: {share:.0%}", share))
         outs.append(held_out_of(log, count, options.split))
     problem = LinearProblem(
-        chain, rows, np.concatenate(torques), np.concatenate(outs), l, names, options.columns
+        chain, rows, np.concatenate(torques), np.concatenate(outs), l, terms, options.columns
     )
     return problem, tuple(remarks)
 
@@ -163,8 +167,8 @@ def _filtered_columns(
     smoothed = smoothed_rows(states, at, whole)
     rigid, extra = np.split(smoothed, [smoothed.shape[2] - len(options.columns)], axis=2)
     speed = motion[1] if coupling is None else coupling.to_motors(motion[1])
-    terms = friction_terms(speed, options.sign_speed, options.exponents, options.offset)
-    rubbed = np.stack([states.low_pass(term)[at] for term in terms], axis=-1)
+    own = friction_columns(options.terms, speed, options.sign_speed)
+    rubbed = np.stack([states.low_pass(column)[at] for column in own], axis=-1)
     n, f = rubbed.shape[1:]
     onto_joints = np.eye(n) if coupling is None else coupling.inverse
     spread = np.einsum("tkf,kj->tjkf", rubbed, onto_joints).reshape(len(at), n, n * f)

@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 from psdmc.calibration.identify.four_steps import FourSteps
 from psdmc.calibration.identify.friction import FrictionResult
 from psdmc.calibration.identify.friction_fit import JointFriction, step_sizes, to_seven, unknowns_of
-from psdmc.calibration.identify.friction_run import lugre_from
 from psdmc.calibration.identify.physical import nearest_physical, whitening_of
 from psdmc.calibration.logs.log import Array
+from psdmc.friction.state import STATE_LAW
 from psdmc.links.link_terms import PhysicalOptions
 from psdmc.model.dynamics_model import DynamicsModel
 
 SEVEN = 7
-NEVER_NEGATIVE = (True, True, False, True, True, False, True)
+NEVER_NEGATIVE = tuple(not value.logarithmic for value in STATE_LAW.values)
 """Of F_c, F_s - F_c, ln v_s, F_v, d_v, ln sigma_0, sigma_1. By the logarithms v_s and sigma_0 are positive; F_s >= F_c."""
 NEAR = 0.5
 """Step sizes by which a friction parameter may change that its run does not show: the relative standard deviation from
 which it is called unseen."""
 HELD = 1e-6
 """Step sizes by which a parameter may change that the friction law fixes: none, to the solver's accuracy."""
-SMALLEST = np.array([1e-9, 0.0, -np.inf, 0.0, 0.05, -np.inf, 0.0])
-"""Of the seven, as the friction run's own bounds, so that a value that the solver leaves on a bound is a LuGre law."""
+SMALLEST = np.where(NEVER_NEGATIVE, STATE_LAW.bounds[0], -np.inf)
+"""Of the seven, as the friction run's own bounds, so that a value that the solver leaves on a bound is one of the law's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +73,7 @@ def _bounded(l: int, joints: int) -> NDArray[np.bool_]:
 def _moved(joint: JointFriction, seven: Array) -> JointFriction:
     fixed = np.diag(joint.covariance) == 0.0
     kept = np.where(fixed, unknowns_of(joint)[:SEVEN], np.maximum(seven, SMALLEST))
-    return replace(joint, friction=lugre_from(kept))
+    return replace(joint, friction=STATE_LAW.from_unknowns(kept))
 
 
 def _whitening(found: FourSteps, size: int) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from psdmc.calibration.identify.gravity import gravity_split
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_terms
+from psdmc.calibration.identify.linear_problem import friction_columns
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite_options import Objective
@@ -164,7 +164,7 @@ def all_columns(model: Regressor, l: int, options: LinearOptions) -> FitColumns:
     """Those of the linear fit of one log: all base parameters, friction, offsets, before its filter."""
 
     def terms(qd: Array) -> Array:
-        return np.stack(friction_terms(qd, options.sign_speed, options.exponents, options.offset), axis=-1)
+        return np.stack(friction_columns(options.terms, qd, options.sign_speed), axis=-1)
 
     return FitColumns(model, np.eye(l), terms)
 

@@ -55,9 +55,9 @@ def _torques(model: DynamicsModel, chain: Mechanism, regressor: Regressor) -> To
     if model.theta_b is None or not np.isfinite(largest).any():
         return None
     try:
-        friction = linear_friction(model).torque if model.calibrated else None
+        friction = linear_friction(model).by_speed if model.calibrated else None
     except InputError:
-        friction = None  # of a campaign: LuGre's
+        friction = None  # of a campaign: it has a state
     return TorqueLimits(chain, regressor, largest, model.theta_b, friction)
 
 

@@ -7,7 +7,7 @@ the calibration.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,20 @@ from typing import Any
 import numpy as np
 
 from psdmc.calibration.logs.foreign_bytes import LARGEST_TOML, SHORTER, decoding, opened
-from psdmc.calibration.logs.toml_tables import TomlTable, is_number, read_toml, require_none, toml_content
+from psdmc.calibration.logs.toml_tables import (
+    TomlTable,
+    is_number,
+    read_toml,
+    require_none,
+    shown,
+    toml_content,
+)
 from psdmc.calibration.logs.wording import listed, quoted
 from psdmc.errors import InputError
+from psdmc.friction.law import Term
+from psdmc.friction.laws import LAWS
+from psdmc.friction.own import laws_of, read_law
+from psdmc.friction.terms import WITH_STATE, named
 from psdmc.reading import read_rest
 from psdmc.robot.dh import read_dh
 from psdmc.robot.tree import default_tip
@@ -27,12 +38,11 @@ Triple = tuple[float, float, float]
 WHAT = "a plant (.toml), such as examples/plants/denso_virtual.toml"
 HINT = "compare it with examples/plants/denso_virtual.toml"
 
+KEYS = ("robot", "tip", "sensors", "harness", "friction", "sign_speed", "joint")
+SIGN_SPEED = 0.03
+"""rad/s (m/s) over which friction without a state changes sign."""
 SMALLEST, LARGEST = 1e-9, 1e9
 """Of a motor's or friction's numbers in SI: wider than any joint, narrow enough that nothing overflows."""
-SLOWEST = 1e-6
-"""rad/s, Stribeck velocity: for a smaller one the integrator would have to resolve motions that no encoder shows."""
-LARGEST_EXPONENT = 3.0
-"""Of viscous friction: air drag has 2."""
 LARGEST_DELAY = 1.0
 """s, between a motion and its current."""
 FINEST = 1e-12
@@ -55,27 +65,15 @@ LARGEST_PLANT = 100
 
 @dataclass(frozen=True, slots=True)
 class JointTruth:
-    """One joint's motor and friction: K_t (N m/A) and the seven LuGre parameters in the order of (12) to (14), SI.
+    """One joint's motor and friction: K_t (N m/A), and values of the plant's friction laws by name, SI.
 
     drive_inertia  kg m^2 (kg) at the joint, which a URDF cannot state; a DH table states its own
     """
 
     name: str
     torque_constant: float
-    stiffness: float
-    coulomb: float
-    static: float
-    stribeck_velocity: float
-    damping: float
-    viscous: float
-    viscous_exponent: float
+    friction: Mapping[str, float]
     drive_inertia: float = 0.0
-
-    def bristle_limit(self, v: float) -> float:
-        """g(v), (13)."""
-        ratio = v / self.stribeck_velocity
-        peak = (self.static - self.coulomb) * math.exp(-ratio * ratio) if abs(ratio) < 25.0 else 0.0
-        return (self.coulomb + peak) / self.stiffness
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,12 +141,18 @@ class PlantUrdf:
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """The content of both files."""
+    """The content of both files.
+
+    terms       of the joints' friction
+    sign_speed  rad/s (m/s) over which friction without a state changes sign
+    """
 
     robot: PlantRobot | PlantUrdf
     joints: tuple[JointTruth, ...]
     sensors: Sensors
     harness: Harness | None
+    terms: tuple[Term, ...]
+    sign_speed: float
 
 
 def read_plant(path: Path) -> Plant:
@@ -159,13 +163,15 @@ def read_plant(path: Path) -> Plant:
 def plant_of(content: dict[str, Any], path: Path) -> Plant:
     """The plant of a file's content; `path` is the file that it came from."""
     faults: list[str] = []
-    table = TomlTable(content, "plant", ("robot", "tip", "sensors", "harness", "joint"), faults)
+    table = TomlTable(content, "plant", KEYS, faults)
     where = path.parent / table.text("robot")
     rows = table.items("joint")
     if len(rows) > LARGEST_PLANT:
         faults.append(f"{len(rows)} joints, expected at most {LARGEST_PLANT}")
         rows = []
-    joints = tuple(_truth(row, f"joint {k}", faults) for k, row in enumerate(rows, start=1))
+    terms = _terms(table, path.parent, faults)
+    speed = table.number("sign_speed", SMALLEST, LARGEST, SIGN_SPEED)
+    joints = tuple(_truth(row, f"joint {k}", terms, faults) for k, row in enumerate(rows, start=1))
     sensors = _sensors(table.content.get("sensors", {}), faults)
     names = [joint.name for joint in joints]
     held = _harness(table.content["harness"], names, faults) if table.has("harness") else None
@@ -177,7 +183,7 @@ def plant_of(content: dict[str, Any], path: Path) -> Plant:
         faults.append("drive_inertia: found with a DH table, which states its own; expected with a URDF only")
     require_none(faults, str(path), HINT)
     if not is_table:
-        return Plant(read_plant_urdf(where, names, tip), joints, sensors, held)
+        return Plant(read_plant_urdf(where, names, tip), joints, sensors, held, terms, speed)
     robot = read_plant_robot(where)
     wanted = [row.name for row in robot.rows]
     if names != wanted:
@@ -186,7 +192,7 @@ def plant_of(content: dict[str, Any], path: Path) -> Plant:
             f"{listed([quoted(name) for name in wanted])}",
             "a plant lists its robot's joints, all of them, in their order",
         )
-    return Plant(robot, joints, sensors, held)
+    return Plant(robot, joints, sensors, held, terms, speed)
 
 
 def plant_texts(path: str | Path) -> tuple[bytes, bytes]:
@@ -201,21 +207,42 @@ def _bytes_of(path: Path, limit: int = LARGEST_TOML) -> bytes:
         return read_rest(file, limit, str(path), SHORTER)
 
 
-def _truth(value: object, where: str, faults: list[str]) -> JointTruth:
-    keys = tuple(field.name for field in fields(JointTruth))
+def _terms(table: TomlTable, folder: Path, faults: list[str]) -> tuple[Term, ...]:
+    """Friction of the joints: by default the law with a state; else a list of laws, of values of laws with a number, and
+    of Python files with a law each."""
+    words = table.items("friction") if table.has("friction") else list(WITH_STATE)
+    files = [word for word in words if isinstance(word, str) and word.endswith(".py")]
+    own = laws_of([read_law(folder / word) for word in files])
+    found = [Term(law) for law in own.values()]
+    for word in words:
+        if word in files:
+            continue
+        by_value = named(word, LAWS) if isinstance(word, str) else None
+        law = LAWS.get(word) if isinstance(word, str) else None
+        if by_value is not None:
+            found.append(by_value[0])
+        elif law is not None and law.number is None:
+            found.append(Term(law))
+        else:
+            faults.append(
+                f"friction: found {shown(word)}, expected a law ({', '.join(LAWS)}), a value of a law with its number, or a "
+                "law's Python file"
+            )
+    return tuple(dict.fromkeys(found))
+
+
+def _truth(value: object, where: str, terms: Sequence[Term], faults: list[str]) -> JointTruth:
+    pairs = [pair for term in terms for pair in zip(term.names, term.law.values, strict=True)]
+    keys = ("name", "torque_constant", *(name for name, _ in pairs), "drive_inertia")
     table = TomlTable(value, where, keys, faults)
     name = table.text("name")
     table.where = f"joint {quoted(name)}" if name else where
     return JointTruth(
         name=name,
         torque_constant=table.number("torque_constant", SMALLEST, LARGEST),
-        coulomb=table.number("coulomb", SMALLEST, LARGEST),
-        static=table.number("static", SMALLEST, LARGEST),
-        stribeck_velocity=table.number("stribeck_velocity", SLOWEST, LARGEST),
-        viscous=table.number("viscous", 0.0, LARGEST),
-        viscous_exponent=table.number("viscous_exponent", 0.0, LARGEST_EXPONENT),
-        stiffness=table.number("stiffness", SMALLEST, LARGEST),
-        damping=table.number("damping", 0.0, LARGEST),
+        friction={
+            key: table.number(key, max(own.low, -LARGEST), min(own.high, LARGEST)) for key, own in pairs
+        },
         drive_inertia=table.number("drive_inertia", 0.0, LARGEST_BODY, 0.0),
     )
 

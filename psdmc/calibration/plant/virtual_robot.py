@@ -1,12 +1,12 @@
-"""A robot with known truth: Pinocchio's dynamics, LuGre friction by scipy's stiff integrator, imperfect sensors.
+"""A robot with known truth: Pinocchio's dynamics, friction, imperfect sensors.
 
-It shares no code with the calibration: robot files, friction law and sensors are implemented here a second time. The
+Robot files and sensors are implemented here a second time. Friction is that of the law's files, but a state is integrated
+by SciPy's stiff integrator, not by the step of the law that the calibration takes. The
 motion is prescribed, as by a stiff position controller; the motors give the torque that it needs.
 """
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,6 +22,7 @@ from psdmc.calibration.logs.foreign_bytes import decoding
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.calibration.plant.plant_file import (
+    SIGN_SPEED,
     Harness,
     JointTruth,
     PlantRobot,
@@ -30,6 +31,8 @@ from psdmc.calibration.plant.plant_file import (
     read_plant,
 )
 from psdmc.errors import InputError
+from psdmc.friction.law import At, Term
+from psdmc.friction.scalars import tanh
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, pinocchio_model
 
 Array = NDArray[np.float64]
@@ -60,6 +63,8 @@ class VirtualRobot:
     joints: tuple[JointTruth, ...]
     sensors: Sensors
     harness: Harness | None = None
+    terms: tuple[Term, ...] = ()
+    sign_speed: float = SIGN_SPEED
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -95,7 +100,9 @@ def load_virtual_robot(
             model, tip = _pinocchio_model(plant.robot)
     sensors = Sensors() if ideal_sensors else plant.sensors
     held = plant.harness if harness else None
-    return VirtualRobot(plant.robot.name, model, tip, plant.joints, sensors, held)
+    return VirtualRobot(
+        plant.robot.name, model, tip, plant.joints, sensors, held, plant.terms, plant.sign_speed
+    )
 
 
 def _model_of_urdf(robot: PlantUrdf, joints: Sequence[JointTruth]) -> tuple[Any, Any]:
@@ -139,9 +146,8 @@ def simulate(
 ) -> Log:
     """The log that the robot's sensors give while it runs a trajectory from rest. Rows as the trajectory's."""
     shifted = _at(trajectory, trajectory.time + robot.sensors.effort_delay)
-    tau = _rigid_torque(_loaded(robot, payload), *shifted)
-    for k, joint in enumerate(robot.joints):
-        tau[:, k] += _friction(joint, trajectory, k, robot.sensors.effort_delay)
+    rigid = _rigid_torque(_loaded(robot, payload), *shifted)
+    tau = rigid + _friction(robot, trajectory, shifted[0], shifted[1], rigid)
     if robot.harness is not None:
         held = np.array([name in robot.harness.joints for name in robot.joint_names])
         tau += np.where(held, robot.harness.torque * np.tanh(shifted[0] / robot.harness.angle), 0.0)
@@ -207,26 +213,43 @@ def _quintic(q: Array, v: Array, a: Array, h: float) -> Array:
     )
 
 
-def _friction(joint: JointTruth, trajectory: Trajectory, k: int, delay: float) -> Array:
-    """Friction torque (14) at each row's time plus the delay; bristles start unbent, nothing where the joint rests."""
-    if not trajectory.qd[:, k].any():
+def _friction(robot: VirtualRobot, trajectory: Trajectory, q: Array, qd: Array, rigid: Array) -> Array:
+    """(N, n) friction of all joints at positions, speeds and rigid torques (N, n) of each row's time plus the delay."""
+    found = np.zeros_like(rigid)
+    sign = tanh(qd / robot.sign_speed)
+    for k, joint in enumerate(robot.joints):
+        for term in robot.terms:
+            p = [joint.friction[name] for name in term.names]
+            if term.law.state is None:
+                found[:, k] += term.torque(p, At(q[:, k], qd[:, k], sign[:, k], rigid[:, k]))
+            else:
+                found[:, k] += _with_state(joint, term, p, trajectory, k, robot.sensors.effort_delay)
+    return found
+
+
+def _with_state(
+    joint: JointTruth, term: Term, p: list[float], trajectory: Trajectory, k: int, delay: float
+) -> Array:
+    """Torque of a law with a state, which is zero at first; nothing where the joint rests."""
+    state = term.law.state
+    if state is None or not trajectory.qd[:, k].any():
         return np.zeros(len(trajectory.time))
+    rate = state.rate
     speed = _speed_function(trajectory, k)
     times = np.minimum(trajectory.time + delay, trajectory.duration)
     grid = times if delay == 0 else np.concatenate([[0.0], times])
 
-    def bend_rate(z: Array, t: float) -> float:
-        v = speed(t)
-        return v - abs(v) * float(z[0]) / joint.bristle_limit(v)
+    def change(z: Array, t: float) -> float:
+        return float(rate(p, speed(t), float(z[0])))
 
     def jacobian(z: Array, t: float) -> list[list[float]]:
         v = speed(t)
-        return [[-abs(v) / joint.bristle_limit(v)]]
+        return [[float(rate(p, v, 1.0) - rate(p, v, 0.0))]]
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ODEintWarning)  # raised below, with the joint's name
         bend, told = odeint(
-            bend_rate,
+            change,
             [0.0],
             grid,
             Dfun=jacobian,
@@ -239,18 +262,13 @@ def _friction(joint: JointTruth, trajectory: Trajectory, k: int, delay: float) -
     if told["message"] != "Integration successful.":
         raise InputError(
             f"joint {joint.name}: its friction cannot be integrated: {told['message']}",
-            "give the joint a friction that changes more slowly: a larger stribeck_velocity or a smaller stiffness",
+            "give the joint a friction that changes more slowly",
         )
     torque = [
-        _friction_torque(joint, speed(t), float(z)) for t, z in zip(grid.tolist(), bend[:, 0], strict=True)
+        float(term.torque(p, At(v=speed(t), z=float(z))))
+        for t, z in zip(grid.tolist(), bend[:, 0], strict=True)
     ]
     return np.array(torque[len(grid) - len(times) :])
-
-
-def _friction_torque(joint: JointTruth, v: float, z: float) -> float:
-    rate = v - abs(v) * z / joint.bristle_limit(v)
-    viscous = math.copysign(joint.viscous * abs(v) ** joint.viscous_exponent, v)
-    return joint.stiffness * z + joint.damping * rate + viscous
 
 
 def _speed_function(trajectory: Trajectory, k: int) -> Callable[[float], float]:

@@ -24,11 +24,11 @@ from psdmc.calibration.identify.friction_fit import JointFriction
 from psdmc.calibration.identify.gravity import judge_gravity
 from psdmc.calibration.identify.inertial import judge_inertial
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.linear_problem import friction_names, friction_terms
-from psdmc.calibration.identify.lugre import PARAMETERS, Lugre
+from psdmc.calibration.identify.linear_problem import friction_columns, names_of
 from psdmc.calibration.identify.motor import judge_motors
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import ChainRegressor
+from psdmc.calibration.identify.state_friction import PARAMETERS
 from psdmc.calibration.identify.steps import StepOptions, judged, step_of
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
@@ -36,6 +36,7 @@ from psdmc.calibration.logs.log_checks import CheckOptions, checked
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
+from psdmc.friction.state import STATE_LAW
 from psdmc.model import recursive
 from psdmc.model.calibrated import Prediction, StepQuality, by_joint
 from psdmc.model.dynamics_model import DynamicsModel
@@ -207,10 +208,9 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
     law = found.prediction
     coupling = coupling_of(law.coupling)
     speed = qd if coupling is None else coupling.to_motors(qd)
-    terms = friction_terms(speed, law.sign_speed, law.exponents, law.offset)
-    names = friction_names(law.exponents, law.offset)
+    terms = friction_columns(law.terms, speed, law.sign_speed)
     extra = found.columns.values(motion_of(q, qd, law.sign_speed, rigid, coupling)) @ found.extra
-    for name, term in zip(names, terms, strict=True):
+    for name, term in zip(names_of(law.terms), terms, strict=True):
         torque = term * np.array([found.friction[joint, name] for joint in found.model.joint_names])
         rigid = rigid + (torque if coupling is None else coupling.torque_of_joints(torque))
     return np.asarray(rigid + extra)
@@ -220,7 +220,7 @@ def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
     chain, motors, theta = found.model.mechanism, found.motors, found.theta_b
     steps = {name: step_of(step) for name, step in found.prediction.steps.items()}
     regressor = ChainRegressor(found.model)
-    friction = _lugre(found)
+    friction = _with_state(found)
     joints = friction.joints
     alone = prepared_runs(chain, regressor, motors, theta, runs.friction, steps["friction"])
     motor = (judge_motors(chain, runs.motor, steps["motor"], found.shown),) if runs.motor else ()
@@ -232,10 +232,10 @@ def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
     )
 
 
-def _lugre(found: Delivered) -> FrictionResult:
+def _with_state(found: Delivered) -> FrictionResult:
     joints = {}
     for joint, run in found.prediction.runs.items():
-        law = Lugre(*(found.friction[joint, name] for name in PARAMETERS))
+        values = STATE_LAW.require(np.array([found.friction[joint, name] for name in PARAMETERS]))
         exact = np.zeros((len(PARAMETERS), len(PARAMETERS)))
-        joints[joint] = JointFriction(joint, law, exact, (), run.inertia, run.offset, run.delay)
+        joints[joint] = JointFriction(joint, values, exact, (), run.inertia, run.offset, run.delay)
     return FrictionResult(joints, ())

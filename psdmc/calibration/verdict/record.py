@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from psdmc.calibration.identify.four_steps import FourSteps, Runs
 from psdmc.calibration.identify.linear_fit import LinearResult
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.lugre import PARAMETERS, UNITS
 from psdmc.calibration.identify.motor import MotorResult
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.steps import CalibrationOptions, StepOptions
@@ -30,8 +29,12 @@ from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.delivered import delivered_quality, reread
 from psdmc.errors import InternalError
+from psdmc.friction.law import Term
+from psdmc.friction.law import unit_of as own_unit
+from psdmc.friction.state import STATE_LAW
 from psdmc.model.calibrated import (
     IDENTIFIED,
+    LINEAR,
     WHOLE,
     Calibrated,
     FrictionRunConstants,
@@ -157,11 +160,13 @@ def four_step_record(
             model=model,
             parameters=_parameter_rows(model, theta_b, inertial.std, groups, seen),
             motors=_motor_rows(model, found.motors, found.motor),
-            friction=_lugre_rows(model, found),
+            friction=_friction_rows(model, found),
             steps=(),
             warnings=(*dropped_links(model), *found.warnings, *visibility_warnings("inertial", names, seen)),
             facts=facts,
-            prediction=Prediction("lugre", {name: step.used for name, step in steps.items()}, runs=runs),
+            prediction=Prediction(
+                STATE_LAW.name, {name: step.used for name, step in steps.items()}, runs=runs
+            ),
             notes=weak_notes("inertial", names, seen),
             covariance=_covariance(inertial.covariance + inertial.prior_covariance),
         ),
@@ -169,13 +174,14 @@ def four_step_record(
     )
 
 
-def _lugre_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
+def _friction_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
     """The seven per joint; the uncertainty of forces includes the torque constant's."""
     relative = dict(zip(model.joint_names, found.motors.relative_std.tolist(), strict=True))
     rows: list[NumberRow] = []
     joints = {joint.name: joint for joint in model.mechanism.joints}
+    units = Term(STATE_LAW).units()
     for name, joint in found.friction.joints.items():
-        values = zip(PARAMETERS, joint.friction.as_array().tolist(), joint.std.tolist(), UNITS, strict=True)
+        values = zip(STATE_LAW.parameters, joint.friction.tolist(), joint.std.tolist(), units, strict=True)
         for parameter, value, std, unit in values:
             by_constant = relative[name] * value if unit.startswith("Nm") else 0.0
             seen = parameter not in joint.unseen
@@ -193,7 +199,7 @@ def linear_record(
     """The record of a linear fit with these values of the whole vector, without its quality."""
     problem, solved = found.problem, found.estimate
     names = (*model.base_parameters.labels, *problem.names)
-    at = _kept_at(model, values, found.prior.scale)
+    at = _kept_at(model, values, found.prior.scale, found.prior.values)
     seen = visibility(names, values, solved.std, solved.unseen, at)
     dropped = np.zeros(len(values), dtype=bool) if found.dropped is None else found.dropped
     stated = np.arange(len(values)) < (model.l if found.stated else 0)
@@ -217,8 +223,11 @@ def linear_record(
         )
 
     joints = {joint.name: joint for joint in model.mechanism.joints}
+    turning = {
+        name: unit for term in problem.terms for name, unit in zip(term.names, term.units(), strict=True)
+    }
     friction = [
-        row(k, owner, name, _unit_of(joints[owner], _friction_unit(name)))
+        row(k, owner, name, _unit_of(joints[owner], turning[name]))
         for k, (owner, name) in enumerate(problem.plain, start=model.l)
     ]
     unknowns = enumerate(problem.columns.unknowns, start=problem.first_extra)
@@ -243,7 +252,7 @@ def linear_record(
             ),
             facts=facts,
             prediction=Prediction(
-                "linear",
+                LINEAR,
                 {"all": step.used},
                 options.sign_speed,
                 options.exponents,
@@ -270,25 +279,18 @@ def _chosen(rows: Sequence[NumberRow], wanted: NDArray[np.bool_]) -> tuple[Numbe
     return tuple(row for row, is_wanted in zip(rows, wanted.tolist(), strict=True) if is_wanted)
 
 
-def _friction_unit(name: str) -> str:
-    """Of a joint that turns."""
-    if not name.startswith("viscous"):
-        return "Nm"
-    _, _, exponent = name.partition("^")
-    return f"Nm (s/rad)^{exponent}" if exponent else "Nms/rad"
-
-
 # Rows that both methods have
 
 
-def _kept_at(model: DynamicsModel, values: Array, scale: Array) -> list[str]:
-    """The value that each unseen parameter is kept at, in words: friction at zero, theta_b at the file's."""
-    prior = np.zeros(len(values))
+def _kept_at(model: DynamicsModel, values: Array, scale: Array, start: Array | None = None) -> list[str]:
+    """The value that each unseen parameter is kept at, in words: theta_b at the file's, what follows it at `start`, zero
+    where that is None."""
+    prior = np.zeros(len(values)) if start is None else start.copy()
     known, unknown = model.file_theta_b, model.unknown_base_parameters
     prior[: model.l] = 0.0 if known is None else known
     words = ["the known links' part" if k in unknown else "the file's value" for k in range(model.l)]
     names = ["zero"] * model.l if known is None else words
-    names += ["zero"] * (len(values) - model.l)
+    names += [f"{value:g}" if value else "zero" for value in prior[model.l :]]
     moved = np.abs(values - prior) > MOVED * scale
     return [
         f"the physical value nearest to {name}" if m else name for name, m in zip(names, moved, strict=True)
@@ -318,7 +320,7 @@ def _covariance(found: Array) -> Array:
 
 def _unit_of(joint: Joint, turning: str) -> str:
     """The unit of a joint's number, given that of one that turns: for Nms/rad Ns/m where it slides."""
-    return turning.replace("Nm", "N").replace("rad", "m") if joint.type.effort_unit == "N" else turning
+    return own_unit(joint.type.effort_unit, turning)
 
 
 def _by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:

@@ -11,7 +11,7 @@ from psdmc.program.program import Instr, Op, Program
 def absorb_negations(program: Program) -> Program:
     """Remove negations that the operation after or before them can absorb.
 
-    A use absorbs one as x + -y = x - y, x - -y = x + y, -x * -y = x * y, -x / -y = x / y, --x = x. A producer
+    A use absorbs one as x + -y = x - y, x - -y = x + y, -x * -y = x * y, -x / -y = x / y, --x = x, |-x| = |x|. A producer
     that nothing else needs absorbs one as -(x - y) = y - x, -(c x) = (-c) x, -((x - y) z) = (y - x) z.
 
     Needs:  every argument precedes its use.
@@ -69,6 +69,8 @@ def _absorbed(instr: Instr, body: Sequence[Instr]) -> Instr | int:
             return Instr(Op.ADD, (instr.args[0], y))
         case ((Op.MUL | Op.DIV), [int(x), int(y)]):
             return Instr(instr.op, (x, y))
+        case _, [int(x)] if instr.op.operation.parity == "even":
+            return Instr(instr.op, (x,))
     return instr
 
 

@@ -2,22 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from psdmc.program.program import Instr, Op, Program
-from psdmc.reproducible import cosine, sine
-
-_FUNCTIONS: dict[Op, Callable[..., float]] = {
-    Op.ADD: lambda a, b: a + b,
-    Op.SUB: lambda a, b: a - b,
-    Op.MUL: lambda a, b: a * b,
-    Op.DIV: lambda a, b: a / b,
-    Op.NEG: lambda a: -a,
-    Op.SIN: sine,
-    Op.COS: cosine,
-    Op.SQRT: math.sqrt,
-}
 
 
 def fold_constants(program: Program) -> Program:
@@ -25,8 +12,8 @@ def fold_constants(program: Program) -> Program:
 
     Needs:  every argument precedes its use; finite inputs (0 * x is taken for 0).
     Keeps:  output values, bit for bit but for the sign of a zero; output names and order.
-    Gives:  no operation has only constants as arguments, but a division by zero; what is no longer needed
-            stays.
+    Gives:  no operation has only constants as arguments, but one whose result is not finite; what is no longer
+            needed stays.
     """
     constants = {i for i, instr in enumerate(program.body) if instr.value is not None}
     if not any(_folds(instr, program.body) for instr in program.body if not constants.isdisjoint(instr.args)):
@@ -55,10 +42,11 @@ def _folds(instr: Instr, body: Sequence[Instr]) -> bool:
 
 
 def _folded(instr: Instr, body: Sequence[Instr]) -> Instr:
-    values = [body[a].value for a in instr.args]
-    if not values or any(value is None for value in values) or (instr.op is Op.DIV and values[1] == 0.0):
+    values = [value for a in instr.args if (value := body[a].value) is not None]
+    if not values or len(values) < len(instr.args):
         return instr
-    return Instr(Op.CONST, value=_FUNCTIONS[instr.op](*values))
+    folded = instr.op.of_numbers(values)
+    return instr if folded is None else Instr(Op.CONST, value=folded)
 
 
 def _argument_that_it_equals(instr: Instr, body: Sequence[Instr]) -> int | None:

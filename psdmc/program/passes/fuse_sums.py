@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from psdmc.program.operations import Unit
 from psdmc.program.program import Instr, Op, Program
 from psdmc.target.costs import Latency
 from psdmc.target.native import COSTS
@@ -16,18 +17,7 @@ Term = tuple[bool, int]
 
 def cycles(latency: Latency) -> dict[Op, int]:
     """Cycles until the result of each operation is ready."""
-    return {
-        Op.LOAD: latency.load,
-        Op.CONST: 0,
-        Op.ADD: latency.add,
-        Op.SUB: latency.add,
-        Op.MUL: latency.mul,
-        Op.DIV: latency.div,
-        Op.SQRT: latency.div,
-        Op.NEG: latency.neg,
-        Op.SIN: latency.sincos,
-        Op.COS: latency.sincos,
-    }
+    return {op: 0 if op.unit is Unit.NONE else getattr(latency, op.unit) for op in Op}
 
 
 def fuse_sums(program: Program, latency: Latency = COSTS.latency) -> Program:

@@ -56,7 +56,8 @@ def _need(program: Program) -> list[int]:
             first, second = need[args[0]], need[args[1]]
             need.append(max(first, second, 1) if first != second else first + 1)
         else:
-            need.append(max(need[args[0]], 1) if args else 0)
+            most = sorted([need[a] for a in args], reverse=True)
+            need.append(max([1, *(own + held for held, own in enumerate(most))]) if args else 0)
     return need
 
 

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psdmc.backends.c.names import LONGEST, RESERVED, c_comment, c_string, identifier
+from psdmc.backends.c.names import RESERVED, c_comment, c_string, identifier
+from psdmc.backends.names import LONGEST
 
 
 @pytest.mark.parametrize(

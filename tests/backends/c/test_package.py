@@ -25,10 +25,10 @@ from small import (
     pendulum_references,
 )
 
-from psdmc.backends.c.options import EmitOptions
 from psdmc.backends.c.package import package_view
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.c.reference_states import ReferenceStates
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.reference_states import ReferenceStates
 from psdmc.errors import InputError, InternalError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "pendulum"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bundled import bundled_model, bundled_robot
 
-from psdmc.backends.c.reference_states import COUNT, LOAD, ReferenceStates, reference_states
+from psdmc.backends.reference_states import COUNT, LOAD, ReferenceStates, reference_states
 from psdmc.functions import DEFAULT, SIGNATURES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_parameters import random_parameters

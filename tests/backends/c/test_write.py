@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from small import pendulum, pendulum_info
 
-from psdmc.backends.c.manifest import RENAMED, digest
-from psdmc.backends.c.options import EmitOptions
-from psdmc.backends.c.own_files import OWN_NAME, edited_files
 from psdmc.backends.c.package_files import package_files
-from psdmc.backends.c.write import write_package
+from psdmc.backends.manifest import RENAMED, digest
+from psdmc.backends.options import EmitOptions
+from psdmc.backends.own_files import OWN_NAME, edited_files
+from psdmc.backends.write import write_package
 from psdmc.errors import InputError, ToolchainError
 from psdmc.functions import RECIPES
 
@@ -152,9 +152,7 @@ def test_renamed_symbols_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     old = FILES["manifest.json"].replace('"robot": "pendulum"', '"robot": "swing"')
     old = old.replace('"name": "inverse_dynamics', '"name": "torques')
     write_package(tmp_path, {**FILES, "manifest.json": old})
-    monkeypatch.setattr(
-        "psdmc.backends.c.manifest.RENAMED", {"torques": "inverse_dynamics", "gone": "gravity"}
-    )
+    monkeypatch.setattr("psdmc.backends.manifest.RENAMED", {"torques": "inverse_dynamics", "gone": "gravity"})
     assert write_package(tmp_path, FILES).renamed == (
         ("swing_*", "pendulum_*"),
         ("swing_torques", "pendulum_inverse_dynamics"),

@@ -12,7 +12,7 @@ from sprung_plant import Run, recorded, torsional_spring
 
 from psdmc.calibration.columns.columns import read_columns
 from psdmc.calibration.columns.effect import Motion
-from psdmc.calibration.columns.kinds import kinds_of
+from psdmc.calibration.columns.kinds import KINDS
 from psdmc.calibration.identify.coupling import Coupling
 from psdmc.calibration.identify.extra import motion_of
 from psdmc.calibration.logs.log_files import write_log
@@ -78,8 +78,7 @@ def test_what_is_wrong_is_named(content: dict[str, Any], said: str) -> None:
 
 
 def test_every_kind_has_a_file_of_its_own() -> None:
-    assert tuple(kinds_of("springs")) == ("gas", "linear", "torsional")
-    assert tuple(kinds_of("friction")) == ("asymmetric", "load", "offset", "stribeck")
+    assert tuple(KINDS) == ("gas", "linear", "torsional")
 
 
 def test_slopes_are_those_of_the_length() -> None:
@@ -97,7 +96,7 @@ def test_slopes_are_those_of_the_length() -> None:
         return np.asarray(effect.way.length(at)[0])  # type: ignore[attr-defined]
 
     by_difference = np.stack([(length(q + d) - length(q - d)) / (2 * step) for d in step * np.eye(6)], axis=1)
-    columns = effect.columns(Motion(q, 0 * q, 0 * q, 0.03))[:, :, 0]
+    columns = effect.columns(Motion(q, 0 * q, q, 0 * q, 0.03))[:, :, 0]
     assert np.abs(columns - length(q)[:, None] * by_difference).max() < 1e-8
     assert np.abs(columns[:, 0]).max() < 1e-12
     assert np.abs(columns[:, 1]).max() > 1e-2
@@ -109,7 +108,7 @@ def test_friction_s_columns_are_their_formulas() -> None:
     columns = read_columns({"friction": tables}, chain)
     rng = np.random.default_rng(1)
     v, load = 0.1 * rng.normal(size=(30, 2)), rng.normal(size=(30, 2))
-    found = columns.values(Motion(0 * v, v, v, 0.03, load))
+    found = columns.values(Motion(0 * v, v, 0 * v, v, 0.03, load))
     sign, own = np.tanh(v / 0.03), np.eye(2)
     expected = [np.abs(sign[:, k, None]) * own[k] for k in range(2)]
     expected += [(sign * np.abs(load))[:, 1, None] * own[1]]

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from psdmc.calibration.identify import friction_run
-from psdmc.calibration.identify.friction_run import MOST_KEPT, JointRun, lugre_from
-from psdmc.calibration.identify.lugre import friction_torque
+from psdmc.calibration.identify.friction_run import MOST_KEPT, JointRun
+from psdmc.calibration.identify.state_friction import friction_torque
 from psdmc.calibration.logs.low_pass import FilterOptions, LowPass
+from psdmc.friction.state import STATE_LAW
 
 PERIOD = 1e-3
 
@@ -42,7 +43,11 @@ def test_friction_is_simulated_once_for_equal_parameters(run: JointRun, monkeypa
 
     other = run.torque(unknowns(coulomb=3.5))
     assert len(simulated) == 2
-    expected = friction_torque(lugre_from(unknowns(coulomb=3.5)), run.qd, PERIOD) + 0.5 * run.qdd + 0.1
+    expected = (
+        friction_torque(STATE_LAW.from_unknowns(unknowns(coulomb=3.5)[:7]), run.qd, PERIOD)
+        + 0.5 * run.qdd
+        + 0.1
+    )
     np.testing.assert_array_equal(other, expected)
 
 

@@ -5,16 +5,35 @@ from __future__ import annotations
 import ctypes
 import subprocess
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from psdmc.calibration.actuators import ActuatorView, actuator_files, calibrated_actuators
-from psdmc.calibration.identify.lugre import Lugre, friction_torque
+from psdmc.calibration.identify import state_friction
 from psdmc.errors import InputError
+from psdmc.friction.state import STATE_LAW
 from psdmc.model.calibrated_json import from_json
 from psdmc.toolchain.compiler_command import find_compiler
+
+
+class Lugre(NamedTuple):
+    """The seven of (12) to (14)."""
+
+    coulomb: float
+    static: float
+    stribeck_velocity: float
+    viscous: float
+    viscous_exponent: float
+    stiffness: float
+    damping: float
+
+
+def friction_torque(friction: Lugre, *along: Any, **more: Any) -> np.ndarray:
+    return state_friction.friction_torque(np.array(friction), *along, **more)
+
 
 STIFF = Lugre(9.59, 12.5, 0.0144, 23.7, 0.61, 288e3, 22.8)
 SOFT = Lugre(3.59, 4.0, 0.21, 2.38, 0.63, 5.36e3, 8.91)
@@ -87,8 +106,8 @@ def test_standing_still_keeps_the_bristles_as_they_are():
     ],
 )
 def test_impossible_parameters_are_refused(wrong: tuple[float, ...]):
-    with pytest.raises(InputError, match="LuGre parameters"):
-        Lugre(*wrong)
+    with pytest.raises(InputError, match="lugre friction: "):
+        STATE_LAW.require(np.array(wrong))
 
 
 @pytest.mark.parametrize(
@@ -99,7 +118,7 @@ def test_the_generated_functions_do_the_same(tmp_path: Path, real: str, ctype, t
         real=real,
         robot="Arm 7",
         joint_names=("a", "b"),
-        friction=(STIFF, SOFT),
+        friction=(np.array(STIFF), np.array(SOFT)),
         torque_constants=(36.1, 17.9),
     )
     library = built(tmp_path, view)
@@ -142,5 +161,5 @@ def built(folder: Path, view: ActuatorView) -> ctypes.CDLL:
 def test_a_calibration_without_lugre_has_no_friction_function():
     plain = {"friction": [{"joint": "a", "name": "coulomb", "value": 1.0}], "motors": []}
 
-    with pytest.raises(InputError, match=r"no LuGre friction was identified for joint\(s\) a"):
+    with pytest.raises(InputError, match=r"no friction with a state was identified for joint\(s\) a"):
         calibrated_actuators("arm", ("a",), from_json(plain))

@@ -11,7 +11,7 @@ import pytest
 from psdmc.calibration.calibrate import CalibrateOptions, calibrate_campaign
 from psdmc.calibration.campaign_file import read_campaign
 from psdmc.calibration.identify.four_steps import Runs, calibrate_four_steps
-from psdmc.calibration.identify.lugre import PARAMETERS
+from psdmc.calibration.identify.state_friction import PARAMETERS
 from psdmc.calibration.identify.steps import CalibrationOptions
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.verdict.record import Calibration
@@ -110,10 +110,7 @@ def test_one_vector_costs_less_than_theta_moved_alone(arm, runs: Runs):
     def cost(theta: np.ndarray, joints: dict) -> float:
         gravity, inertial, split = found.gravity.estimate, found.inertial.estimate, found.gravity.split
         phi = theta[split.pivots] + split.dependence @ theta[split.rest] - gravity.values
-        seven = [
-            joints[k].friction.as_array() - old.friction.as_array()
-            for k, old in found.friction.joints.items()
-        ]
+        seven = [joints[k].friction - old.friction for k, old in found.friction.joints.items()]
         sources = np.concatenate([np.zeros(2), phi, *seven])
         psi = theta[split.rest] - inertial.values - inertial.considered @ sources
         own = sum(

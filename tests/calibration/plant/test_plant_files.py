@@ -27,7 +27,7 @@ def refused(arm, folder: Path, plant: str, robot: str | None = None) -> str:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("stiffness = 9e3", "stiffness = 0.0", "joint 'shoulder': stiffness: found 0.0, expected a number from 1e-09"),
+        ("stiffness = 9e3", "stiffness = 0.0", "joint 'shoulder': stiffness: found 0.0, expected a number from 1 to"),
         ("stribeck_velocity = 0.05", "stribeck_velocity = 0", "joint 'elbow': stribeck_velocity: found 0"),
         ("coulomb = 3.0", "coulomb = 0.0", "joint 'shoulder': coulomb: found 0.0"),
         ("torque_constant = 12.0", "torque_constant = 0.0", "torque_constant: found 0.0"),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +14,7 @@ from psdmc.calibration.motions.trajectory import Trajectory
 from psdmc.calibration.plant.virtual_robot import Payload, load_virtual_robot, simulate
 from psdmc.errors import InputError
 
+RIPPLE = Path(__file__).parents[3] / "examples" / "friction_laws" / "ripple.py"
 CONSTANTS = np.array([12.0, 5.0])
 
 
@@ -108,3 +112,42 @@ def test_a_plant_whose_joints_are_not_the_robots_is_refused(arm):
 
     with pytest.raises(InputError, match="wrist"):
         load_virtual_robot(path)
+
+
+def test_a_plant_may_have_other_laws_and_a_law_of_its_own(arm, tmp_path):
+    """Formulas are written out here; the ripple is the example's file."""
+    shutil.copy(arm.folder / "two_link.toml", tmp_path)
+    shutil.copy(RIPPLE, tmp_path)
+    numbers = {
+        "coulomb": (3.0, 1.2),
+        "viscous^1.5": (0.4, 0.2),
+        "load_friction": (0.1, 0.05),
+        "ripple_sin": (0.9, -0.3),
+        "ripple_cos": (0.0, 0.6),
+    }
+    lines = [
+        'robot = "two_link.toml"',
+        'friction = ["coulomb", "viscous^1.5", "load", "ripple.py"]',
+        "[sensors]",
+    ]
+    for k, joint in enumerate(arm.model.joint_names):
+        lines += ["[[joint]]", f'name = "{joint}"', f"torque_constant = {CONSTANTS[k]}"]
+        lines += [f'"{name}" = {values[k]}' for name, values in numbers.items()]
+    (tmp_path / "plant.toml").write_text("\n".join(lines), encoding="utf-8")
+    motion = gravity_sweep(arm.model.chain, 1, SweepOptions(speed=0.2, seconds=2.0))
+
+    torque = simulate(load_virtual_robot(tmp_path / "plant.toml"), motion).effort * CONSTANTS
+
+    rigid = arm.regressor.regressor(motion.q, motion.qd, motion.qdd) @ arm.model.theta_b
+    p = {name: np.array(values) for name, values in numbers.items()}
+    size = p["coulomb"] + p["viscous^1.5"] * np.abs(motion.qd) ** 1.5 + p["load_friction"] * np.abs(rigid)
+    waves = p["ripple_sin"] * np.sin(5 * motion.q) + p["ripple_cos"] * np.cos(5 * motion.q)
+    assert np.abs(torque - (rigid + np.tanh(motion.qd / 0.03) * size + waves)).max() < 1e-9
+
+
+def test_a_law_that_no_file_has_is_named(arm, tmp_path):
+    shutil.copy(arm.folder / "two_link.toml", tmp_path)
+    text = arm.plant.read_text(encoding="utf-8")
+    (tmp_path / "plant.toml").write_text('friction = ["stick", "stribeck"]\n' + text, encoding="utf-8")
+    with pytest.raises(InputError, match="friction: found 'stick', expected a law"):
+        load_virtual_robot(tmp_path / "plant.toml")

@@ -1,12 +1,11 @@
-"""The kinds of effects that a fit can have beside rigid bodies and plain friction: one file of this folder each, described
-by its KIND."""
+"""The kinds of springs that a fit can have: one file of this folder each, described by its KIND."""
 
 from __future__ import annotations
 
 from importlib import import_module
 from pkgutil import iter_modules
 
-from psdmc.calibration.columns.effect import Kind, Section
+from psdmc.calibration.columns.effect import Kind
 from psdmc.errors import InternalError
 
 
@@ -17,9 +16,4 @@ def _kind(file: str) -> Kind:
     return kind
 
 
-_FOUND = tuple(_kind(name) for name in sorted(module.name for module in iter_modules(__path__)))
-
-
-def kinds_of(section: Section) -> dict[str, Kind]:
-    """The kinds of one section of a description, by name."""
-    return {kind.name: kind for kind in _FOUND if kind.section == section}
+KINDS = {kind.name: kind for kind in map(_kind, sorted(module.name for module in iter_modules(__path__)))}

@@ -29,4 +29,4 @@ def _read(table: TomlTable, chain: Mechanism) -> tuple[Effect, ...]:
     return (Spring(tuple(unknowns), tuple(laws), way, reference),)
 
 
-KIND = Kind("gas", "springs", ("from", "to", "length", "friction"), _read)
+KIND = Kind("gas", ("from", "to", "length", "friction"), _read)

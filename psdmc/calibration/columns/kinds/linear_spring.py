@@ -37,4 +37,4 @@ def _read(table: TomlTable, chain: Mechanism) -> tuple[Effect, ...]:
     return (Spring(tuple(unknowns), tuple(laws), way, reference),)
 
 
-KIND = Kind("linear", "springs", ("from", "to", "joints", "rest", "friction"), _read)
+KIND = Kind("linear", ("from", "to", "joints", "rest", "friction"), _read)

@@ -27,4 +27,4 @@ def _read(table: TomlTable, chain: Mechanism) -> tuple[Effect, ...]:
     return (Spring((Unknown(name, "stiffness", unit),), (stretch,), way, rest),)
 
 
-KIND = Kind("torsional", "springs", ("joint", "rest"), _read)
+KIND = Kind("torsional", ("joint", "rest"), _read)

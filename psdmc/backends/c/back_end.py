@@ -1,0 +1,23 @@
+"""The back end that writes C packages."""
+
+from __future__ import annotations
+
+from psdmc.backends.c.names import identifier
+from psdmc.backends.c.package import package_view
+from psdmc.backends.c.package_files import package_files
+from psdmc.backends.protocol import BackEnd, Emission
+
+
+def _files(given: Emission) -> dict[str, str]:
+    return package_files(
+        package_view(given.info, given.kernels, given.options, given.references, given.adapters)
+    )
+
+
+def _entry(robot: str) -> tuple[str, str]:
+    return f"include/{robot}/{robot}.h", f"the header, #include <{robot}/{robot}.h>"
+
+
+BACK_END = BackEnd(
+    "C", "prefix of C names", _files, identifier, _entry, lambda folder: f"psdmc build {folder}"
+)

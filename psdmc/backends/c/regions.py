@@ -1,0 +1,108 @@
+"""The C of a function's regions, in the form that the template prints: loops and calls as text, straight lines as bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from psdmc.backends.c.body import make_body
+from psdmc.backends.c.c_expr import literal
+from psdmc.backends.c.lines import Body
+from psdmc.program.operations import Op
+from psdmc.program.regions import Call, For, Region, Regions, Slice, Straight
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Lines of C, or a straight line, behind so many spaces."""
+
+    spaces: int
+    lines: tuple[str, ...]
+    body: Body | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RegionsView:
+    """A function's body: declarations of its own arrays, then pieces in their order."""
+
+    declarations: tuple[str, ...]
+    pieces: tuple[Piece, ...]
+
+    @property
+    def calls(self) -> frozenset[Op]:
+        """Operations that are macros."""
+        return frozenset(op for piece in self.pieces if piece.body for op in piece.body.calls)
+
+
+def regions_view(body: Regions, inputs: Sequence[str], robot: str, theta: bool, suffix: str) -> RegionsView:
+    """The view of regions that read these inputs.
+
+    robot   what the called functions' names start with
+    theta   whether they take theta_b
+    suffix  of constants
+    """
+    constants = tuple(
+        f"static const real {name}[{len(values)}] = {{{', '.join(literal(x, suffix).text for x in values)}}}"
+        for name, values in body.constants.items()
+    )
+    arrays = tuple(f"real {name}[{size}]" for name, size in body.arrays.items())
+    writer = _Writer(robot, "_theta" if theta else "", suffix, {*inputs, *body.constants})
+    return RegionsView((*constants, *arrays), tuple(writer.pieces(body.regions, 1)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Writer:
+    """`fixed`: arrays, and slices of them, that nothing may be stored into."""
+
+    robot: str
+    variant: str
+    suffix: str
+    fixed: set[str]
+
+    def pieces(self, regions: Sequence[Region], depth: int) -> Iterator[Piece]:
+        spaces = 4 * depth
+        for region in regions:
+            if isinstance(region, Straight):
+                body = make_body(region.program, (), {}, self.suffix, stores_early=False, uniform=())
+                if depth > 1 and len(regions) == 1:  # the loop's own braces
+                    yield Piece(spaces - 4, (), body)
+                    continue
+                yield Piece(spaces, ("{",))
+                yield Piece(spaces, (), body)
+                yield Piece(spaces, ("}",))
+            elif isinstance(region, For):
+                counter = f"round_{depth}"
+                head = f"for (size_t {counter} = 0; {counter} < {region.count}; {counter}++) {{"
+                yield Piece(spaces, (head,))
+                yield Piece(spaces + 4, tuple(self._slice(each, counter) for each in region.slices))
+                yield from self.pieces(region.regions, depth + 1)
+                yield Piece(spaces, ("}",))
+            else:
+                yield Piece(spaces, tuple(self._call(region)))
+
+    def _slice(self, each: Slice, counter: str) -> str:
+        is_fixed = each.array in self.fixed
+        self.fixed.discard(each.name)
+        self.fixed.update({each.name} if is_fixed else ())
+        moved = counter if each.stride == 1 else f"{counter} * {each.stride}"
+        start = f"{each.array} + {each.first} + {moved}" if each.first else f"{each.array} + {moved}"
+        return f"{'const real' if is_fixed else 'real'} *const {each.name} = {start};"
+
+    def _call(self, call: Call) -> Iterator[str]:
+        given, found = ([_at(*place) for place in places] for places in (call.given, call.found))
+        arguments = ", ".join([*given, *(["theta_b"] if self.variant else []), *found])
+        called = f"{self.robot}_{call.function}{self.variant}({arguments})"
+        if not call.pivots:
+            yield f"{called};"
+            return
+        yield "{"
+        yield f"    const int bad = {called};"
+        yield "    if (bad && !failed) {"
+        yield "        failed = before + bad;"
+        yield "    }"
+        yield f"    before += {call.pivots};"
+        yield "}"
+
+
+def _at(array: str, first: int) -> str:
+    return f"{array} + {first}" if first else array

@@ -1,0 +1,97 @@
+"""The robot in words, for the first lines of a package."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+from psdmc.backends.info import JointInfo, PackageInfo
+from psdmc.backends.options import EmitOptions
+from psdmc.program.signature import Signature
+from psdmc.robot.mechanism import BASE_FRAME
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
+
+
+def facts(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
+    """Joints, limits, gravity, parameters, model and options, one line each; untrusted names still unescaped."""
+    gx, gy, gz = info.gravity
+    return (
+        f"Robot: {info.name}, {_extent(info)}",
+        f"Model: {info.model_hash or 'not hashed'}",
+        f"Options: {', '.join(f'{key}={value}' for key, value in option_items(info, options).items())}",
+        *_target(options.target),
+        "Units: SI. Positions rad (m), rates rad/s (m/s), torques N m (N) for revolute (prismatic) joints.",
+        f"Gravity: ({gx:g}, {gy:g}, {gz:g}) m/s^2 in the {info.base_frame}",
+        "",
+        "Joints, each behind those that carry it:" if info.is_tree else "Joints, from base to tip:",
+        *(f"  {i}  {line}" for i, line in enumerate(_joints(info))),
+        *(f"     {sentence}" for sentence in info.followers),
+        "",
+        "theta_b, base parameters in standard parameters about the file's link frames:",
+        *(f"  {i}  {parameter.equation}  [{parameter.unit}]" for i, parameter in enumerate(info.parameters)),
+        "",
+    )
+
+
+def frame_lines(info: PackageInfo) -> tuple[str, ...]:
+    """The named frames by number."""
+    numbered = (f"  {i}  {name}" for i, name in enumerate(info.frames))
+    return ("", "Frames, in the order of every array over them:", *numbered)
+
+
+def _extent(info: PackageInfo) -> str:
+    if info.base_frame != BASE_FRAME:
+        return f"a floating base in the world ({info.base})"
+    return f"a tree on {info.base}" if info.is_tree else f"from {info.base} to {info.tip}"
+
+
+def _target(target: Target) -> tuple[str, ...]:
+    """A chosen target, and how compilers build for it; empty for the default."""
+    if target == NATIVE:
+        return ()
+    flags = f"; compile with {' '.join(target.flags)}" if target.flags else ""
+    return (f"Target: {target.name}, {target.about}{flags}",)
+
+
+def uses_frames(signatures: Iterable[Signature]) -> bool:
+    """Whether some of these functions is about the named frames."""
+    return any("frames" in q.axes for s in signatures for q in (*s.inputs, *s.outputs))
+
+
+def option_items(info: PackageInfo, options: EmitOptions) -> dict[str, str]:
+    """The user's choices by name; the target only where it is not the default."""
+    target = {} if options.target == NATIVE else {"target": options.target.name}
+    return {"real": options.real, "trig": options.trig, **info.options, **target}
+
+
+def _joints(info: PackageInfo) -> Iterator[str]:
+    """A line for each joint, with its places in q and rates where these are not its number."""
+    if not info.is_wide:
+        yield from map(joint_line, info.joints)
+        return
+    q, v = 0, 0
+    for joint in info.joints:
+        yield f"{joint_line(joint)}; {_places('q', q, joint.nq)}, {_places('rates', v, joint.nv)}"
+        q, v = q + joint.nq, v + joint.nv
+
+
+def _places(vector: str, first: int, count: int) -> str:
+    return f"{vector}[{first}]" if count == 1 else f"{vector}[{first}..{first + count - 1}]"
+
+
+def joint_line(joint: JointInfo) -> str:
+    """A joint and its limits; unknown limits are left out."""
+    parts = [f"{joint.name} ({joint.kind}{': ' if joint.coordinates else ''}{joint.coordinates})"]
+    if math.isfinite(joint.lower) or math.isfinite(joint.upper):
+        parts.append(f"{joint.lower:.9g} to {joint.upper:.9g} {joint.unit}")
+    for value, unit in (
+        (joint.speed, f"{joint.unit}/s"),
+        (joint.acceleration, f"{joint.unit}/s^2"),
+        (joint.effort, joint.effort_unit),
+    ):
+        if math.isfinite(value):
+            parts.append(f"{value:.9g} {unit}")
+    if joint.parent:
+        parts.append(f"on link {joint.parent}")
+    return ", ".join(parts)

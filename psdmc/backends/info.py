@@ -1,0 +1,196 @@
+"""The facts about its robot in the emitted package, other than arithmetic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.backends.bodies import BodiesMap, bodies_map
+from psdmc.friction.joints import Friction
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.equations import BaseParameter
+from psdmc.model.linear_friction import linear_friction
+from psdmc.model.payload import load_map
+from psdmc.program.signature import Sizes
+from psdmc.robot.mechanism import BASE_FRAME, Mechanism
+from psdmc.robot.unit_lengths import units_of
+from psdmc.version import psdmc_version
+
+
+@dataclass(frozen=True, slots=True)
+class JointInfo:
+    """A joint's name, its type's word and units, and its limits in these (infinite where unknown).
+
+    nq, nv       its coordinates and its rates, and
+    coordinates  what these are, where there are several
+    parent       the link that it hangs on, untrusted text; empty in a serial chain
+    """
+
+    name: str
+    kind: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    speed: float = math.inf
+    acceleration: float = math.inf
+    effort: float = math.inf
+    unit: str = "rad"
+    effort_unit: str = "N m"
+    nq: int = 1
+    nv: int = 1
+    coordinates: str = ""
+    parent: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PackageInfo:
+    """One robot's metadata for header, manifest and README.
+
+    name        the robot's own name, untrusted text
+    joints      n, from base to tip; a tree's parents before their children
+    gravity     m/s^2 in the base frame
+    base, tip   link names
+    parameters  l base parameters, in the order of theta_b
+    model_hash  content hash of the MODEL
+    options     what the user chose, as printed in header and manifest
+    frames      names of the named frames, untrusted text; empty: the tip alone
+    payload     (l, 10) maps of a load to the change of theta_b, at the tip and, where there are others, at each named
+                frame; empty where the package has no function for loads
+    units       parts of q, from an entry to before another, whose length must be one
+    bodies      links and the map of their bodies to theta_b; None where the package has no function for it
+    friction    what a calibration from plain logs found; None where the package has no function for it
+    q_names     nq names of q's entries, untrusted text, and
+    v_names     nv names of rates' and torques'
+    base_frame  the frame that gravity, frames and velocities are given in, in words
+    followers   sentences about joints that follow others, untrusted text: they are not among `joints`
+    """
+
+    name: str
+    joints: tuple[JointInfo, ...]
+    gravity: tuple[float, float, float]
+    base: str
+    tip: str
+    parameters: tuple[BaseParameter, ...]
+    model_hash: str
+    psdmc_version: str
+    options: Mapping[str, str] = field(default_factory=dict)
+    frames: tuple[str, ...] = ()
+    payload: tuple[NDArray[np.float64], ...] = ()
+    followers: tuple[str, ...] = ()
+    units: tuple[tuple[int, int], ...] = ()
+    friction: Friction | None = None
+    bodies: BodiesMap | None = None
+    q_names: tuple[str, ...] = ()
+    v_names: tuple[str, ...] = ()
+    base_frame: str = BASE_FRAME
+
+    def __post_init__(self) -> None:
+        if not self.joints:
+            raise ValueError("a package needs at least one joint")
+        object.__setattr__(self, "frames", self.frames or (self.tip,))
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    @property
+    def nq(self) -> int:
+        """Length of q."""
+        return sum(joint.nq for joint in self.joints)
+
+    @property
+    def nv(self) -> int:
+        """Length of qd, qdd and tau: degrees of freedom."""
+        return sum(joint.nv for joint in self.joints)
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether some joint has several coordinates, so that q, rates and tables of joints differ in length."""
+        return any(joint.nq > 1 for joint in self.joints)
+
+    @property
+    def is_tree(self) -> bool:
+        """Whether the robot is no serial chain."""
+        return any(joint.parent for joint in self.joints)
+
+    @property
+    def sizes(self) -> Sizes:
+        """What the words of signatures mean for this robot."""
+        return Sizes(self.n, self.nq, self.nv, self.l, len(self.frames))
+
+    @property
+    def l(self) -> int:  # noqa: E743
+        """Number of base parameters."""
+        return len(self.parameters)
+
+
+def package_info(
+    model: DynamicsModel,
+    name: str | None = None,
+    options: Mapping[str, str] | None = None,
+    payload: bool = False,
+    friction: bool = False,
+    bodies: bool = False,
+) -> PackageInfo:
+    """Metadata of a MODEL. `name` replaces the robot's own. With `payload` it has what functions for loads need, with
+    `friction` and `bodies` what those for friction and bodies need; InputError where the model's assumptions do not admit
+    every load or body, or it was not calibrated from plain logs."""
+    chain = model.mechanism
+    joints = tuple(
+        JointInfo(
+            joint.name,
+            joint.type.word,
+            joint.limits.lower,
+            joint.limits.upper,
+            joint.limits.speed,
+            joint.limits.acceleration,
+            joint.limits.effort,
+            joint.type.position_unit,
+            joint.type.effort_unit,
+            joint.type.nq,
+            joint.type.nv,
+            joint.type.coordinates,
+            "" if chain.is_serial else chain.parent_link(i),
+        )
+        for i, joint in enumerate(chain.joints)
+        if i in chain.own_joints
+    )
+    gx, gy, gz = (float(g) + 0.0 for g in chain.gravity.tolist())
+    return PackageInfo(
+        name=chain.name if name is None else name,
+        joints=joints,
+        gravity=(gx, gy, gz),
+        base=chain.base_name,
+        tip=chain.tip_name,
+        parameters=model.base_parameters,
+        model_hash=model.content_hash,
+        psdmc_version=psdmc_version(),
+        options=dict(options or {}),
+        frames=tuple(frame.name for frame in chain.frames),
+        payload=_load_maps(model) if payload else (),
+        followers=tuple(_followers(chain)),
+        units=units_of(chain.joints[i].type for i in chain.own_joints),
+        friction=linear_friction(model) if friction else None,
+        bodies=bodies_map(model) if bodies else None,
+        q_names=chain.q_names,
+        v_names=chain.v_names,
+        base_frame=chain.base_frame,
+    )
+
+
+def _followers(chain: Mechanism) -> Iterator[str]:
+    for joint, coordinate in zip(chain.joints, chain.coordinates, strict=True):
+        if coordinate.leader is not None and chain.joints[coordinate.leader] is not joint:
+            leader = chain.joints[coordinate.leader].name
+            yield f"{joint.name} follows {leader}: q = {coordinate.ratio:g} q_{leader} + {coordinate.offset:g}"
+
+
+def _load_maps(model: DynamicsModel) -> tuple[NDArray[np.float64], ...]:
+    chain = model.mechanism
+    is_tip_alone = [frame.name for frame in chain.frames] == [chain.tip_name]
+    frames = (chain.tip_frame,) if is_tip_alone else (chain.tip_frame, *chain.frames)
+    return tuple(load_map(chain, model.B, frame) for frame in frames)

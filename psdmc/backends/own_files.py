@@ -1,0 +1,116 @@
+"""Which files of a folder psdmc wrote: by its manifest, or by the journal of an emission that was killed.
+
+Both lists are files like any other and may be forged: names that psdmc would not give, and whatever lies
+behind a symbolic link, count as foreign.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+
+from psdmc.backends.manifest import GENERATOR
+from psdmc.errors import InputError
+from psdmc.reading import read_file
+
+MANIFEST = "manifest.json"
+JOURNAL = ".psdmc-emission.json"
+"""Lists what an emission is about to write. It exists while it writes, and after it was killed."""
+
+LARGEST_LIST = 16 << 20
+"""Bytes of a manifest or journal that are read; a nine-joint arm's manifest has 0.1 MB."""
+
+OWN_NAME = re.compile(
+    r"""(?: (?: include/[A-Za-z_]\w* | src | test | casadi ) / [A-Za-z_]\w* \. (?: c | h | hpp | inc )
+          | cmake / [A-Za-z_]\w* \.cmake\.in
+          | [A-Za-z_]\w* \.pc\.in
+          | (?: src | tests ) / [a-z_]\w* \.rs
+          | Cargo\.toml | CMakeLists\.txt | Makefile | README\.md | LICENSE | package\.xml )""",
+    re.VERBOSE | re.ASCII,
+)
+"""Every name that a package can have beside its manifest's own."""
+
+NOT_REGULAR = "no regular file of this folder"
+"""Takes the place of the digest of a folder, a device or anything behind a symbolic link."""
+
+Digests = Mapping[str, frozenset[str]]
+
+
+def listed(path: Path) -> Digests:
+    """Path -> digests as listed in a manifest or journal; empty where there is none, or it is not psdmc's."""
+    return {
+        name: frozenset([value] if isinstance(value, str) else map(str, value))
+        for name, value in _entries(path).items()
+        if isinstance(value, str | list) and (OWN_NAME.fullmatch(name) or name == MANIFEST)
+    }
+
+
+def digest_of(root: Path, path: str) -> str | None:
+    """SHA-256 of a file below root; None where there is none."""
+    try:
+        if link_in(root, path) or not stat.S_ISREG((root / path).lstat().st_mode):
+            return NOT_REGULAR
+        with open(root / path, "rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def link_in(root: Path, path: str) -> bool:
+    """Whether a component of `path` below `root` is a symbolic link."""
+    parts = Path(path).parts
+    return any(root.joinpath(*parts[: k + 1]).is_symlink() for k in range(len(parts)))
+
+
+def edited_files(directory: str | os.PathLike[str]) -> list[str] | None:
+    """Paths of a package that are missing or differ from what psdmc wrote; None where the folder holds no package.
+
+    The manifest lists all files but itself. InputError where one cannot be read.
+    """
+    root = Path(directory)
+    try:
+        entries = _entries(root / MANIFEST)
+        edited = [
+            name
+            for name, value in entries.items()
+            if not OWN_NAME.fullmatch(name) or digest_of(root, name) != value
+        ]
+    except OSError as error:
+        raise InputError(
+            f"{error.filename or root}: cannot be read: {error.strerror}", "check its rights"
+        ) from error
+    return edited if entries else None
+
+
+def content_of(directory: str | os.PathLike[str]) -> dict[str, object]:
+    """What the manifest of a package says; empty where the folder holds no package."""
+    return _content(Path(directory) / MANIFEST)
+
+
+def target_of(directory: str | os.PathLike[str]) -> str | None:
+    """The name of the machine that a package says it was made for; None where it names none."""
+    target = content_of(directory).get("target")
+    name = target.get("name") if isinstance(target, dict) else None
+    return name if isinstance(name, str) else None
+
+
+def _entries(path: Path) -> dict[str, object]:
+    files = _content(path).get("files")
+    return files if isinstance(files, dict) else {}
+
+
+def _content(path: Path) -> dict[str, object]:
+    """What a manifest or journal of psdmc's says; empty where there is none."""
+    try:
+        status = path.lstat()
+        if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_LIST:
+            return {}
+        content = json.loads(read_file(path, LARGEST_LIST, "emit the package again"))
+    except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
+        return {}
+    return content if isinstance(content, dict) and content.get("generator") == GENERATOR else {}

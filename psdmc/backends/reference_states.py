@@ -1,0 +1,133 @@
+"""A few states and the values of every generated function there, by the functions' NumPy references, without lowering.
+
+An emitted package's self-test compares with them on the user's machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.backends.reference_load import ReferenceLoad
+from psdmc.functions import DEFAULT, RECIPES
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.random_parameters import random_parameters
+from psdmc.model.random_states import on_joints
+from psdmc.program.signature import TAU, Q, Sizes
+from psdmc.recipes.on_arrays import RobotOnArrays
+from psdmc.recipes.recipe import Needs, Recipe
+from psdmc.reproducible import times
+
+Array = NDArray[np.float64]
+
+COUNT = 4
+"""States kept. The self-test repeats them to fill batches, so that four cover every entry without making the package
+large."""
+
+CANDIDATES = 32
+"""States drawn. Those whose mass matrices are best conditioned are kept, because forward dynamics loses digits with the
+condition number."""
+
+SEED = 2021
+LOAD = 0.25
+"""Share of another physical robot's parameters that the check of run-time parameters adds to the robot's own."""
+
+WORST_CONDITION = 1e7
+"""Condition number of M beyond which a state is no test of forward dynamics."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReferenceStates:
+    """k states, and the outputs that belong to them.
+
+    given     quantity's name -> (k, its size): q, qd, qdd and what else functions read; tau and tau_theta, the torques of
+              (q, qd, qdd) with the compiled-in parameters and with theta_b
+    expected  Signature.label of an output (a kernel's name, where it has one) -> (k, its size), matrices row by row
+    theta_b   (l,) the run-time parameters of the _theta kernels; not the robot's own, so that the test notices a kernel
+              that ignores them
+    load      what a load adds to theta_b, where the package has functions that add loads
+
+    Where M(q) is not positive definite at the states, forward dynamics has no entry.
+    """
+
+    given: Mapping[str, Array]
+    expected: Mapping[str, Array]
+    theta_b: Array
+    load: ReferenceLoad | None = None
+
+    def __post_init__(self) -> None:
+        if not self.given:
+            raise ValueError("reference states hold no quantity")
+        count = len(next(iter(self.given.values())))
+        for name, array in (*self.given.items(), *self.expected.items()):
+            if array.ndim != 2 or len(array) != count or array.size == 0:
+                raise ValueError(
+                    f"reference values of {name} have shape {array.shape}, expected ({count}, k)"
+                )
+        object.__setattr__(self, "given", MappingProxyType(dict(self.given)))
+        object.__setattr__(self, "expected", MappingProxyType(dict(self.expected)))
+
+
+def reference_states(
+    model: DynamicsModel, functions: Collection[str] = DEFAULT, count: int = COUNT
+) -> ReferenceStates:
+    """States of a model and the values of these functions there; those that need the unknown theta_b are left out."""
+    given = _drawn(model)
+    theta_b = _other_parameters(model)
+    robots = {"_theta": RobotOnArrays.of(model, theta_b)}
+    if model.theta_b is not None:
+        robots[""] = RobotOnArrays.of(model, np.asarray(model.theta_b))
+    conditions = np.max([_conditions(robot, given["q"]) for robot in robots.values()], axis=0)
+    best = np.sort(np.argsort(np.round(np.log10(conditions), 6), kind="stable")[:count])
+    given = {name: array[best] for name, array in given.items()}
+    solvable = bool(conditions[best].max() < WORST_CONDITION)
+    recipes = [recipe for name, recipe in RECIPES.items() if name in functions]
+    expected: dict[str, Array] = {}
+    for suffix, robot in robots.items():
+        tau = robot.torques(given["q"], given["qd"], given["qdd"], robot.base_acceleration)
+        given[f"{TAU.name}{suffix}"] = tau
+        own = [recipe for recipe in recipes if recipe.signature.theta]
+        expected |= _values(own, robot, given | {TAU.name: tau}, suffix, solvable)
+    free = [recipe for recipe in recipes if not recipe.signature.theta]
+    expected |= _values(free, robots.get("", robots["_theta"]), given, "", solvable)
+    return ReferenceStates(given, expected, theta_b)
+
+
+def _drawn(model: DynamicsModel) -> dict[str, Array]:
+    """(CANDIDATES, size) of everything that functions read except torques, drawn in the functions' order."""
+    robot, rng = model.mechanism, np.random.default_rng(SEED)
+    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(robot.frames))
+    read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != TAU}
+    drawn = {q.name: q.largest * rng.uniform(-1.0, 1.0, (CANDIDATES, sizes.size(q))) for q in read.values()}
+    return drawn | {q.name: on_joints(robot, drawn[q.name]) for q in read.values() if q.axes == Q.axes}
+
+
+def _values(
+    recipes: Sequence[Recipe], robot: RobotOnArrays, given: Mapping[str, Array], suffix: str, solvable: bool
+) -> dict[str, Array]:
+    """Every output of these functions, (k, size); `solvable`: the mass matrices can be inverted."""
+    found: dict[str, Array] = {}
+    for recipe in recipes:
+        if recipe.needs is Needs.POSITIVE_MASS and not solvable:
+            continue
+        values = recipe.reference(robot, given)
+        for output in recipe.signature.outputs:
+            label = recipe.signature.label(output, theta=bool(suffix))
+            found[label] = values[output.name].reshape(len(given["q"]), -1)
+    return found
+
+
+def _other_parameters(model: DynamicsModel) -> Array:
+    other: Array = times(model.B, random_parameters(model.mechanism))
+    return other if model.theta_b is None else model.theta_b + LOAD * other
+
+
+def _conditions(robot: RobotOnArrays, q: Array) -> Array:
+    """Condition number of M(q) per state; infinite where it is not positive definite."""
+    values = np.linalg.eigvalsh(robot.mass_matrix(q))
+    with np.errstate(divide="ignore"):
+        return np.where(values[:, 0] > 0.0, np.abs(values[:, -1] / values[:, 0]), np.inf)

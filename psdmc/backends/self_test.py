@@ -1,0 +1,30 @@
+"""What a package's own test compares: labels, inputs and tolerances, the same in every language."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from psdmc.program.signature import TAU, Quantity, Signature
+
+TOLERANCES: Mapping[str, str] = {"float64": "1e-10", "float32": "1e-3"}
+FORWARD_TOLERANCES: Mapping[str, str] = {"float64": "1e-7", "float32": "1e-1"}
+"""Relative to a joint's largest value: large enough for badly conditioned mass matrices, small enough to detect wrong
+code."""
+
+_ROWS = ("6", "nv")
+
+
+def tolerance(function: Signature, real: str) -> str:
+    """Of all outputs of a function."""
+    return (FORWARD_TOLERANCES if function.positive else TOLERANCES)[real]
+
+
+def compared_by_row(output: Quantity) -> bool:
+    """Whether each row is compared relative to its own largest value; else all are relative to the largest of all
+    entries."""
+    return bool(output.axes) and output.axes[0] in _ROWS
+
+
+def given_name(vector: str, theta: bool) -> str:
+    """The reference states' name of an input: torques have one with the compiled-in parameters and one with theta_b."""
+    return f"{vector}_theta" if theta and vector == TAU.name else vector

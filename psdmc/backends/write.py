@@ -1,0 +1,162 @@
+"""Write a package to a folder of its own: only files that changed, and no file over one that psdmc did not write.
+
+A file is psdmc's own if the folder's manifest.json, or the journal of an emission that was killed, lists it with the
+digest that it has. Every other file is foreign: another program's, or psdmc's own but edited since.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from itertools import count
+from pathlib import Path
+
+from psdmc.atomic import (
+    refuse_foreign_folder,
+    remove_leftovers,
+    system_errors_at,
+    write_together,
+    write_whole,
+)
+from psdmc.backends.manifest import GENERATOR, digest, renamed
+from psdmc.backends.own_files import (
+    JOURNAL,
+    MANIFEST,
+    NOT_REGULAR,
+    Digests,
+    content_of,
+    digest_of,
+    link_in,
+    listed,
+)
+from psdmc.errors import InputError
+
+
+class Changes(list[str]):
+    """Paths of a package's files that changed, those removed included.
+
+    removed   files of the package that was there before, which this one does not have
+    kept      files of others that were in the way -> names under which they are kept
+    renamed   symbols of the package that was there before, and their names in this one
+    """
+
+    def __init__(
+        self,
+        written: Iterable[str],
+        removed: Iterable[str],
+        kept: Mapping[str, str],
+        renamed: Iterable[tuple[str, str]],
+    ) -> None:
+        self.removed, self.kept, self.renamed = tuple(removed), dict(kept), tuple(renamed)
+        super().__init__([*written, *self.removed])
+
+
+def require_own_folder(directory: str | os.PathLike[str], force: bool = False) -> None:
+    """InputError where a folder holds files, but no package of psdmc's nor the journal of one, and `force` is not set."""
+    root = Path(directory)
+    with system_errors_at(root):
+        own = force or bool(listed(root / MANIFEST) or listed(root / JOURNAL))
+    if not own:
+        refuse_foreign_folder(
+            root, "choose a new or empty folder with -o, or write beside these files with --force"
+        )
+
+
+def write_package(
+    directory: str | os.PathLike[str], files: Mapping[str, str], force: bool = False
+) -> Changes:
+    """Write `files` (path -> text) under `directory`; returns the paths that changed.
+
+    Unchanged files are not touched; files of an earlier emission that are no longer part of it are removed. InputError
+    where the folder is another's or a foreign file is in the way and `force` is not set, where a symbolic link or
+    something else that is no file is in the way, and where the folder cannot take files; ToolchainError where the disk
+    fails. With `force`, a file that was never the package's is kept under another name. Nothing is written before all
+    files were checked; all content is on disk before the first file is replaced; an emission that is killed between two
+    files is recognized by its journal, and finished or replaced by the next one.
+    """
+    root = Path(directory)
+    require_own_folder(root, force)
+    with system_errors_at(root):
+        return _write(root, files, force)
+
+
+def _write(root: Path, files: Mapping[str, str], force: bool) -> Changes:
+    manifest, journal = listed(root / MANIFEST), listed(root / JOURNAL)
+    before = content_of(root)
+    present = {path: digest_of(root, path) for path in files}
+    changed = {path: text for path, text in files.items() if present[path] != digest(text)}
+    _refuse_links(root, changed)
+    foreign = [path for path in changed if not _is_own(path, present[path], manifest, journal)]
+    blocked = [path for path in foreign if not force or present[path] == NOT_REGULAR]
+    if blocked:
+        raise InputError(
+            f"{root}: not overwriting {', '.join(blocked[:3])}{' ...' if len(blocked) > 3 else ''}: "
+            "not as psdmc wrote it",
+            "choose another folder" + ("" if force else ", or overwrite with --force"),
+        )
+    kept = {path: _copied(root, path) for path in foreign if path not in manifest and path not in journal}
+    stale = _stale(root, files, manifest, journal)
+    if changed or stale:
+        _replace(root, changed, stale, journal)
+    _tidy(root, files)
+    symbols = renamed(before, json.loads(files[MANIFEST])) if before and MANIFEST in files else []
+    return Changes(changed, stale, kept, symbols)
+
+
+def _copied(root: Path, path: str) -> str:
+    """The free name under which a file of another's is kept."""
+    names = (f"{path}.orig{number or ''}" for number in count())
+    free = next(name for name in names if not os.path.lexists(root / name))
+    shutil.copy2(root / path, root / free)
+    return free
+
+
+def _refuse_links(root: Path, paths: Mapping[str, str]) -> None:
+    for path in paths:
+        if link_in(root, path):
+            raise InputError(
+                f"{root}: not writing {path}: it is a symbolic link",
+                "remove the link, or choose another folder",
+            )
+
+
+def _is_own(path: str, found: str | None, manifest: Digests, journal: Digests) -> bool:
+    """Whether this path is free, or holds a file that psdmc wrote."""
+    if found is None or (path == MANIFEST and manifest):
+        return True
+    return found in manifest.get(path, ()) or found in journal.get(path, ())
+
+
+def _stale(root: Path, files: Mapping[str, str], manifest: Digests, journal: Digests) -> list[str]:
+    """Files of earlier emissions that are still as psdmc wrote them and that this one does not have."""
+    gone = [path for path in {**manifest, **journal} if path not in files]
+    found = {path: digest_of(root, path) for path in gone}
+    return [
+        path for path in gone if found[path] is not None and _is_own(path, found[path], manifest, journal)
+    ]
+
+
+def _replace(root: Path, files: Mapping[str, str], stale: list[str], journal: Digests) -> None:
+    """Replace the files; the journal is written first, so that a killed emission's files are recognized."""
+    root.mkdir(parents=True, exist_ok=True)
+    known = {path: sorted(digests) for path, digests in journal.items()}
+    for path, text in files.items():
+        known[path] = sorted({digest(text), *known.get(path, ())})
+    write_whole(root / JOURNAL, json.dumps({"generator": GENERATOR, "files": known}, indent=1) + "\n")
+    try:
+        write_together(root, files)
+    except BaseException:
+        if not any(digest_of(root, path) == digest(text) for path, text in files.items()):
+            (root / JOURNAL).unlink(missing_ok=True)  # nothing was replaced
+        raise
+    for path in stale:
+        (root / path).unlink(missing_ok=True)
+
+
+def _tidy(root: Path, files: Mapping[str, str]) -> None:
+    """Remove what a killed emission left."""
+    for folder in dict.fromkeys((root / path).parent for path in files):
+        remove_leftovers(folder)
+    (root / JOURNAL).unlink(missing_ok=True)

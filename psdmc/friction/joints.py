@@ -1,0 +1,122 @@
+"""Friction of a robot's joints: terms, and the values that a calibration found for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from psdmc.friction.law import Array, At, Law, Row, Term, total
+from psdmc.friction.scalars import tanh
+from psdmc.friction.terms import WITH_STATE, named
+from psdmc.program.program import Program, Slot
+from psdmc.program.trace import Tracer
+
+MOST_TERMS = 64
+"""Of a joint: fits have up to ten."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Friction:
+    """Friction torque of n joints: the sum of terms, sizes against the motion first.
+
+    terms       each with its law
+    values      (n, m) one row for each joint; zero where a joint lacks a term
+    sign_speed  rad/s (m/s) over which friction changes sign, so that it is smooth
+    beyond      what else the calibration found beside rigid bodies, in words without names
+    """
+
+    terms: tuple[Term, ...]
+    values: Array
+    sign_speed: float
+    beyond: tuple[str, ...] = ()
+
+    @property
+    def by_position(self) -> bool:
+        """Whether the torque depends on the joints' positions."""
+        return any("q" in term.reads for term in self.terms)
+
+    def by_speed(self, qd: Array) -> Array:
+        """(..., n) torque of the terms that do not depend on positions."""
+        here = [(term, own) for term, own in self._rows(list(self.values.T)) if "q" not in term.reads]
+        return self._torque(here, np.asarray(qd), 0.0)
+
+    def torque(self, qd: ArrayLike, q: ArrayLike = 0.0) -> Array:
+        """(..., n) N m (N) at speeds and positions (..., n), to be added to what the rigid bodies take."""
+        return self._torque(self._rows(list(self.values.T)), np.asarray(qd, dtype=np.float64), np.asarray(q))
+
+    def program(self) -> Program:
+        """One joint's friction tau[0] by its values p[...], its speed v[0] and its position q[0]."""
+        tracer = Tracer()
+        p = tracer.symbols("p", self.values.shape[1])
+        v = tracer.symbol(Slot("v", 0))
+        at = At(tracer.symbol(Slot("q", 0)), v, tanh(v / self.sign_speed))
+        return tracer.finish([(Slot("tau", 0), total(self._rows(p), at))])
+
+    def _torque(self, rows: Sequence[Row], v: Array, q: ArrayLike) -> Array:
+        return np.asarray(total(rows, At(q, v, tanh(v / self.sign_speed))) + np.zeros_like(v))
+
+    def _rows(self, values: Sequence[Any]) -> list[Row]:
+        """Terms with their values."""
+        found, first = [], 0
+        for term in self.terms:
+            found.append((term, values[first : first + len(term.names)]))
+            first += len(term.names)
+        return found
+
+
+def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """What acts against the motion first, constants last."""
+    return tuple(sorted(terms, key=lambda term: (not term.law.against, not term.reads)))
+
+
+def found_friction(
+    values: Mapping[tuple[str, str], float],
+    joints: Sequence[str],
+    everyone_s: Sequence[Term],
+    laws: Mapping[str, Law],
+    sign_speed: float,
+) -> Friction:
+    """The friction of values by joint and name, without what depends on the load; KeyError or ValueError where these are
+    damaged.
+
+    everyone_s  terms that each joint must have
+    laws        that values may be of, by name
+    """
+    if not sign_speed > 0.0:
+        raise ValueError(f"sign_speed {sign_speed:g}")
+    terms = dict.fromkeys(everyone_s)
+    for (_, name), value in values.items():
+        found = named(name, laws)
+        if found is None:
+            raise ValueError(f"{name!r} is a value of no friction law")
+        if not math.isfinite(value):
+            raise ValueError(f"{name} is {value}")
+        if "load" not in found[0].reads:
+            terms.setdefault(found[0])
+    if len(terms) > MOST_TERMS:
+        raise ValueError(f"{len(terms)} terms")
+    names = [name for term in everyone_s for name in term.names]
+    missing = [(joint, name) for joint in joints for name in names if (joint, name) not in values]
+    if missing:
+        raise KeyError(*missing[:1])
+    chosen = ordered(list(terms))
+    rows = [[values.get((joint, name), 0.0) for term in chosen for name in term.names] for joint in joints]
+    return Friction(chosen, np.array(rows, dtype=np.float64).reshape(len(joints), -1), sign_speed)
+
+
+def rows_of(values: Mapping[str, float], law: str, laws: Mapping[str, Law]) -> list[Row]:
+    """Terms of one joint with its values by name; names of no law are left out.
+
+    law   the name of a law with a state, if the values are of one
+    laws  that values may be of, by name
+    """
+    whole = WITH_STATE.get(law)
+    if whole is not None and set(whole.parameters) <= set(values):
+        return [(Term(whole), [values[name] for name in whole.parameters])]
+    pairs = [found[0] for name in values if (found := named(name, laws)) is not None]
+    return [(term, [values.get(name, 0.0) for name in term.names]) for term in dict.fromkeys(pairs)]

@@ -1,0 +1,20 @@
+"""Coulomb friction that differs between the directions: coulomb + asymmetry forward, coulomb - asymmetry backward.
+
+Its column is the size of the smooth sign. It differs from an offset's near rest only: a fit with both shows little more
+than their sum.
+"""
+
+import math
+
+from psdmc.friction.law import Law, Value
+from psdmc.friction.scalars import absolute
+
+LAW = Law(
+    name="asymmetric",
+    about="Coulomb friction that differs between the directions: coulomb + value forward, coulomb - value backward; neither "
+    "is negative.",
+    formula="|s| asymmetry",
+    values=(Value("coulomb_asymmetry", low=-math.inf, within="coulomb"),),
+    torque=lambda p, at: p[0] * absolute(at.sign),
+    instead="offset",
+)

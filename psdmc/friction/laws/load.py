@@ -1,0 +1,13 @@
+"""Friction that grows with the torque that the joint carries, as that of gears does."""
+
+from psdmc.friction.law import Law, Value
+from psdmc.friction.scalars import absolute
+
+LAW = Law(
+    name="load",
+    about="Friction that grows with the torque of the rigid bodies.",
+    formula="load |torque of the rigid bodies|",
+    values=(Value("load_friction", "1"),),
+    torque=lambda p, at: p[0] * absolute(at.load),
+    against=True,
+)

@@ -1,0 +1,14 @@
+"""A constant torque of a joint: what is left of a cable, a spring's rest position or a sensor's zero."""
+
+import math
+
+from psdmc.friction.law import Law, Value
+
+LAW = Law(
+    name="offset",
+    about="A constant torque, in either direction.",
+    formula="constant",
+    values=(Value("offset", low=-math.inf),),
+    torque=lambda p, at: p[0],
+    word=True,
+)

@@ -1,0 +1,35 @@
+"""Viscous friction: grows with a power of the speed. Several exponents together follow any growing curve."""
+
+from collections.abc import Sequence
+
+from psdmc.friction.law import Law, Number, Value
+from psdmc.friction.scalars import absolute, power
+
+
+def line(p: Sequence[float], exponent: float, top: float) -> tuple[float, float, str]:
+    """The least-squares line s v to v^exponent over 0 to `top`."""
+    slope = 3.0 / (exponent + 2.0) * top ** (exponent - 1.0)
+    return (
+        0.0,
+        p[0] * slope,
+        "" if exponent == 1.0 else "a viscous law that is no line (the line nearest to it is)",
+    )
+
+
+LAW = Law(
+    name="viscous",
+    about="Viscous friction: grows with the speed, or with a power of it.",
+    formula=lambda d: "viscous |v|" if d == 1.0 else f"viscous |v|^{d:g}",
+    values=(
+        Value(
+            lambda d: "viscous" if d == 1.0 else f"viscous^{d:g}",
+            lambda d: "Nms/rad" if d == 1.0 else f"Nm (s/rad)^{d:g}",
+        ),
+    ),
+    torque=lambda p, at, exponent: p[0] * power(absolute(at.v), exponent),
+    against=True,
+    number=Number("exponents", 0.0, 8.0, 4, usual=1.0),
+    word=True,
+    key=False,
+    line=line,
+)

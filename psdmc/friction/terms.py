@@ -1,0 +1,99 @@
+"""Terms by the names that records, options and files have for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from psdmc.friction.law import Law, Term
+from psdmc.friction.laws import LAWS
+
+WORDS = tuple(law for law in LAWS.values() if law.word)
+"""Laws that are terms of every joint: words of --friction."""
+KEYS = {law.name: law for law in LAWS.values() if law.key}
+"""Laws of some joints: keys of [friction]."""
+WITH_STATE = {law.name: law for law in LAWS.values() if law.state is not None}
+"""Laws of friction runs of single joints, one of which is a joint's whole friction."""
+
+_ALWAYS = LAWS["coulomb"]
+_GROWING = LAWS["viscous"]
+OPTIONAL = LAWS["offset"]
+"""A term of every joint, which [friction] can give to some joints only."""
+EXAMPLE = ",".join(law.name for law in (_ALWAYS, _GROWING, OPTIONAL))
+"""Words of --friction."""
+
+
+def every_joint_s(exponents: Iterable[float], offset: bool) -> tuple[Term, ...]:
+    """The terms of every joint in a linear fit with these options; ValueError where an exponent is out of range."""
+    growing = (Term(_GROWING, float(d)) for d in exponents)
+    return (Term(_ALWAYS), *growing, *((Term(OPTIONAL),) if offset else ()))
+
+
+def expected_words() -> str:
+    """The words of --friction, for messages and documents."""
+    growing, number = _GROWING, _GROWING.number
+    assert number is not None
+    assert number.usual is not None
+    return (
+        f"{_ALWAYS.name}, {growing.name}, {growing.name}^EXPONENT (above {number.low:g}, to {number.high:g}), "
+        f"{OPTIONAL.name}"
+    )
+
+
+def options_of(words: Sequence[str]) -> tuple[tuple[float, ...], bool] | str:
+    """Exponents of a linear fit, and whether it has offsets, of words of --friction; else what is wrong."""
+    number = _GROWING.number
+    assert number is not None
+    terms = [
+        found and found[0] for found in (named(word, {law.name: law for law in WORDS}) for word in words)
+    ]
+    for word, term in zip(words, terms, strict=True):
+        if term is None or term.number == number.low:
+            return f"found {word!r}, expected {expected_words()}"
+    exponents = [term.number for term in terms if term is not None and term.number is not None]
+    if _ALWAYS.name not in words:
+        return f"no {_ALWAYS.name}, expected it among the terms: it is always fitted"
+    if len(set(words)) < len(words) or len(set(exponents)) < len(exponents):
+        return "a term twice, expected each once"
+    if len(exponents) > number.most:
+        return f"{len(exponents)} {_GROWING.name} terms, expected at most {number.most}"
+    if exponents and number.usual not in exponents:
+        return f"{_GROWING.name}^EXPONENT without {_GROWING.name}, expected both"
+    return tuple(sorted(exponents, key=lambda d: (d != number.usual, d))), OPTIONAL.name in words
+
+
+def named(name: str, laws: Mapping[str, Law]) -> tuple[Term, int] | None:
+    """The term of a linear law that has a value of this name, and the value's place; None where there is none."""
+    for law in laws.values():
+        if law.state is not None:
+            continue
+        for place, value in enumerate(law.values):
+            if law.number is None:
+                if value.name == name:
+                    return Term(law), place
+                continue
+            number = value.number_in(name, law.number.usual)
+            if number is not None and law.number.low <= number <= law.number.high:
+                return Term(law, number), place
+    return None
+
+
+def with_present_names(
+    rows: Sequence[dict[str, Any]], exponents: Sequence[float]
+) -> Sequence[dict[str, Any]]:
+    """Rows of friction as older model files hold them, with terms called by their exponents. psdmc 0.1 called the first one
+    by the name without an exponent, whatever its exponent."""
+    first = Term(_GROWING, float(exponents[0])) if exponents else None
+    if first is None or first.names[0] in [row.get("name") for row in rows]:
+        return rows
+    number = _GROWING.number
+    assert number is not None
+    usual = Term(_GROWING, number.usual)
+    units = {usual.units(effort)[0]: first.units(effort)[0] for effort in ("N m", "N")}
+    renamed = {usual.names[0]: first.names[0], f"{usual.names[0]}^{number.usual:g}": usual.names[0]}
+    return [
+        row | {"name": renamed[row["name"]], "unit": units.get(str(row.get("unit", "")), row.get("unit", ""))}
+        if str(row.get("name")) in renamed
+        else row
+        for row in rows
+    ]

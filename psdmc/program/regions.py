@@ -1,0 +1,273 @@
+"""A function as a list of regions: straight lines, loops over slices of arrays, and calls of other functions.
+
+A straight line grows with the square or the cube of the joints if a function multiplies matrices or calls another function
+several times; regions stay short. `run` executes them on arrays of states, to interpret a function, or on symbols, to write
+it out as one straight line.
+
+Regions read and write arrays of reals by name: the function's inputs and outputs, and arrays of its own. An entry must be
+written before it is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from psdmc.errors import InternalError
+from psdmc.program.interpret import evaluated
+from psdmc.program.passes.drop_unused import drop_unused
+from psdmc.program.program import Program, Slot
+from psdmc.program.trace import Symbol, Tracer
+
+Scalar = Any
+"""A number, an array of states, or a symbol."""
+
+
+@dataclass(frozen=True, slots=True)
+class Straight:
+    """A PROGRAM whose vectors are arrays in sight. It reads all entries before it writes one."""
+
+    program: Program
+
+
+@dataclass(frozen=True, slots=True)
+class Slice:
+    """A part of an array that moves on with each round of a loop.
+
+    name    that the loop's regions call it by
+    array   outside the loop
+    first   its entry in the first round
+    stride  entries to the next round's
+    """
+
+    name: str
+    array: str
+    first: int = 0
+    stride: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class For:
+    """Regions that are repeated a fixed number of times. Inside, slices stand beside the arrays in sight."""
+
+    count: int
+    slices: tuple[Slice, ...]
+    regions: tuple[Region, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A call of another function of the package, with theta_b if the caller takes it.
+
+    given   an array and its first entry for each input, in their order
+    found   the same for each output
+    pivots  entries that must be positive there: where one is not, the caller fails. They number on from those of earlier
+            calls
+    """
+
+    function: str
+    given: tuple[tuple[str, int], ...]
+    found: tuple[tuple[str, int], ...]
+    pivots: int = 0
+
+
+Region = Straight | For | Call
+
+
+@dataclass(frozen=True, slots=True)
+class Regions:
+    """A function's body.
+
+    arrays     its own arrays, with their lengths
+    constants  arrays of numbers
+    """
+
+    arrays: Mapping[str, int]
+    regions: tuple[Region, ...]
+    constants: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+def drop_unread(body: Regions) -> Regions:
+    """The regions without what they store into arrays of their own and never read, and without slices and arrays that this
+    leaves unused.
+
+    Keeps: outputs, bit for bit.
+    """
+    while True:
+        read: set[str] = set()
+        _collect_read(body.regions, {}, read)
+        kept = read.union(_called(body.regions))
+        dead = frozenset(body.arrays) - kept
+        regions = _without(body.regions, dead)
+        if regions == body.regions:
+            break
+        body = replace(body, regions=regions)
+    arrays = {name: size for name, size in body.arrays.items() if name in kept}
+    return replace(body, arrays=arrays)
+
+
+def _collect_read(regions: Sequence[Region], roots: Mapping[str, str], read: set[str]) -> None:
+    """Adds the arrays that regions read; `roots` are those that slices are parts of."""
+    for region in regions:
+        if isinstance(region, For):
+            inner = {each.name: roots.get(each.array, each.array) for each in region.slices}
+            _collect_read(region.regions, {**roots, **inner}, read)
+        else:
+            names = _read_by(region)
+            read.update(roots.get(name, name) for name in names)
+
+
+def _read_by(region: Straight | Call) -> list[str]:
+    if isinstance(region, Straight):
+        return [slot.vector for slot in region.program.inputs()]
+    return [name for name, _ in region.given]
+
+
+def _called(regions: Sequence[Region]) -> set[str]:
+    """Arrays that calls write."""
+    found: set[str] = set()
+    for region in regions:
+        if isinstance(region, For):
+            found |= _called(region.regions)
+        elif isinstance(region, Call):
+            found |= {name for name, _ in region.found}
+    return found
+
+
+def _without(regions: Sequence[Region], dead: frozenset[str]) -> tuple[Region, ...]:
+    """The regions that store nothing into dead arrays; those that have nothing left to do are gone."""
+    found: list[Region] = []
+    for region in regions:
+        if isinstance(region, Straight):
+            outputs = tuple(each for each in region.program.outputs if each[0].vector not in dead)
+            if len(outputs) < len(region.program.outputs):
+                region = Straight(drop_unused(Program(region.program.body, outputs)))
+            if outputs:
+                found.append(region)
+        elif isinstance(region, For):
+            inner = _without(
+                region.regions, dead | {each.name for each in region.slices if each.array in dead}
+            )
+            used = _named(inner)
+            slices = tuple(each for each in region.slices if each.name in used)
+            if inner:
+                found.append(For(region.count, slices, inner))
+        else:
+            found.append(region)
+    return tuple(found)
+
+
+def _named(regions: Sequence[Region]) -> set[str]:
+    """Arrays and slices that regions name."""
+    found: set[str] = set()
+    for region in regions:
+        if isinstance(region, For):
+            found |= _named(region.regions) | {each.array for each in region.slices}
+        else:
+            found.update(_read_by(region))
+            if isinstance(region, Straight):
+                found.update(slot.vector for slot, _ in region.program.outputs)
+            else:
+                found.update(name for name, _ in region.found)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """Values and the distance of their places in an array, which is 1 in a vector and the width in a matrix's column."""
+
+    values: Sequence[Scalar]
+    stride: int = 1
+    first: int = 0
+
+
+def straight(record: Callable[[Reader], Mapping[str, Column]]) -> Straight:
+    """The straight line that stores what `record` computes, array by array, of what it reads."""
+    tracer = Tracer()
+    outputs = [
+        (Slot(name, column.first + k * column.stride), value)
+        for name, column in record(Reader(tracer)).items()
+        for k, value in enumerate(column.values)
+    ]
+    return Straight(tracer.finish(outputs))
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """Reads entries of arrays as symbols."""
+
+    tracer: Tracer
+
+    def __call__(self, name: str, count: int, stride: int = 1, first: int = 0) -> list[Symbol]:
+        return [self.tracer.symbol(Slot(name, first + k * stride)) for k in range(count)]
+
+
+Caller = Callable[[str, list[list[Scalar]]], tuple[list[list[Scalar]], list[Scalar]]]
+"""Of a function's name and its inputs: its outputs, and what must be positive."""
+
+
+def run(
+    body: Regions, inputs: Mapping[str, Sequence[Scalar]], outputs: Mapping[str, int], call: Caller
+) -> tuple[dict[str, list[Scalar]], list[Scalar]]:
+    """The outputs, whose lengths are given, and what must be positive in the order in which it is found.
+
+    InternalError where an entry is read before it is written.
+    """
+    arrays: dict[str, list[Scalar]] = {name: list(values) for name, values in inputs.items()}
+    arrays |= {name: list(values) for name, values in body.constants.items()}
+    arrays |= {name: [None] * size for name, size in (*body.arrays.items(), *outputs.items())}
+    places = {name: _Place(values, 0) for name, values in arrays.items()}
+    pivots: list[Scalar] = []
+    _run(body.regions, places, call, pivots)
+    return {name: arrays[name] for name in outputs}, pivots
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """An array from one of its entries on."""
+
+    values: list[Scalar]
+    first: int
+
+    def moved(self, entries: int) -> _Place:
+        return _Place(self.values, self.first + entries)
+
+
+def _run(
+    regions: Sequence[Region], places: MutableMapping[str, _Place], call: Caller, pivots: list[Scalar]
+) -> None:
+    for region in regions:
+        if isinstance(region, Straight):
+            _run_straight(region.program, places)
+        elif isinstance(region, For):
+            for number in range(region.count):
+                slices = {
+                    each.name: places[each.array].moved(each.first + number * each.stride)
+                    for each in region.slices
+                }
+                _run(region.regions, {**places, **slices}, call, pivots)
+        else:
+            _run_call(region, places, call, pivots)
+
+
+def _run_straight(program: Program, places: Mapping[str, _Place]) -> None:
+    def load(slot: Slot) -> Scalar:
+        place = places[slot.vector]
+        value = place.values[place.first + slot.index]
+        if value is None:
+            raise InternalError(f"{slot} is read before it is written")
+        return value
+
+    for slot, value in evaluated(program, load):
+        place = places[slot.vector]
+        place.values[place.first + slot.index] = value
+
+
+def _run_call(call: Call, places: Mapping[str, _Place], caller: Caller, pivots: list[Scalar]) -> None:
+    given = [places[name].values[places[name].first + first :] for name, first in call.given]
+    found, own = caller(call.function, given)
+    for (name, first), values in zip(call.found, found, strict=True):
+        start = places[name].first + first
+        places[name].values[start : start + len(values)] = values
+    pivots += own
