@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields
 from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from psdmc.friction.terms import WITH_STATE
+from psdmc.friction.law import Law
+from psdmc.friction.laws import LAWS
+from psdmc.friction.terms import WITH_STATE, named
 from psdmc.model import json_values as json
 from psdmc.model.calibrated import (
     LINEAR,
@@ -194,19 +196,22 @@ def from_json(value: object) -> Calibrated:
     else:
         content = upgraded(content)
     parameters = _rows(content, "base_parameters", _parameter)
+    friction = _rows(content, "friction", _number)
+    prediction = _maybe(content, "prediction", _prediction_of)
+    _require_laws(friction, LAWS if prediction is None else prediction.laws)
     return Calibrated(
         robot=_text(content, "robot"),
         method=_text(content, "method"),
         joint_names=tuple(_texts(content, "joints")),
         parameters=parameters,
         motors=_rows(content, "motors", _number),
-        friction=_rows(content, "friction", _number),
+        friction=friction,
         springs=_rows(content, "springs", _number),
         steps=tuple(_step(name, rows) for name, rows in _record(content, "quality").items()),
         warnings=tuple(_remark_of(each) for each in _list(content, "warnings")),
         notes=tuple(_texts(content, "notes")),
         facts=plain(_record(content, "facts")),
-        prediction=_maybe(content, "prediction", _prediction_of),
+        prediction=prediction,
         verdict=_maybe(content, "verdict", _verdict_of),
         covariance=_maybe(content, "covariance", lambda kept: _covariance(kept, len(parameters))),
         logs=_rows(content, "logs", lambda row: _of(LogUsed, row)),
@@ -284,6 +289,14 @@ def _number(row: object) -> NumberRow:
         raise ValueError(f"the calibration's parameters of {name!r} are not those of its name")
     seen = _remark_of(_part(row, "visibility"))
     return _of(NumberRow, row, visibility=seen, parameters=parameters)
+
+
+def _require_laws(friction: Iterable[NumberRow], laws: Mapping[str, Law]) -> None:
+    """ValueError where a row is a value of no friction law."""
+    with_state = {name for law in WITH_STATE.values() for name in law.parameters}
+    for name in sorted({row.name for row in friction} - with_state):
+        if named(name, laws) is None:
+            raise ValueError(f"the calibration's {name!r:.60} is a value of no friction law")
 
 
 def _covariance(value: object, l: int) -> Array:

@@ -191,7 +191,7 @@ FORGED: list[tuple[tuple[Any, ...], Any, str]] = [
     (("covariance", 0), -1.0, "covariance is that of no numbers"),
     (("covariance", 1), 1e9, "covariance is that of no numbers"),
     (("covariance", 0), None, "number"),
-    (("friction", 0, "name"), "stribeck_x", "could not convert"),
+    (("friction", 0, "name"), "stribeck_x", "is a value of no friction law"),
     (("friction", 0, "parameters"), {"exponent": 2.0}, "not those of its name"),
     (("friction", 0, "seen"), "yes", "true or false"),
     (("base_parameters", 0, "value"), None, "number"),

@@ -118,7 +118,7 @@ def test_asymmetry_and_stribeck_in_c(real: str, limit: float, tmp_path: Path) ->
 def test_a_forged_stribeck_velocity_is_refused(name: str) -> None:
     kept = as_json(with_friction(bundled_model("two_link_full")).calibrated)
     kept["friction"][0]["name"] = name
-    with pytest.raises(ValueError, match=r"Stribeck velocity|could not convert"):
+    with pytest.raises(ValueError, match="is a value of no friction law"):
         from_json(kept)
 
 
@@ -214,7 +214,7 @@ def test_what_has_no_such_friction_is_refused(arm: DynamicsModel, tmp_path: Path
     [{"sign_speed": 0.0}, {"sign_speed": "fast"}, {"exponents": [1.0, "inf"]}, {"exponents": [1.0, 99.0]}],
 )
 def test_forged_numbers_are_refused(law: dict[str, object], tmp_path: Path) -> None:
-    with pytest.raises((InputError, ValueError), match=r"damaged|expected a number"):
+    with pytest.raises((InputError, ValueError), match=r"damaged|expected a number|with number 99"):
         emit_c(
             with_friction(bundled_model("two_link_full"), **law),
             tmp_path / "c",
