@@ -67,16 +67,17 @@ def derive(
 ) -> DynamicsModel:
     """Derive the model (E, P, theta_b) of a robot file (URDF, xacro, MJCF or DH table) and check it.
 
-    The result is a DynamicsModel. Its torques were compared with Newton-Euler recursions before it is returned.
+    Returns a DynamicsModel. Before, psdmc compares the torques of the model with Newton-Euler recursions.
 
+    robot          path of the robot file
     base, tip      first and last link of a chain; None: the whole robot
     gravity        m/s^2 in the file's root frame; None: the file's own, or (0, 0, -9.81)
-    drive_inertia  True: the joints' drive inertias are parameters; or one value per joint, kg m^2 (kg)
+    drive_inertia  True: the joints' drive inertias are parameters; or one value per joint, kg m^2 (kg if sliding)
     assume_zero    parameters to be taken as zero, such as "link5:mx" or "link5:Ixz@com"; a list or a single name
-    snap           rad; constant rotations that differ by less from right angles become exact; 0 changes none
-    expand         False leaves out E and P, for robots with many joints; None leaves them out for branched robots
-    progress       psdmc calls it with the name of each stage
-    frames         links for poses, Jacobians, wrenches and loads; none: the tip, or the end of each branch
+    snap           largest difference (rad) from a right angle at which psdmc makes a constant rotation exact; 0: never
+    expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
+    progress       function that psdmc calls with the name of each stage, such as print
+    frames         names of links for poses, Jacobians, wrenches and loads; none: the tip, or the end of each branch
     tool           x, y, z (m), roll, pitch, yaw (rad) of one more frame, 'tool', relative to the tip
     lock           positions (rad or m) of joints that stay fixed, by name
     floating       True: a floating base. q is position (m), quaternion (x, y, z, w), then the joints. Rates are the
@@ -87,7 +88,7 @@ def derive(
     unknown        links whose inertia is unknown: a list, a single name, or "all". "missing" means all links without an
                    inertia in the file. Otherwise such links are massless
 
-    Raises InputError for a wrong file or option. Raises DerivationError if the model needs too much memory or time.
+    Raises InputError if the file or an option is wrong. Raises DerivationError if the model needs too much memory or time.
 
     Source: Lloyd, Irani and Ahmadi, Mech. Mach. Theory 156 (2021) 104149.
 
@@ -141,27 +142,27 @@ def emit_c(
     friction: bool = False,
     bodies: bool = False,
 ) -> Changes:
-    """Write the C package of a model into a folder; returns the list of files that changed.
+    """Write the C package of a model into a folder. Returns the names of the files that were written or removed.
 
     model      a model, or the path of a model file
     directory  folder to write: missing, empty, or written by psdmc before
-    lowering   "expanded", "factored", or "auto": the cheaper form for each function
+    lowering   how psdmc makes the arithmetic: "expanded" from E and P, "factored" by a recursion, "auto": the cheaper
     functions  names of functions, or one name; None: the default functions
     real       precision, "float64" or "float32"; None: the target's
     trig       sine and cosine: "inline", "freestanding" (without libm) or "libm"; None: the target's
     name       name of the robot in C, the prefix of all symbols; None: the model's
-    force      True: write into a folder with other files, and replace edited files of the package. Foreign
-               files are never deleted; one of the same name is kept as NAME.orig
-    progress   psdmc calls it with the name of each stage
+    force      True: write into a folder with other files, and replace edited files of the package. psdmc deletes no
+               foreign file, and keeps one of the same name as NAME.orig
+    progress   function that psdmc calls with the name of each stage, such as print
     payload    True: add functions that add a load to theta_b
-    adapters   other programs to write code for, such as "casadi", with the functions that they need
-    target     processor to generate for, by its name in psdmc.target.presets
+    adapters   programs for which psdmc adds code, such as "casadi"
+    target     processor to generate for: "native", "x86-64-v3", "neon", "cortex-m4f" and others
     friction   True: add the friction torques of a model that was calibrated from logs
     bodies     True: add a function that computes theta_b from the masses and inertias of all links
 
-    Raises InputError for a wrong option. Raises it also if the mass matrix is not positive definite within the joint
-    limits; leave out forward_dynamics then. With `payload`, `bodies` or `friction` it is raised if the model's
-    assumptions exclude a load or a body, or if the model has no friction.
+    Raises InputError if an option is wrong, or if the mass matrix is not positive definite within the joint limits: leave
+    out forward_dynamics then. Raises InputError also if `payload` or `bodies` contradicts an assumption of the model, or
+    if `friction` is true and the model has none.
     """
     own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
@@ -257,15 +258,15 @@ def compile(
     progress: Progress = silent,
     target: str | Target = NATIVE,
 ) -> CompiledRobot[Any]:
-    """Compile the functions of a model for this machine; returns a robot whose methods take NumPy arrays.
+    """Compile the functions of a model for this machine. Returns a CompiledRobot, whose methods take NumPy arrays.
 
-    The library is kept in a cache, so a second call for the same model and options is fast.
+    psdmc keeps the library in a cache, so a second call for the same model and options is fast.
 
     model      a model, or the path of a model file
-    functions  names of functions, or one name: only these exist. None: the default functions are compiled at once, and
-               each other function when you call it for the first time
+    functions  names of functions, or one name: psdmc compiles only these. None: psdmc compiles the default functions at
+               once, and each other function at its first call
 
-    The other options are those of `emit_c`. Raises InputError for a target that computes one state per call only. Raises
+    The other options are those of `emit_c`. Raises InputError if the target has no functions for many states. Raises
     ToolchainError if the compiler or the CPU does not support the target.
 
     >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP

@@ -19,8 +19,10 @@ is incomplete."""
 
 
 class PsdmcError(Exception):
-    """Base class of errors with a cause outside psdmc; `hint` is the remedy. Tracebacks show it below the message, as a
-    note (`__notes__`)."""
+    """Base class of the errors that a user can cause. The attribute `message` names what is wrong, `hint` the remedy.
+
+    Tracebacks print the hint below the message.
+    """
 
     exit_status = 1
 
@@ -33,25 +35,25 @@ class PsdmcError(Exception):
 
 
 class InputError(PsdmcError):
-    """Raised if a file, an option or an argument is wrong: change the input. Exit status 2."""
+    """psdmc raises this error if a file, an option or an argument is wrong: change the input. Exit status 2."""
 
     exit_status = 2
 
 
 class DerivationError(PsdmcError):
-    """Raised if the input is right but psdmc cannot derive the model: change the options. Exit status 3."""
+    """psdmc raises this error if the robot file is right but the model needs other options. Exit status 3."""
 
     exit_status = 3
 
 
 class ToolchainError(PsdmcError):
-    """Raised if a compiler, a program or a folder fails: change the machine. Exit status 4."""
+    """psdmc raises this error if a compiler, a program or a folder of this machine fails. Exit status 4."""
 
     exit_status = 4
 
 
 class InternalError(Exception):
-    """Raised if psdmc has a fault; the input is not the cause."""
+    """psdmc raises this error if psdmc itself has a fault: please report the message and your input."""
 
 
 def exit_status_of(action: Callable[[], int | None]) -> int:

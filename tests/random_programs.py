@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Collection
 
 import numpy as np
 
@@ -14,13 +15,16 @@ SEEDS = range(30)
 _SIZES = {"tau": 3}
 
 
-def random_program(seed: int, length: int = 60) -> Program:
-    """Loads, a few constants, then operations that prefer recent values; three outputs of shared parts."""
+def random_program(seed: int, length: int = 60, of: Collection[Op] = tuple(Op)) -> Program:
+    """Loads, a few constants, then operations that prefer recent values; three outputs of shared parts.
+
+    of  operations that may occur
+    """
     choose = random.Random(seed)
     body = [Instr(Op.LOAD, slot=Slot(vector, i)) for vector in ("q", "qd") for i in range(3)]
     body += [Instr(Op.CONST, value=value) for value in (0.0, 1.0, -1.0, 2.5, -0.3)]
     rare = {
-        op: 1 for op in Op if op.arity and op not in (Op.DIV, Op.SQRT, Op.EXP, Op.LOG, Op.POW)
+        op: 1 for op in Op if op in of and op.arity and op not in (Op.DIV, Op.SQRT, Op.EXP, Op.LOG, Op.POW)
     }  # these overflow or are NaN
     weights = rare | {Op.ADD: 10, Op.SUB: 10, Op.MUL: 16, Op.NEG: 4, Op.SIN: 2, Op.COS: 2}
     for _ in range(length):

@@ -363,7 +363,7 @@ WRITE_C = {
     "backends/c": "the back end of C",
     "toolchain": "compiles",
     "bench/rivals": "other programs' C and C++ around theirs and psdmc's",
-    "calibration/identify/state_friction.py": "a compiled simulation of its own",
+    "calibration/identify/state_friction.py": "compiles the simulation of a friction law with a state",
 }
 """Where C text is, and why."""
 

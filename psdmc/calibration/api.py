@@ -23,15 +23,16 @@ def calibrate(
     loaded: str | Path | Sequence[str | Path] = (),
     load: str | Path | Sequence[float] | None = None,
 ) -> Calibration:
-    """Fit a model to logs; returns the calibrated model, the identified values and the verdict.
+    """Fit a model to logs of the robot. Returns the calibrated model, the identified values and the verdict.
 
     The result's `verdict.word` is "usable", "usable, with doubts" or "not usable". `verdict.reasons`, `.suspects` and
-    `.doubts` explain it. `.model` is the calibrated model, for every verdict.
+    `verdict.doubts` explain the word. The result's `model` is the calibrated model, for every verdict.
 
     model              a model, or the path of a model file
-    torque_constants   N m/A by joint name, for logs of currents, and for joints that do not feel the load
-    validation         logs that are used for the test only; all other logs are then used for the fit only
-
+    logs               paths of the logs, or the path of a log description (TOML)
+    options            filter and friction law of the fit; None: those of the log description, or the defaults
+    torque_constants   N m/A by joint name, for logs of currents; with `loaded`, only for joints that do not feel the load
+    validation         logs that only test the fit; psdmc then fits to all other logs, and tests with none of them
     loaded             more logs of currents, recorded with a known load on the robot, to find torque constants
     load               the known load: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load file
 

@@ -50,15 +50,17 @@ def identify_payload(
     regressor: Regressor | None = None,
     progress: Progress = silent,
 ) -> PayloadFound:
-    """Find the mass, centre of mass and inertia of a rigid load from logs; returns them with the verdict.
+    """Find the mass, centre of mass and inertia of a rigid load from logs. Returns these values with the verdict.
 
     model             model of the robot without the load: calibrated, or with all inertias and unknown friction
-    frame             frame of the results: None: the tip, or the name of another frame of the model
+    frame             name of the model's frame for the results; None: the tip
     logs              logs that were recorded with the load, or a log description
     options           filter and friction law of the fit; None: those of the log description, or of the model's calibration
     torque_constants  N m/A by joint name, for logs of currents; None: the model's
+    regressor         function that computes the regressor; None: psdmc's own in NumPy
+    progress          function that psdmc calls with the name of each stage, such as print
 
-    Raises InputError if a log cannot be used, nothing moves, or the model's theta_b is unknown.
+    Raises InputError if a log cannot be used, if no joint moves in the logs, or if the model's theta_b is unknown.
     """
     require_axes(model.mechanism, "payload identification")
     if model.mechanism.has_followers:

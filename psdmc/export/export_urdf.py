@@ -53,13 +53,16 @@ class Exported:
 def export_urdf(
     model: DynamicsModel, path: str | Path, mjcf: bool | None = None, progress: Progress = silent
 ) -> Exported:
-    """Write the model as a URDF whose links have the model's theta_b and are the physical ones nearest to the file's.
+    """Write the model as a URDF. Its links have the model's theta_b and physical inertias, nearest to those of the file.
 
-    If the model holds a URDF, names, limits and shapes are from that file. Otherwise links, joints and limits are
-    from the model. Friction of a calibrated model is in <dynamics>.
+    If the model comes from a URDF, names, limits and shapes are from that file. Otherwise links, joints and limits are
+    from the model. Friction of a calibrated model is in <dynamics>. Returns the paths, the links' parameters, and the
+    largest torque differences when Pinocchio and MuJoCo read the written files.
 
-    mjcf   True: also write an MJCF with the suffix .xml; None: only if the model has drive inertias. The MJCF replaces no
-           file but one that psdmc wrote
+    path      file to write
+    mjcf      True: also write an MJCF with the suffix .xml, which replaces only a file that psdmc wrote; None: only if the
+              model has drive inertias
+    progress  function that psdmc calls with the name of each stage, such as print
 
     Raises InputError if theta_b is unknown, if no physical links have it (NoSuchLinks), or if a file cannot be written.
     """

@@ -61,11 +61,21 @@ RECIPE = Recipe(
     Signature(
         "centroidal_momentum_matrix",
         175,
-        "A(q) with A qd the linear momentum (kg m/s), then the angular momentum about the centre of mass (kg m^2/s) of all "
+        "matrix A(q): A qd is the linear momentum (kg m/s), then the angular momentum about the centre of "
+        "mass (kg m^2/s) of all "
         "links, along the base frame's axes",
         (Q,),
-        (Quantity("A", ("6", "nv")),),
+        (
+            Quantity(
+                "A",
+                ("6", "nv"),
+                means="rows: linear momentum (kg m/s), then angular momentum (kg m^2/s) per unit rate, "
+                "along the axes of the base frame",
+            ),
+        ),
         theta=False,
+        summary="Compute the matrix A(q) of centroidal momentum: A qd is the momentum of all links about "
+        "their centre of mass.",
     ),
     "centroidal momentum matrix",
     trace,

@@ -48,8 +48,14 @@ RECIPE = Recipe(
         170,
         "velocity of all links' common centre of mass per unit joint rate, base frame",
         (Q,),
-        (Quantity("J", ("3", "nv")),),
+        (
+            Quantity(
+                "J", ("3", "nv"), means="velocity of the centre of mass (m/s) per unit rate of each joint"
+            ),
+        ),
         theta=False,
+        summary="Compute the Jacobian J of the centre of mass of all links: J qd is the centre's velocity "
+        "in the base frame.",
     ),
     "Jacobian of the centre of mass",
     trace,

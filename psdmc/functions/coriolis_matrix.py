@@ -50,10 +50,12 @@ RECIPE = Recipe(
     Signature(
         "coriolis_matrix",
         50,
-        "C(q, qd) with dM/dt - 2 C skew-symmetric",
+        "Coriolis matrix C(q, qd), for which dM/dt - 2 C is skew-symmetric",
         (Q, QD),
-        (Quantity("C", ("nv", "nv")),),
+        (Quantity("C", ("nv", "nv"), means="Coriolis matrix, SI units"),),
         theta=True,
+        summary="Compute the Coriolis matrix C(q, qd): C qd are the Coriolis and centrifugal torques, and "
+        "dM/dt - 2 C is skew-symmetric.",
     ),
     "Coriolis matrix",
     trace,

@@ -16,8 +16,16 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-FROM, TO = Quantity("q0", ("nq",), np.pi), Quantity("q1", ("nq",), np.pi)
-WAY = Quantity("v", ("nv",))
+FROM, TO = (
+    Quantity("q0", ("nq",), np.pi, means="joint positions at the start: rad, m or unit quaternions"),
+    Quantity("q1", ("nq",), np.pi, means="joint positions at the end: rad, m or unit quaternions"),
+)
+WAY = Quantity(
+    "v",
+    ("nv",),
+    means="displacement: q1 - q0 for joints with one coordinate; for quaternions the shorter rotation "
+    "vector, along the axes of q0",
+)
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -47,6 +55,7 @@ RECIPE = Recipe(
         (FROM, TO),
         (WAY,),
         theta=False,
+        summary="Compute the displacement v that leads from q0 to q1: integrate(q0, v) = q1.",
     ),
     "way between two positions",
     trace,

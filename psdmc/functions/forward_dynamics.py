@@ -34,10 +34,12 @@ RECIPE = Recipe(
     Signature(
         "forward_dynamics",
         20,
-        "qdd = M(q)^-1 (tau - h(q, qd))",
+        "joint accelerations that torques cause, qdd = M(q)^-1 (tau - h(q, qd))",
         (Q, QD, TAU),
         (QDD,),
         theta=True,
+        summary="Compute the joint accelerations that torques cause: qdd = M(q)^-1 (tau - h(q, qd)), h "
+        "being the Coriolis, centrifugal and gravity torques.",
         positive=PIVOTS,
     ),
     "forward dynamics",

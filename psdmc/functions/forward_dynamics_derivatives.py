@@ -84,8 +84,19 @@ RECIPE = Recipe(
         22,
         "qdd, d qdd / d q, d qdd / d qd and d qdd / d tau = M(q)^-1; row i: derivatives of qdd[i]",
         (Q, QD, TAU),
-        (QDD, *(Quantity(name, ("nv", "nv")) for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau"))),
+        (
+            QDD,
+            *(
+                Quantity(
+                    f"dqdd_d{x}",
+                    ("nv", "nv"),
+                    means=f"derivatives of qdd by {x}: row i belongs to qdd[i], each column to a rate",
+                )
+                for x in ("q", "qd", "tau")
+            ),
+        ),
         theta=True,
+        summary="Compute the forward-dynamics accelerations qdd and their Jacobians by q, qd and tau.",
         positive=PIVOTS,
         products=(Product("dqdd_dq", "dqdd_dtau", "dtau_dq"), Product("dqdd_dqd", "dqdd_dtau", "dtau_dqd")),
     ),

@@ -44,6 +44,7 @@ RECIPE = Recipe(
         (Q, QD, TAU, DQ, DQD, DTAU),
         (QDD, DQDD),
         theta=True,
+        summary="Compute the forward-dynamics accelerations qdd, and their derivative along the direction (dq, dqd, dtau).",
         positive=PIVOTS,
     ),
     "forward dynamics along a direction",

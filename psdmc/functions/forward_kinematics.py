@@ -46,8 +46,16 @@ RECIPE = Recipe(
         100,
         "origin (m) and rotation matrix of every named frame in the base frame",
         (Q,),
-        (Quantity("position", ("frames", "3")), Quantity("rotation", ("frames", "3", "3"))),
+        (
+            Quantity("position", ("frames", "3"), means="origins of the frames, m"),
+            Quantity(
+                "rotation",
+                ("frames", "3", "3"),
+                means="rotation matrices; their columns are the axes of the named frame",
+            ),
+        ),
         theta=False,
+        summary="Compute the position and rotation of each named frame in the base frame.",
     ),
     "forward kinematics",
     trace,

@@ -43,8 +43,15 @@ RECIPE = Recipe(
         110,
         "linear then angular velocity of every named frame per unit joint rate, base frame",
         (Q,),
-        (Quantity("J", ("frames", "6", "nv")),),
+        (
+            Quantity(
+                "J",
+                ("frames", "6", "nv"),
+                means="rows: linear velocity (m/s), then angular velocity (rad/s) per unit rate of each joint",
+            ),
+        ),
         theta=False,
+        summary="Compute the Jacobian J of each named frame: J qd is the frame's velocity along the axes of the base frame.",
     ),
     "frame Jacobian",
     trace,

@@ -52,8 +52,15 @@ RECIPE = Recipe(
         196,
         "d (J qd) / d q: derivatives of every named frame's linear then angular velocity, base frame; those by qd are J",
         (Q, QD),
-        (Quantity("dv_dq", ("frames", "6", "nv")),),
+        (
+            Quantity(
+                "dv_dq",
+                ("frames", "6", "nv"),
+                means="derivatives of the linear (m/s), then angular velocity (rad/s), one column per rate",
+            ),
+        ),
         theta=False,
+        summary="Compute the Jacobian by q of each named frame's velocity along the axes of the base frame.",
     ),
     "derivatives of frame velocities",
     trace,

@@ -32,7 +32,15 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 
 RECIPE = Recipe(
-    Signature("gravity", 60, "g(q)", (Q,), (Quantity("g", ("nv",)),), theta=True),
+    Signature(
+        "gravity",
+        60,
+        "gravity torques g(q), which hold the robot still",
+        (Q,),
+        (Quantity("g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints"),),
+        theta=True,
+        summary="Compute the gravity torques g(q), which hold the robot still.",
+    ),
     "gravity",
     trace,
     reference,

@@ -48,10 +48,18 @@ RECIPE = Recipe(
     Signature(
         "gravity_derivatives",
         194,
-        "g(q) and d g / d q; row i: derivatives of g[i]",
+        "gravity torques g(q), and d g / d q; row i: derivatives of g[i]",
         (Q,),
-        (Quantity("g", ("nv",)), Quantity("dg_dq", ("nv", "nv"))),
+        (
+            Quantity("g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints"),
+            Quantity(
+                "dg_dq",
+                ("nv", "nv"),
+                means="derivatives of g by q: row i belongs to g[i], each column to a rate",
+            ),
+        ),
         theta=True,
+        summary="Compute the gravity torques g(q), which hold the robot still, and their Jacobian by q.",
     ),
     "derivatives of gravity",
     trace,

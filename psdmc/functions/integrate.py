@@ -15,7 +15,12 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-WAY = Quantity("v", ("nv",), 3.0)
+WAY = Quantity(
+    "v",
+    ("nv",),
+    3.0,
+    means="displacement: rates times a time, rad or m; rotation vectors, along the axes of q, for quaternions",
+)
 """Rates times seconds: rad or m."""
 
 
@@ -40,6 +45,7 @@ RECIPE = Recipe(
         (Q, WAY),
         (Q_NEXT,),
         theta=False,
+        summary="Compute the configuration that q reaches after the displacement v.",
         normalizes=True,
     ),
     "position after constant rates",

@@ -28,7 +28,16 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 
 RECIPE = Recipe(
-    Signature("inverse_dynamics", 10, "tau = M(q) qdd + h(q, qd)", (Q, QD, QDD), (TAU,), theta=True),
+    Signature(
+        "inverse_dynamics",
+        10,
+        "joint torques of a motion, tau = M(q) qdd + h(q, qd)",
+        (Q, QD, QDD),
+        (TAU,),
+        theta=True,
+        summary="Compute the joint torques of a motion: tau = M(q) qdd + h(q, qd), h being the Coriolis, "
+        "centrifugal and gravity torques.",
+    ),
     "inverse dynamics",
     trace,
     reference,

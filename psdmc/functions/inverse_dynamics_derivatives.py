@@ -45,8 +45,16 @@ RECIPE = Recipe(
         12,
         "d tau / d q, d tau / d qd and d tau / d qdd = M(q); row i: derivatives of tau[i]",
         (Q, QD, QDD),
-        tuple(Quantity(name, ("nv", "nv")) for name in ("dtau_dq", "dtau_dqd", "dtau_dqdd")),
+        tuple(
+            Quantity(
+                f"dtau_d{x}",
+                ("nv", "nv"),
+                means=f"derivatives of tau by {x}: row i belongs to tau[i], each column to a rate",
+            )
+            for x in ("q", "qd", "qdd")
+        ),
         theta=True,
+        summary="Compute the Jacobians of the inverse-dynamics torques tau by q, qd and qdd.",
     ),
     "derivatives of inverse dynamics",
     trace,

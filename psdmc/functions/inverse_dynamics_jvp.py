@@ -55,6 +55,7 @@ RECIPE = Recipe(
         (Q, QD, QDD, *DIRECTIONS),
         (TAU, DTAU),
         theta=True,
+        summary="Compute the inverse-dynamics torques tau, and their derivative along the direction (dq, dqd, dqdd).",
     ),
     "inverse dynamics along a direction",
     trace,

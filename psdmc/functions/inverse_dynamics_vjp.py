@@ -53,6 +53,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, COTANGENT),
         (TAU, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD),
         theta=True,
+        summary="Compute the inverse-dynamics torques tau, and the gradients of the weighted sum "
+        "cotangent . tau by q, qd and qdd.",
     ),
     "gradient of inverse dynamics",
     trace,

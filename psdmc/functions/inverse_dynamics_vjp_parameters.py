@@ -45,6 +45,8 @@ RECIPE = with_parameter_gradient(
     STATE,
     182,
     "tau, and the gradient of cotangent . tau by q, qd, qdd and theta_b",
+    "Compute the inverse-dynamics torques tau, and the gradients of the weighted sum cotangent . tau by "
+    "q, qd, qdd and theta_b.",
     trace,
     reference,
     pinocchio,

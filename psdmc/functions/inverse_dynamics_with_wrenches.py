@@ -17,7 +17,12 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-WRENCHES = Quantity("wrenches", ("frames", "6"), largest=20.0)
+WRENCHES = Quantity(
+    "wrenches",
+    ("frames", "6"),
+    largest=20.0,
+    means="on each named frame, from the world: force (N), then moment (N m) about the frame's origin, along its axes",
+)
 
 
 def trace(g: Ingredients) -> Outputs:
@@ -62,6 +67,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, WRENCHES),
         (TAU,),
         theta=True,
+        summary="Compute joint torques under external wrenches on the named frames: tau = M(q) qdd + h(q, "
+        "qd) - sum of J^T wrench.",
     ),
     "inverse dynamics with wrenches",
     trace,

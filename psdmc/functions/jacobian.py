@@ -41,8 +41,15 @@ RECIPE = Recipe(
         90,
         "linear then angular velocity of the tip per unit joint rate, base frame",
         (Q,),
-        (Quantity("J", ("6", "nv")),),
+        (
+            Quantity(
+                "J",
+                ("6", "nv"),
+                means="rows: linear velocity (m/s), then angular velocity (rad/s) per unit rate of each joint",
+            ),
+        ),
         theta=False,
+        summary="Compute the Jacobian J of the tip: J qd is the tip's velocity along the axes of the base frame.",
     ),
     "Jacobian",
     trace,

@@ -47,10 +47,11 @@ RECIPE = Recipe(
     Signature(
         "kinetic_energy",
         130,
-        "T = qd^T M(q) qd / 2 in J, drive inertias included",
+        "kinetic energy T = qd^T M(q) qd / 2 (J), drive inertias included",
         (Q, QD),
-        (Quantity("T"),),
+        (Quantity("T", means="kinetic energy, J"),),
         theta=True,
+        summary="Compute the kinetic energy T = qd^T M(q) qd / 2 of the links and the drives.",
     ),
     "kinetic energy",
     trace,

@@ -28,7 +28,15 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 
 RECIPE = Recipe(
-    Signature("mass_matrix", 30, "M(q), both triangles", (Q,), (Quantity("M", ("nv", "nv")),), theta=True),
+    Signature(
+        "mass_matrix",
+        30,
+        "mass matrix M(q), both triangles",
+        (Q,),
+        (Quantity("M", ("nv", "nv"), means="symmetric matrix, both triangles filled; kg m^2, kg m or kg"),),
+        theta=True,
+        summary="Compute the joint-space mass matrix M(q), drive inertias included.",
+    ),
     "mass matrix",
     trace,
     reference,

@@ -40,10 +40,11 @@ RECIPE = Recipe(
     Signature(
         "mass_matrix_inverse",
         192,
-        "M(q)^-1, both triangles",
+        "inverse of the mass matrix M(q), both triangles",
         (Q,),
-        (Quantity("Minv", ("nv", "nv")),),
+        (Quantity("Minv", ("nv", "nv"), means="symmetric matrix, both triangles filled; SI units"),),
         theta=True,
+        summary="Compute the inverse of the joint-space mass matrix M(q).",
         positive=PIVOTS,
     ),
     "inverse of the mass matrix",

@@ -10,6 +10,7 @@ from psdmc.recipes.recipe import Packing
 RECIPE = packed(
     mass_matrix.RECIPE,
     31,
-    "M(q), the lower triangle's entries that can differ from zero, row by row",
+    "entries of the mass matrix's lower triangle that can differ from zero, row by row",
+    "Compute the entries of the mass matrix's lower triangle that can differ from zero, row by row.",
     Packing(mass_matrix.RECIPE.name, mass_matrix_places, is_triangle=True),
 )

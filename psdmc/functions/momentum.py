@@ -54,8 +54,15 @@ RECIPE = Recipe(
         "linear momentum (kg m/s), then angular momentum about the base frame's origin (kg m^2/s) of all links, along the "
         "base frame's axes, drive inertias not included",
         (Q, QD),
-        (Quantity("h", ("6",)),),
+        (
+            Quantity(
+                "h",
+                ("6",),
+                means="linear momentum (kg m/s), then angular momentum (kg m^2/s), along the axes of the base frame",
+            ),
+        ),
         theta=False,
+        summary="Compute the momentum of all links about the origin of the base frame, without drive inertias.",
     ),
     "momentum",
     trace,

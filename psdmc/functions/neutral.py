@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,8 +38,9 @@ RECIPE = Recipe(
         220,
         "q at which no joint has moved: zeros, and unit quaternions (cosines) of no turn",
         (),
-        (Q,),
+        (replace(Q, means="zeros, and unit quaternions without rotation"),),
         theta=False,
+        summary="Return the configuration in which no joint has moved.",
     ),
     "neutral position",
     trace,

@@ -33,10 +33,11 @@ RECIPE = Recipe(
     Signature(
         "nonlinear_effects",
         40,
-        "h(q, qd) = C(q, qd) qd + g(q)",
+        "Coriolis, centrifugal and gravity torques, h(q, qd) = C(q, qd) qd + g(q)",
         (Q, QD),
-        (Quantity("h", ("nv",)),),
+        (Quantity("h", ("nv",), means="torques (N m), or forces (N) of sliding joints"),),
         theta=True,
+        summary="Compute the Coriolis, centrifugal and gravity torques, h(q, qd) = C(q, qd) qd + g(q).",
     ),
     "nonlinear effects",
     trace,

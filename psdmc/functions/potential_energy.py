@@ -43,10 +43,11 @@ RECIPE = Recipe(
     Signature(
         "potential_energy",
         140,
-        "U with dU/dq = g(q) in J; U(0) = 0, as theta_b does not show the energy there",
+        "potential energy U(q) (J), zero at q = 0; dU/dq = g(q)",
         (Q,),
-        (Quantity("U"),),
+        (Quantity("U", means="potential energy, J; zero at q = 0"),),
         theta=True,
+        summary="Compute the potential energy U of the links; its derivative by q is g(q), the gravity torques.",
     ),
     "potential energy",
     trace,

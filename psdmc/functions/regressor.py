@@ -29,7 +29,13 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
 
 RECIPE = Recipe(
     Signature(
-        "regressor", 70, "Y with tau = Y theta_b", (Q, QD, QDD), (Quantity("Y", ("nv", "l")),), theta=False
+        "regressor",
+        70,
+        "regressor Y(q, qd, qdd): tau = Y theta_b",
+        (Q, QD, QDD),
+        (Quantity("Y", ("nv", "l"), means="regressor: row i belongs to tau[i], column j to theta_b[j]"),),
+        theta=False,
+        summary="Compute the regressor Y(q, qd, qdd): the torques of inverse dynamics are tau = Y theta_b.",
     ),
     "joint-torque regressor",
     trace,

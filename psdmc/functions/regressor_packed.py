@@ -10,6 +10,7 @@ from psdmc.recipes.recipe import Packing
 RECIPE = packed(
     regressor.RECIPE,
     71,
-    "Y's entries that can differ from zero, row by row",
+    "entries of the regressor Y that can differ from zero, row by row",
+    "Compute the entries of the regressor Y that can differ from zero, row by row; Y theta_b are the torques.",
     Packing(regressor.RECIPE.name, regressor_places),
 )

@@ -36,10 +36,21 @@ RECIPE = Recipe(
     Signature(
         "regressor_slotine_li",
         80,
-        "Y with M(q) qdd_r + C(q, qd) qd_r + g(q) = Y theta_b",
-        (Q, QD, Quantity("qd_r", ("nv",), 3.0), Quantity("qdd_r", ("nv",), 5.0)),
-        (Quantity("Y", ("nv", "l")),),
+        "regressor Y of adaptive control (Slotine and Li): Y theta_b = M(q) qdd_r + C(q, qd) qd_r + g(q)",
+        (
+            Q,
+            QD,
+            Quantity("qd_r", ("nv",), 3.0, means="reference rates, rad/s or m/s"),
+            Quantity("qdd_r", ("nv",), 5.0, means="reference accelerations, rad/s^2 or m/s^2"),
+        ),
+        (
+            Quantity(
+                "Y", ("nv", "l"), means="regressor: row i belongs to joint torque i, column j to theta_b[j]"
+            ),
+        ),
         theta=False,
+        summary="Compute the regressor of adaptive control (Slotine and Li, 1987): Y theta_b = M(q) qdd_r "
+        "+ C(q, qd) qd_r + g(q).",
     ),
     "Slotine-Li regressor",
     trace,

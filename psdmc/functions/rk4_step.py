@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 STAGE_PIVOTS = Positive(
     Quantity("pivot", ("4", "nv")),
-    which="the joint whose pivot is not positive, plus n for each stage of the step before",
-    reason=PIVOTS.reason,
+    which=f"{PIVOTS.which}, + n times the stage of the step",
     spoilt="states",
 )
 
@@ -108,6 +107,7 @@ RECIPE = Recipe(
         (Q, QD, TAU, DT),
         (Q_NEXT, QD_NEXT),
         theta=True,
+        summary="Compute the state after one step of the classical fourth-order Runge-Kutta method, with constant torques.",
         positive=STAGE_PIVOTS,
     ),
     "step of fourth-order Runge-Kutta",

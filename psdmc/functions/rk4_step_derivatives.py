@@ -294,6 +294,8 @@ RECIPE = Recipe(
         STEP.signature.inputs,
         (*STEP.signature.outputs, A, B),
         theta=True,
+        summary="Compute the state after one step of the classical fourth-order Runge-Kutta method, and "
+        "that state's derivatives by q, qd and tau.",
         positive=STEP.signature.positive,
         calls=ACCELERATIONS.name,
     ),

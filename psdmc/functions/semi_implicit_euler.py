@@ -47,6 +47,7 @@ RECIPE = Recipe(
         (Q, QD, TAU, DT),
         (Q_NEXT, QD_NEXT),
         theta=True,
+        summary="Compute the state after one step of semi-implicit Euler: qd_next = qd + dt qdd, q_next = q + dt qd_next.",
         positive=PIVOTS,
     ),
     "step of semi-implicit Euler",

@@ -71,6 +71,7 @@ RECIPE = Recipe(
         STEP.signature.inputs,
         (*STEP.signature.outputs, A, B),
         theta=True,
+        summary="Compute the state after one step of semi-implicit Euler, and that state's derivatives by q, qd and tau.",
         positive=STEP.signature.positive,
     ),
     "Jacobians of a step of semi-implicit Euler",

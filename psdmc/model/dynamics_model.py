@@ -36,18 +36,19 @@ RENAMED = (
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, eq=False)
 class DynamicsModel(Answers):
-    """Inverse dynamics as monomials times constants: tau[i] = y(state) @ P[i] @ theta_b.
+    """A model holds a robot's inverse dynamics as monomials times constants: tau[i] = y(state) @ P[i] @ theta_b.
 
-    A model has all functions of compiled robots as methods, computed in NumPy. Their arrays are (..., nq) for q and
-    (..., nv) for rates and torques, in SI units; leading axes are states. n joints, p monomials, l base parameters.
+    `psdmc.derive` makes models. A model has all functions of a compiled robot as methods, which psdmc computes in NumPy.
+    Their arrays are (..., nq) for q and (..., nv) for rates and torques, in SI units; the leading axes (...) count states.
+    A model has n joints, p monomials y and l base parameters theta_b.
 
-    expansion    E and P; None if derived with --no-expand
-    theta_b      (l,) float      base parameters, SI units as in `base_parameters`; None if unknown
-    B            (l, 11n) float  theta_b = B @ x, for standard parameters x that the assumptions allow
+    expansion    the matrices E and P; None if the model was derived with --no-expand
+    theta_b      (l,) base parameters, SI units as in `base_parameters`; None if unknown
+    B            (l, 11n) matrix: theta_b = B @ x for standard parameters x, 11 per link, that the assumptions allow
     mechanism    the robot: joints, link frames, gravity, limits, standard parameters
-    certificate  (nv,)           largest torque error against Newton-Euler at random states, per joint rate, relative to
-                                 the largest torque of that rate
-    provenance   plain JSON values: source text, its hash and format, options, snapping and its effect, tolerances
+    certificate  (nv,) per joint rate: the largest difference from Newton-Euler torques at random states, divided by the
+                 largest torque of that rate
+    provenance   plain JSON values: text, hash and format of the robot file, options, snapped angles, tolerances
     calibrated   what a calibration found, with the covariance of theta_b and the verdict; None if not calibrated
     """
 
@@ -84,78 +85,86 @@ class DynamicsModel(Answers):
 
     @property
     def chain(self) -> Mechanism:
-        """The mechanism; psdmc 0.1 called it `chain`."""
+        """Return `mechanism`, which psdmc 0.1 called `chain`."""
         return self.mechanism
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the n joints, from base to tip."""
+        """Return the names of the n joints, from base to tip."""
         return self.mechanism.joint_names
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Names of the n links that the joints move. A link with everything fixed to it is a body."""
+        """Return the names of the n links that the joints move, in the order of the joints."""
         return tuple(joint.link_name for joint in self.mechanism.joints)
 
     @property
     def q_names(self) -> tuple[str, ...]:
-        """Names of the nq entries of q: the joint's name, or 'root_joint.x' and so on for a joint with several entries."""
+        """Return the names of the nq entries of q, such as 'elbow', or 'root_joint.x' if a joint has several entries."""
         return self.mechanism.q_names
 
     @property
     def v_names(self) -> tuple[str, ...]:
-        """Names of the nv entries of rates, accelerations and torques, such as 'elbow' or 'root_joint.vx'."""
+        """Return the names of the nv entries of rates, accelerations and torques, such as 'elbow' or 'root_joint.vx'."""
         return self.mechanism.v_names
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Names of the frames of poses, Jacobians, wrenches and loads, in the order of results."""
+        """Return the names of the frames for poses, Jacobians, wrenches and loads, in the order of the results."""
         return tuple(frame.name for frame in self.mechanism.frames)
 
     @property
     def n(self) -> int:
-        """Number of joints."""
+        """Return the number of joints, including mimic joints, which follow another joint."""
         return len(self.mechanism)
 
     @property
     def nq(self) -> int:
-        """Length of q."""
+        """Return the length of q: the joint positions, with four entries for a quaternion."""
         return self.mechanism.nq
 
     @property
     def nv(self) -> int:
-        """Length of qd, qdd and tau."""
+        """Return the length of qd, qdd and tau: the number of joint rates."""
         return self.mechanism.nv
 
     @property
     def l(self) -> int:  # noqa: E743  the paper's letter
-        """Number of base parameters."""
+        """Return the number of base parameters, the length of theta_b."""
         return int(self.B.shape[0])
 
     @property
     def E(self) -> NDArray[np.uint8] | None:
-        """Exponents of the monomials, (5n, p) uint8; None if the model was derived without them."""
+        """Return the exponents of the p monomials, (5n, p) uint8; None if the model was derived without them.
+
+        The rows are the exponents of q, sin q, cos q, qd and qdd, n rows each.
+        """
         return None if self.expansion is None else self.expansion.E
 
     @property
     def P(self) -> tuple[sparse.csr_array, ...] | None:
-        """Sparse reduction matrices (p, l), one per joint; None if the model was derived without them."""
+        """Return the sparse matrices P[i], (p, l), one per joint torque; None if the model was derived without them."""
         return None if self.expansion is None else self.expansion.P
 
     @property
     def p(self) -> int | None:
-        """Number of monomials; None if the model was derived without them."""
+        """Return the number of monomials, products of powers of q, sin q, cos q, qd and qdd; None if there are none."""
         return None if self.expansion is None else self.expansion.p
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """Index into x, per base parameter, of the first standard parameter that only this base parameter contains, with
-        factor one."""
+        """Return, per base parameter, the index of its pivot among the 11n standard parameters.
+
+        The pivot is the first standard parameter that this base parameter contains with factor one, and no other contains.
+        """
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
     @property
     def is_reduced(self) -> bool:
-        """True if every base parameter has a pivot, as in every derived model."""
+        """True if each base parameter contains, with factor one, a standard parameter that no other contains.
+
+        This is true for every model that psdmc derives.
+        """
         return bool(self._leads.any(axis=1).all())
 
     @property
@@ -166,9 +175,10 @@ class DynamicsModel(Answers):
 
     @property
     def representative(self) -> Array:
-        """Matrix (11n, l) that gives standard parameters with a given theta_b: B @ representative = 1.
+        """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b with these base parameters.
 
-        Each base parameter is placed on its pivot. The other free coordinates are zero.
+        Many standard parameters have the same theta_b. This choice puts each base parameter on its pivot. The others are
+        zero, unless the model's assumptions couple them to a pivot. B @ R is the identity matrix.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -179,13 +189,13 @@ class DynamicsModel(Answers):
         )
 
     def expanded(self) -> Expansion:
-        """Return E and P; InputError if the model has none."""
+        """Return the matrices E and P as one object. Raises InputError if the model was derived without them."""
         if self.expansion is None:
             raise InputError("this model was derived without E and P", "derive it again without --no-expand")
         return self.expansion
 
     def known_theta_b(self) -> Array:
-        """Return theta_b, (l,); InputError if it is unknown."""
+        """Return the base parameters theta_b, (l,), SI units. Raises InputError if some inertias are unknown."""
         if self.theta_b is None:
             raise InputError(
                 f"the base parameters of '{self.mechanism.name}' are unknown",
@@ -195,7 +205,7 @@ class DynamicsModel(Answers):
 
     @property
     def unknown_base_parameters(self) -> tuple[int, ...]:
-        """Indices of the base parameters that contain an unknown standard parameter; empty if theta_b is known."""
+        """Return the indices of the base parameters that depend on an unknown inertia; empty if theta_b is known."""
         if self.theta_b is not None:
             return ()
         is_unknown = np.isnan(self.mechanism.parameters.reshape(-1))
@@ -203,7 +213,7 @@ class DynamicsModel(Answers):
 
     @property
     def file_theta_b(self) -> Array | None:
-        """theta_b, (l,), or the part of it that comes from links of known inertia; None if no link has one."""
+        """Return theta_b, (l,), with unknown parameters of links counted as zero; None if no inertia is known."""
         if self.theta_b is not None:
             return self.theta_b
         known = self.mechanism.known_parameters
@@ -212,15 +222,16 @@ class DynamicsModel(Answers):
         return np.asarray(times(self.B, known.reshape(-1)))
 
     def equivalent_parameters(self) -> Array:
-        """Return standard parameters (11n,) that have the model's theta_b: one choice of many, `representative @ theta_b`.
+        """Return standard parameters, (11n,), that give the same torques as the model: `representative @ theta_b`.
 
-        They are not the links' parameters, and no rigid bodies need have them. InputError if theta_b is unknown.
+        Many standard parameters give these torques. The returned ones are not the links' real parameters, and may have
+        negative masses. Raises InputError if theta_b is unknown.
         """
         found: Array = times(self.representative, self.known_theta_b())
         return found
 
     def standard_parameters(self) -> Array:
-        """Return `equivalent_parameters()`; this is its name in psdmc 0.1."""
+        """Return `equivalent_parameters()`, which psdmc 0.1 called `standard_parameters()`, with a DeprecationWarning."""
         warnings.warn(RENAMED, DeprecationWarning, stacklevel=2)
         return self.equivalent_parameters()
 
@@ -231,16 +242,16 @@ class DynamicsModel(Answers):
         inertias: ArrayLike,
         drive_inertias: ArrayLike | None = None,
     ) -> Array:
-        """Return theta_b (l,) of a robot with these bodies, for the argument `theta_b` of functions.
+        """Compute the base parameters theta_b, (l,), of this robot with other masses and inertias.
 
-            masses          (n,) kg, one body per joint, in the order of `link_names`: the link and all that is fixed to it
+            masses          (n,) kg, one per link of `link_names`, with all that is fixed to the link
             coms            (n, 3) m, centres of mass in the link frames
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the link frames' axes
             drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the model's
 
-        Raises InputError for numbers that are not finite or outside the ranges of robot files, and for a negative mass.
-        InputError also if an inertia is not symmetric or has no mass, or if the model's assumptions exclude the bodies.
-        UserWarning if no rigid body has such an inertia.
+        Pass the result to a function's argument `theta_b`. Raises InputError if a number is not finite, a mass is negative,
+        or an inertia is not symmetric or has no mass. Raises InputError also if a number is too large for a robot file, or
+        if the model's assumptions exclude a body. Warns if an inertia belongs to no rigid body.
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
@@ -254,15 +265,24 @@ class DynamicsModel(Answers):
         *,
         out: Array | None = None,
     ) -> Array:
-        """Return torques tau (..., nv) in N m, or N for sliding joints.
+        """Compute the joint torques tau, (..., nv), of a motion: N m, or N for sliding joints.
 
-        q (..., nq), qd and qdd (..., nv). `theta_b` (l,) replaces the model's base parameters, `out` takes the result.
-        psdmc evaluates E, P and theta_b, or Newton-Euler if the model has no E. This is slow: `psdmc.compile` is faster.
+            q          (..., nq) joint positions, rad or m; the leading axes (...) count states
+            qd, qdd    (..., nv) joint rates and accelerations
+            theta_b    (l,) base parameters in place of the model's; optional
+            out        array that takes the result; optional
+
+        psdmc evaluates tau[i] = y(state) @ P[i] @ theta_b in NumPy, or Newton-Euler recursions if the model has no E and P.
+        A robot from `psdmc.compile` is hundreds of times faster.
         """
         return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
     def torques_for(self, theta_b: ArrayLike, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """Return torques (..., nv) as `inverse_dynamics` does, with the base parameters theta_b (l,)."""
+        """Compute the joint torques tau, (..., nv), of a motion, for a robot with the base parameters theta_b, (l,).
+
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
+        qd, qdd    (..., nv) joint rates and accelerations
+        """
         theta = real_array("theta_b", theta_b)
         if theta.shape != (self.l,):
             raise InputError(
@@ -276,30 +296,51 @@ class DynamicsModel(Answers):
         return found.reshape(*shape, self.nv)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
-        """Return the regressor Y (..., nv, l), with tau = Y theta_b."""
+        """Compute the regressor Y, (..., nv, l): the torques of inverse dynamics are tau = Y theta_b.
+
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
+        qd, qdd    (..., nv) joint rates and accelerations
+        out        array that takes the result; optional
+        """
         return self._answer("regressor", q, qd, qdd, out=out)
 
     def mass_matrix(
         self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
     ) -> Array:
-        """Return the mass matrix M(q), (..., nv, nv), both triangles."""
+        """Compute the joint-space mass matrix M(q), (..., nv, nv), with both triangles filled; kg m^2, kg m or kg.
+
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
+        theta_b    (l,) base parameters in place of the model's; optional
+        out        array that takes the result; optional
+        """
         return self._answer("mass_matrix", q, theta_b, out=out)
 
     def nonlinear_effects(
         self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
     ) -> Array:
-        """Return h(q, qd) = C(q, qd) qd + g(q), (..., nv): Coriolis, centrifugal and gravity torques."""
+        """Compute the Coriolis, centrifugal and gravity torques h(q, qd), (..., nv): N m, or N for sliding joints.
+
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
+        qd         (..., nv) joint rates
+        theta_b    (l,) base parameters in place of the model's; optional
+        out        array that takes the result; optional
+        """
         return self._answer("nonlinear_effects", q, qd, theta_b, out=out)
 
     def gravity(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None) -> Array:
-        """Return the gravity torques g(q), (..., nv)."""
+        """Compute the gravity torques g(q), (..., nv), which hold the robot still: N m, or N for sliding joints.
+
+        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
+        theta_b    (l,) base parameters in place of the model's; optional
+        out        array that takes the result; optional
+        """
         return self._answer("gravity", q, theta_b, out=out)
 
     @property
     def base_parameters(self) -> BaseParameters:
-        """Equation, unit and value of each entry of theta_b, a tuple; the value is None if it is unknown.
+        """Return the base parameters: a tuple with the equation, unit and value of each. An unknown value is None.
 
-        `to_frame()` returns a pandas data frame, `to_latex()` LaTeX.
+        The tuple's method `to_frame()` returns a pandas data frame, and `to_latex()` returns LaTeX.
         """
         unknown, known = self.unknown_base_parameters, self.file_theta_b
         values = [None] * self.l if known is None else known.tolist()
@@ -309,17 +350,17 @@ class DynamicsModel(Answers):
     def to_latex(self) -> str:
         """Return the base parameters' equations, values and units as an `aligned` environment of amsmath.
 
-        Entries of theta_b are numbered from 0, joints from 1.
+        The equations number the entries of theta_b from 0 and the joints from 1.
         """
         return self.base_parameters.to_latex()
 
     def torque_expression(self, joint: int | str, numbers: bool = False) -> sympy.Expr:
-        """Return the torque of one joint as a SymPy expression, for small robots; its `args` are the terms.
+        """Return the torque of one joint as a SymPy sum, whose `args` are the terms; meant for small robots.
 
             joint    name of the joint, or its number from 0
             numbers  True: use the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        The symbols q1, qd1, qdd1 belong to the first joint. Raises InputError for an unknown joint, a model without E and
+        The symbols q1, qd1 and qdd1 belong to the first joint. Raises InputError for an unknown joint, a model without E and
         P, or a torque of more than 2,000 monomials. Raises ToolchainError if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
@@ -327,11 +368,14 @@ class DynamicsModel(Answers):
 
     @property
     def content_hash(self) -> str:
-        """SHA-256 of the content of the model file, as hexadecimal digits."""
+        """Return the SHA-256 of the model as 64 hexadecimal digits; equal models have equal sums.
+
+        The sum covers the arrays and the manifest that `save` writes into the model file.
+        """
         return store.content_hash(self)
 
     def save(self, path: str | Path) -> None:
-        """Write the model to a file, as `psdmc.save(model, path)` does."""
+        """Write the model to a file that `psdmc.load` reads, as `psdmc.save(model, path)` does."""
         store.save(self, path)
 
     def with_payload(
@@ -341,7 +385,7 @@ class DynamicsModel(Answers):
         inertia: ArrayLike | None = None,
         frame: Placement | str | None = None,
     ) -> DynamicsModel:
-        """Return a model with a rigid load fixed to the tip, or to another named frame.
+        """Return a new model with a rigid load fixed to the tip, or to another named frame.
 
             mass      kg
             com       (3,) m, centre of mass in `frame`

@@ -62,7 +62,10 @@ def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
 
 
 def load(path: str | Path) -> DynamicsModel:
-    """Return the model in a file; InputError if it is missing, damaged, edited, or written by a newer psdmc."""
+    """Read a model from a file that `save` or `psdmc derive` wrote.
+
+    Raises InputError if the file is missing, damaged or edited, or if a newer psdmc wrote it.
+    """
     source = Path(path)
     return load_bytes(_bytes_of(source), source)
 

@@ -53,7 +53,7 @@ class Model(ModelParts, Protocol):
 
 
 def save(model: Model, path: str | Path) -> None:
-    """Write a model to a file, completely or not at all.
+    """Write a model to a file that `load` reads; after a failure the old file is unchanged.
 
     Raises InputError if the path cannot be written, and ToolchainError if the disk fails.
     """

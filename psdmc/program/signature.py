@@ -52,11 +52,13 @@ class Quantity:
 
     axes     each a word of WORDS or a number
     largest  SI; tests draw an input from plus or minus this
+    means    what Python's documentation says of it, with the unit
     """
 
     name: str
     axes: tuple[str, ...] = ()
     largest: float = 1.0
+    means: str = ""
 
     def __post_init__(self) -> None:
         wrong = [axis for axis in self.axes if axis not in WORDS and not axis.isdecimal()]
@@ -73,14 +75,12 @@ class Quantity:
 class Positive:
     """Intermediate results that must be positive, entry by entry, for the function to have a result.
 
-    which   says in words which entry is not positive
-    reason  says what that means
+    which   says in words which entry is not positive, and what that means
     spoilt  says which outputs become NaN then
     """
 
     quantity: Quantity
     which: str
-    reason: str
     spoilt: str
 
 
@@ -98,6 +98,7 @@ class Signature:
               are NaN and it returns which; None: it cannot fail
     products  how outputs that a trace does not give follow from what it gives
     normalizes  whether quaternions that it reads may have any length but zero
+    summary   a sentence on what it computes, for Python and the table of docs/functions.md
     calls     name of a function of states that its C calls stage by stage, instead of a body of its own
     """
 
@@ -111,6 +112,7 @@ class Signature:
     products: tuple[Product, ...] = ()
     calls: str | None = None
     normalizes: bool = False
+    summary: str = ""
 
     def __post_init__(self) -> None:
         names = [q.name for q in (*self.inputs, *self.stored)] + [product.right for product in self.products]
@@ -149,9 +151,10 @@ def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
     return found
 
 
-Q = Quantity("q", ("nq",), math.pi)
-"""Positions, rad or m."""
-QD, QDD = Quantity("qd", ("nv",), 3.0), Quantity("qdd", ("nv",), 5.0)
-"""Their rates."""
-TAU = Quantity("tau", ("nv",))
-"""Torques, N m or N; those of q, qd and qdd wherever states are drawn."""
+Q = Quantity(
+    "q", ("nq",), math.pi, "joint positions: rad or m, or a unit quaternion for a ball joint or floating base"
+)
+QD = Quantity("qd", ("nv",), 3.0, "joint rates, rad/s or m/s")
+QDD = Quantity("qdd", ("nv",), 5.0, "joint accelerations, rad/s^2 or m/s^2")
+TAU = Quantity("tau", ("nv",), means="joint torques (N m), or forces (N) of sliding joints")
+"""Those of q, qd and qdd if states are drawn."""

@@ -14,8 +14,7 @@ from psdmc.recipes.torques import torques
 
 PIVOTS = Positive(
     Quantity("pivot", ("nv",)),
-    which="the joint whose pivot is not positive",
-    reason="the joint at which the mass matrix is not positive definite",
+    which="the number of the joint, from 0, at which the mass matrix is not positive definite",
     spoilt="accelerations",
 )
 """The pivots of M(q), which must be positive for it to be inverted."""

@@ -23,19 +23,21 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-COTANGENT = Quantity("cotangent", ("nv",))
-"""Weights of the outputs."""
+COTANGENT = Quantity(
+    "cotangent", ("nv",), means="one weight per entry of the weighted torques or accelerations"
+)
 
-DQ, DQD, DQDD = (Quantity("dq", ("nv",)), Quantity("dqd", ("nv",)), Quantity("dqdd", ("nv",)))
-"""Directions of q, qd and qdd."""
-
-DTAU = Quantity("dtau", ("nv",))
-"""Direction of tau."""
+DQ, DQD, DQDD, DTAU = (
+    Quantity(f"d{name}", ("nv",), means=f"change of {name} per unit step along the direction")
+    for name in ("q", "qd", "qdd", "tau")
+)
+"""Directions of inputs, and derivatives of outputs along them."""
 
 GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
-    Quantity(f"grad_{name}", ("nv",)) for name in ("q", "qd", "qdd", "tau")
+    Quantity(f"grad_{name}", ("nv",), means=f"gradient of the weighted sum by {name}, one entry per rate")
+    for name in ("q", "qd", "qdd", "tau")
 )
-GRADIENT_THETA = Quantity("grad_theta_b", ("l",))
+GRADIENT_THETA = Quantity("grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b")
 """Derivatives of the weighted sum of outputs by each input."""
 
 _FREE = "free_qdd"
@@ -92,6 +94,7 @@ def with_parameter_gradient(
     state: Recipe,
     order: int,
     meaning: str,
+    summary: str,
     trace: Callable[[Ingredients], Outputs],
     reference: Callable[[RobotOnArrays, Mapping[str, Array]], Arrays],
     pinocchio: Callable[[Reference, Mapping[str, Array]], Arrays],
@@ -107,6 +110,7 @@ def with_parameter_gradient(
             (*known.outputs, GRADIENT_THETA),
             theta=True,
             positive=known.positive,
+            summary=summary,
         ),
         f"{state.title}, by parameters too",
         trace,

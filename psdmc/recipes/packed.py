@@ -13,11 +13,14 @@ from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Packing, Recipe
 from psdmc.robot.mechanism import Array
 
-VALUES = Quantity("values", ("nonzeros",))
-"""A packed matrix."""
+VALUES = Quantity(
+    "values",
+    ("nonzeros",),
+    means="the entries; `CompiledRobot.pattern` gives their rows and columns, and nonzeros is their number",
+)
 
 
-def packed(dense: Recipe, order: int, meaning: str, packing: Packing) -> Recipe:
+def packed(dense: Recipe, order: int, meaning: str, summary: str, packing: Packing) -> Recipe:
     """The recipe of a function that packs `dense`, a function of one matrix."""
     function, (matrix,) = dense.signature, dense.signature.outputs
 
@@ -28,7 +31,13 @@ def packed(dense: Recipe, order: int, meaning: str, packing: Packing) -> Recipe:
     return replace(
         dense,
         signature=Signature(
-            f"{dense.name}_packed", order, meaning, function.inputs, (VALUES,), theta=function.theta
+            f"{dense.name}_packed",
+            order,
+            meaning,
+            function.inputs,
+            (VALUES,),
+            theta=function.theta,
+            summary=summary,
         ),
         title=f"{dense.title}, packed",
         reference=reference,

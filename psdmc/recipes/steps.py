@@ -18,12 +18,14 @@ from psdmc.recipes.on_arrays import columns, matrix
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 
-DT = Quantity("dt", (), 0.01)
-"""Length of the step, s."""
+DT = Quantity("dt", (), 0.01, "length of the step, s: one number, or one per state")
 
-Q_NEXT, QD_NEXT = Quantity("q_next", ("nq",)), Quantity("qd_next", ("nv",))
-A, B = Quantity("A", ("nx", "nx")), Quantity("B", ("nx", "nv"))
-"""Derivatives of (q_next, qd_next) by (q, qd) and by tau."""
+Q_NEXT = Quantity(
+    "q_next", ("nq",), means="joint positions after the step, rad or m, with quaternions of unit length"
+)
+QD_NEXT = Quantity("qd_next", ("nv",), means="joint rates after the step, rad/s or m/s")
+A = Quantity("A", ("nx", "nx"), means="derivatives of (q_next, qd_next) by (q, qd), with nx = 2 nv")
+B = Quantity("B", ("nx", "nv"), means="derivatives of (q_next, qd_next) by tau")
 
 Rows = Sequence[Sequence[Scalar]]
 

@@ -82,9 +82,12 @@ class CompiledFunctions(RobotFacts):
         theta_b: ArrayLike | None = None,
         out: Any = None,
     ) -> Any:
-        """Call a function at these states; returns its output, or a named tuple of several.
+        """Call a generated function by its declaration, as methods such as `inverse_dynamics` do; returns their result.
 
-        out  array, or tuple of arrays, that takes the results and is returned; None: new arrays
+        function  the declaration, from psdmc.functions.SIGNATURES
+        inputs    arrays in the order of the declaration
+        theta_b   (l,) base parameters in place of the compiled-in ones; optional
+        out       array, or tuple of arrays, that takes the results and is returned; None: new arrays
         """
         if any(map(is_foreign, inputs)):
             return self._foreign(function, inputs, theta_b, out)
@@ -107,11 +110,11 @@ class CompiledFunctions(RobotFacts):
         return outs[0] if len(outs) == 1 else results(function)(*outs)
 
     def pattern(self, name: str) -> tuple[Array, Array]:
-        """Return rows and columns, (k,) each, of the matrix entries that can differ from zero.
+        """Return the row and column indices, (k,) each, of the k matrix entries that can differ from zero.
 
         `robot.mass_matrix(q)[..., rows, columns]` equals `robot.mass_matrix_packed(q)`.
 
-        name  a function that returns one matrix, such as 'mass_matrix' or 'regressor'; InputError for others
+        name  a function that returns one matrix, such as 'mass_matrix' or 'regressor'; others raise InputError
         """
         self._kernel(name)
         if name not in self._patterns:

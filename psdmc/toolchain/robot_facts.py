@@ -36,74 +36,74 @@ class RobotFacts:
 
     @property
     def name(self) -> str:
-        """Name of the robot in C, the prefix of its functions."""
+        """Return the name of the robot in C, with which the names of its C functions begin."""
         return self._interface.robot
 
     @property
     def n(self) -> int:
-        """Number of joints that do not follow another joint."""
+        """Return the number of joints; mimic joints, which follow another joint, are not counted."""
         return self._interface.n
 
     @property
     def nq(self) -> int:
-        """Length of q."""
+        """Return the length of q: the joint positions, with four entries for a quaternion."""
         return self._interface.nq
 
     @property
     def nv(self) -> int:
-        """Length of qd, qdd and tau."""
+        """Return the length of qd, qdd and tau: the number of joint rates."""
         return self._interface.nv
 
     @property
     def l(self) -> int:  # noqa: E743  the paper's letter
-        """Number of base parameters."""
+        """Return the number of base parameters, the length of theta_b."""
         return self._interface.l
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the n joints, from base to tip."""
+        """Return the names of the n joints, from base to tip."""
         return self._interface.joint_names
 
     @property
     def q_names(self) -> tuple[str, ...]:
-        """Names of the nq entries of q: the joint's name, or 'root_joint.x' and so on for a joint with several entries."""
+        """Return the names of the nq entries of q, such as 'elbow', or 'root_joint.x' if a joint has several entries."""
         return self._interface.q_names
 
     @property
     def v_names(self) -> tuple[str, ...]:
-        """Names of the nv entries of rates, accelerations and torques, such as 'elbow' or 'root_joint.vx'."""
+        """Return the names of the nv entries of rates, accelerations and torques, such as 'elbow' or 'root_joint.vx'."""
         return self._interface.v_names
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Names of the frames of poses, Jacobians and wrenches, in the order of results."""
+        """Return the names of the frames for poses, Jacobians and wrenches, in the order of the results."""
         return self._interface.frame_names
 
     @property
     def dtype(self) -> np.dtype[np.float64] | np.dtype[np.float32]:
-        """NumPy type of all results: float64 or float32."""
+        """Return the NumPy type of all results: float64 or float32."""
         single, double = np.dtype(np.float32), np.dtype(np.float64)
         return single if self._interface.dtype == "float32" else double
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """Names of the compiled functions."""
+        """Return the names of the functions that are compiled so far, such as 'inverse_dynamics'."""
         return tuple(dict.fromkeys(name.removesuffix("_theta") for name in self._interface.kernels))
 
     @cached_property
     def limits(self) -> JointLimits:
-        """Limits of the joints from the robot file, each (n,). The functions do not enforce them."""
+        """Return the joint limits of the robot file, each (n,). The functions do not enforce these limits."""
         columns = np.array(self._interface.limits, np.float64).T
         return JointLimits(*(_frozen(column) for column in columns))
 
     @cached_property
     def gravity_acceleration(self) -> Vector:
-        """Gravity, (3,) m/s^2 in the base frame, or in the world frame of a floating base; it is part of the code."""
+        """Return the acceleration of gravity in the code, (3,) m/s^2 in the base frame (world frame for a floating base)."""
         return _frozen(self._interface.gravity)
 
     @cached_property
     def theta_b(self) -> Vector | None:
-        """Base parameters in the code, (l,), SI; None if unknown: functions then need the argument `theta_b`."""
+        """Return the compiled-in base parameters, (l,), SI units; None if unknown: pass `theta_b` in each call then."""
         values = self._interface.theta_b
         return None if values is None else _frozen(values)
 

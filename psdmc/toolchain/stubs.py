@@ -4,6 +4,7 @@ type checkers."""
 from __future__ import annotations
 
 import ast
+import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -54,16 +55,45 @@ def arguments(function: Signature) -> tuple[str, ...]:
 
 
 def documentation(function: Signature) -> str:
-    """A method's docstring: the function's meaning, then the shapes of its inputs and outputs."""
-    given = ", ".join(f"{q.name} {_shape(q)}" for q in function.inputs)
-    theta = "; theta_b (l,) in place of the parameters compiled in" if function.theta else ""
-    shapes = ", ".join(f"{output.name} {_shape(output)}" for output in function.outputs)
-    failure = f"; NaN in states that have {function.positive.which}" if function.positive else ""
-    written = "array" if len(function.outputs) == 1 else "tuple of arrays"
-    return (
-        f"{function.meaning}.\n\nTakes {given}{theta}.\nReturns {shapes}{failure}.\n"
-        f"out: the {written} to write to. nq = nv = n if every joint has one coordinate."
-    )
+    """A method's docstring: what it computes, its arguments and results, what NaN means, and the words for sizes."""
+    several = len(function.outputs) > 1
+    lead = ("...",) if function.inputs else ()
+    given = [(q.name, f"{_shape(q)} {q.means}") for q in function.inputs]
+    theta = "(l,) base parameters in place of the model's, SI units; optional if the model's are known"
+    given += [("theta_b", theta)] if function.theta else []
+    written = "tuple of arrays that take the results" if several else "array that takes the result"
+    given += [("out", f"{written}; optional")]
+    made = [(q.name, f"{_shape(q, lead)} {q.means}") for q in function.outputs]
+    axes = {axis for q in (*function.inputs, *function.outputs) for axis in q.axes}
+    axes |= {"l"} if function.theta else set()
+    notes = [*_failures(function), *([_STATES] if lead else [])]
+    notes += [meaning for size, meaning in _SIZES.items() if size in axes]
+    returned = f"Returns {'a named tuple' if several else 'an array'}:"
+    footer = textwrap.fill(" ".join(notes), 100)
+    return "\n\n".join([function.summary, _rows(given), returned, _rows(made), footer])
+
+
+_STATES = "The leading axes (...) count states."
+_SIZES = {
+    "nq": "nq is the length of q: the number of joints if every joint has one coordinate.",
+    "nv": "nv is the number of joint rates.",
+    "l": "l is the number of base parameters.",
+    "frames": "frames is the number of named frames.",
+}
+
+
+def _failures(function: Signature) -> list[str]:
+    """What NaN means."""
+    if function.positive is None:
+        return []
+    stage = " or in a stage of its step" if len(function.positive.quantity.axes) > 1 else ""
+    state = f"If the mass matrix is not positive definite in a state{stage},"
+    return [f"{state} the results of that state are NaN."]
+
+
+def _rows(named: list[tuple[str, str]]) -> str:
+    width = max(len(name) for name, _ in named)
+    return "\n".join(f"{name:{width}}  {text}" for name, text in named)
 
 
 def stub(functions: Iterable[Signature]) -> str:
@@ -96,8 +126,8 @@ def _method(function: Signature) -> list[str]:
     return [f"    def {function.name}({', '.join(given)}) -> {returns}[RealT]: ..."]
 
 
-def _shape(quantity: Quantity) -> str:
-    return f"({', '.join(('...', *quantity.axes))})"
+def _shape(quantity: Quantity, lead: tuple[str, ...] = ("...",)) -> str:
+    return f"({', '.join((*lead, *quantity.axes))}{'' if lead else ','})"
 
 
 def own_methods() -> set[str]:

@@ -12,7 +12,7 @@ from psdmc.program.signature import Positive, Q, Quantity, Signature
 from psdmc.program.trace import Slot, Tracer
 
 N, L, FRAMES = 3, 2, 2
-PIVOT = Positive(Quantity("pivot", ("nv",)), "the joint that is odd", "the joint that is odd", "outputs")
+PIVOT = Positive(Quantity("pivot", ("nv",)), "the joint that is odd", "outputs")
 FUNCTION = Signature(
     "everything",
     1000,

@@ -247,8 +247,8 @@ def test_a_call_is_described_as_the_method_that_it_is(robot: CompiledRobot) -> N
     assert call.__name__ == "inverse_dynamics"
     assert call.__self__ is robot
     assert str(inspect.signature(call)) == "(q, qd, qdd, theta_b=None, *, out=None)"
-    assert "Takes q (..., nq), qd (..., nv), qdd (..., nv)" in call.__doc__
-    assert "Returns tau (..., nv)" in call.__doc__
+    assert "\nqdd      (..., nv) joint accelerations, rad/s^2" in call.__doc__
+    assert "\ntau  (..., nv) joint torques" in call.__doc__.split("Returns an array:")[1]
     assert callable(call)
 
 

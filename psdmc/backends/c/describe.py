@@ -55,10 +55,10 @@ def _failure(function: Signature, target: Target) -> tuple[str, ...]:
         return ()
     if not target.has_batches:
         return (
-            f"{function.name} returns 0, or 1 + {function.positive.which};",
-            f"the {function.positive.spoilt} of such a state are NaN.",
+            f"{function.name} returns 0, or 1 + {function.positive.which}.",
+            f"The {function.positive.spoilt} of such a state are NaN.",
         )
     return (
-        f"{function.name} returns 0, or 1 + {function.positive.which}, or (batch) 1 + the first",
-        f"row that has one; the {function.positive.spoilt} of such a state are NaN.",
+        f"{function.name} returns 0, or 1 + {function.positive.which}.",
+        f"A batch returns 0, or 1 + the first row that fails. The {function.positive.spoilt} of such a state are NaN.",
     )

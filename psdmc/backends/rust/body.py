@@ -19,6 +19,8 @@ LANES = 4
 """Angles are taken in a multiple of so many, two vectors of which hold a usual arm's: the compiler puts them in lanes."""
 
 _SUM, _PRODUCT, _SIGN, _ATOM = range(4)
+WRITTEN = frozenset({Op.LOAD, Op.CONST, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.SQRT, Op.SIN, Op.COS})
+"""Operations that the crate has."""
 _SYMBOL = {Op.ADD: ("+", _SUM), Op.SUB: ("-", _SUM), Op.MUL: ("*", _PRODUCT), Op.DIV: ("/", _PRODUCT)}
 
 
@@ -57,8 +59,15 @@ def statements(
     program: Program, shapes: Mapping[str, Sequence[int]], stored: Sequence[Quantity]
 ) -> list[str]:
     """The lines that compute a PROGRAM: outputs begin as zeros, and each entry is stored when it is known."""
-    declared = [f"let mut {variable(q.name)} = {array(shapes[q.name], '0.0')};" for q in stored]
-    return [*declared, *_Writer(program, shapes).lines()]
+    return [*(_declared(q.name, program, shapes) for q in stored), *_Writer(program, shapes).lines()]
+
+
+def _declared(name: str, program: Program, shapes: Mapping[str, Sequence[int]]) -> str:
+    """Declare an output. Rust warns of a value that nothing reads, and of `mut` if nothing is stored."""
+    is_stored = any(slot.vector == name and program.body[i].value != 0.0 for slot, i in program.outputs)
+    if is_stored and not shapes[name]:
+        return f"let {variable(name)};"
+    return f"let {'mut ' if is_stored else ''}{variable(name)} = {array(shapes[name], '0.0')};"
 
 
 def array(shape: Sequence[int], of: str = "f64") -> str:

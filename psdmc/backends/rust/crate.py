@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from psdmc.backends.describe import facts, frame_lines, uses_frames
 from psdmc.backends.info import PackageInfo
 from psdmc.backends.protocol import Emission, Function
-from psdmc.backends.rust.body import array, number, statements
+from psdmc.backends.rust.body import WRITTEN, array, number, place, statements
 from psdmc.backends.rust.names import identifier, text, variable
 from psdmc.backends.self_test import compared_by_row, given_name, tolerance
 from psdmc.errors import InputError, InternalError
@@ -52,7 +52,7 @@ class Check(NamedTuple):
 
 
 class KernelText(NamedTuple):
-    """One Rust function; `pivots` are the entries of `positive` to look at, in their order."""
+    """One Rust function; `pivots` are the numbers and values to look at, in their order."""
 
     name: str
     parameters: str
@@ -60,7 +60,6 @@ class KernelText(NamedTuple):
     cost: str
     lines: list[str]
     result: str
-    positive: str
     pivots: str
 
 
@@ -183,6 +182,11 @@ def _kernel(kernel: Kernel, info: PackageInfo) -> KernelText:
             f"{signature.name} of {info.name} is too long for one body, and Rust has no other form of it",
             "leave it out of --functions, or use psdmc emit-c",
         )
+    if lacking := sorted({instr.op.value for instr in kernel.single} - WRITTEN):
+        raise InputError(
+            f"{signature.name} of {info.name} needs {', '.join(lacking)}, which the Rust back end lacks",
+            "leave it out of --functions, or use psdmc emit-c",
+        )
     inputs = (*signature.inputs, *((Quantity("theta_b", ("l",)),) if kernel.theta else ()))
     shapes = {q.name: sizes.shape(q.axes) for q in (*inputs, *signature.stored)}
     if wrong := [name for name in shapes if LOCAL.fullmatch(name)]:
@@ -195,12 +199,11 @@ def _kernel(kernel: Kernel, info: PackageInfo) -> KernelText:
     positive = pivots = ""
     if signature.positive:
         positive, returns = signature.positive.quantity.name, f"Result<{returns}, crate::NotPositive>"
-        pivots = str([slot.index for slot, _ in kernel.single.outputs if slot.vector == positive])
+        slots = [slot for slot, _ in kernel.single.outputs if slot.vector == positive]
+        pivots = ", ".join(f"({slot.index}, {place(slot, shapes)})" for slot in slots)
     lines = statements(kernel.single, shapes, signature.stored)
     about = f"{kernel.name}: {cost(kernel.single)}, {kernel.lowering}"
-    return KernelText(
-        kernel.name, ", ".join(parameters), returns, about, lines, result, variable(positive), pivots
-    )
+    return KernelText(kernel.name, ", ".join(parameters), returns, about, lines, result, pivots)
 
 
 def _type(value: Any) -> str:

@@ -34,7 +34,7 @@ def test_a_floating_base_is_in_the_world(tmp_path: Path) -> None:
     for text in (said, (tmp_path / "manifest.json").read_text(), (tmp_path / "README.md").read_text()):
         assert BASE_FRAME not in text
     assert "m/s^2 in the world frame" in repr(model)
-    assert "named frame in the world frame" in model.forward_kinematics.__doc__
+    assert "named frame in the world frame." in model.forward_kinematics.__doc__
 
 
 @pytest.mark.parametrize("name", ["scara", "two_link"])

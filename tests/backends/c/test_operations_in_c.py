@@ -11,7 +11,6 @@ import pytest
 from direct import Direct, shared_library
 from fifty_digits import MP
 from operation_arguments import arguments
-from psdmc.backends.c.options import EmitOptions
 from slow_cases import slow_but_for
 from small import pendulum, pendulum_info
 
@@ -19,6 +18,7 @@ from psdmc.backends.c.c_expr import is_call
 from psdmc.backends.c.operations import CALLS
 from psdmc.backends.c.package import PackageView, package_view
 from psdmc.backends.c.package_files import library_files
+from psdmc.backends.options import EmitOptions
 from psdmc.errors import InputError
 from psdmc.program.interpret import interpret
 from psdmc.program.kernel import Kernel

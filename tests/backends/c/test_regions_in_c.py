@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from direct import Direct, shared_library
-from psdmc.backends.c.options import EmitOptions
 from region_functions import MATRICES, multiplied
 from small import kernel, pendulum_info
 
 from psdmc.backends.c.package import PackageView, package_view
+from psdmc.backends.options import EmitOptions
 from psdmc.program.kernel import Kernel
 from psdmc.program.program import Program
 from psdmc.program.regions import Call, Column, For, Region, Regions, Slice, run, straight

@@ -53,6 +53,13 @@ def test_of_arms(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.needs("cargo")
+def test_every_function_of_a_small_robot(tmp_path: Path) -> None:
+    emit(bundled_model("two_link"), tmp_path, "rust", functions=list(RECIPES))
+
+    assert passed(cargo(tmp_path, "test")) > len(RECIPES)
+
+
+@pytest.mark.needs("cargo")
 def test_of_a_floating_base(tmp_path: Path) -> None:
     try:
         files = metadata.distribution("example-robot-data").files or ()

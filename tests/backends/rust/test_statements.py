@@ -7,9 +7,15 @@ import re
 
 import numpy as np
 import pytest
+from bundled import bundled_model
 from random_programs import SEEDS, outputs_of, random_program
 
-from psdmc.backends.rust.body import statements
+from psdmc.backends.info import package_info
+from psdmc.backends.rust.body import WRITTEN, statements
+from psdmc.backends.rust.crate import _kernel
+from psdmc.errors import InputError
+from psdmc.functions import RECIPES
+from psdmc.program.kernel import Kernel
 from psdmc.program.program import Instr, Op, Program, Slot
 from psdmc.program.signature import Quantity
 
@@ -34,7 +40,7 @@ def run(lines: list[str], **given: object) -> dict[str, object]:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_programs(seed: int) -> None:
-    program = random_program(seed)
+    program = random_program(seed, of=WRITTEN)
     lines = statements(program, SHAPES, [TAU])
     q, qd = np.random.default_rng(7).uniform(-1, 1, (2, 50, 3))
 
@@ -72,3 +78,14 @@ def test_a_product_that_is_put_out_is_not() -> None:
     program = Program(body, ((Slot("tau", 0), 2), (Slot("tau", 1), 3)))
 
     assert "fma" not in "".join(statements(program, SHAPES, [TAU]))
+
+
+def test_a_function_that_needs_what_the_crate_lacks_is_refused() -> None:
+    body = (Instr(Op.LOAD, slot=Slot("q", 0)), Instr(Op.LOAD, slot=Slot("q", 1)), Instr(Op.TANH, (0,)))
+    tau = Kernel(
+        RECIPES["gravity"].signature, False, Program(body, ((Slot("g", 0), 2),)), Program((), ()), "factored"
+    )
+    info = package_info(bundled_model("two_link"))
+
+    with pytest.raises(InputError, match="gravity of two_link needs tanh, which the Rust back end lacks"):
+        _kernel(tau, info)

@@ -22,8 +22,8 @@
  *   _batch      one state per row
  *   _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too
  *   _theta      with the base parameters theta_b given at run time (_theta_batch: one theta_b for all rows)
- * forward_dynamics returns 0, or 1 + the joint whose pivot is not positive, or (batch) 1 + the first
- * row that has one; the accelerations of such a state are NaN.
+ * forward_dynamics returns 0, or 1 + the number of the joint, from 0, at which the mass matrix is not positive definite.
+ * A batch returns 0, or 1 + the first row that fails. The accelerations of such a state are NaN.
  */
 #ifndef pendulum_H
 #define pendulum_H
@@ -53,7 +53,7 @@ extern const double pendulum_theta_b[pendulum_BASE_PARAMETERS];
 extern const char *const pendulum_base_parameter_equations[pendulum_BASE_PARAMETERS];
 extern const char *const pendulum_base_parameter_units[pendulum_BASE_PARAMETERS];
 
-/* tau = M(q) qdd + h(q, qd); tau is 1 */
+/* joint torques of a motion, tau = M(q) qdd + h(q, qd); tau is 1 */
 /* inverse_dynamics: 2 mul + 1 add + 1 sincos, expanded */
 void pendulum_inverse_dynamics(const double *q, const double *qd, const double *qdd, double *tau);
 void pendulum_inverse_dynamics_batch(size_t count, const double *q, const double *qd, const double *qdd, double *tau);
@@ -62,7 +62,7 @@ void pendulum_inverse_dynamics_batch_soa(size_t count, const double *q, const do
 void pendulum_inverse_dynamics_theta(const double *q, const double *qd, const double *qdd, const double *theta_b, double *tau);
 void pendulum_inverse_dynamics_theta_batch(size_t count, const double *q, const double *qd, const double *qdd, const double *theta_b, double *tau);
 
-/* qdd = M(q)^-1 (tau - h(q, qd)); qdd is 1 */
+/* joint accelerations that torques cause, qdd = M(q)^-1 (tau - h(q, qd)); qdd is 1 */
 /* forward_dynamics: 1 mul + 1 add + 1 div + 1 sincos, expanded */
 int pendulum_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd);
 size_t pendulum_forward_dynamics_batch(size_t count, const double *q, const double *qd, const double *tau, double *qdd);
