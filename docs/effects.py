@@ -74,22 +74,22 @@ def choices(robot: str) -> Iterator[Row]:
 
     first = next(search.starts((PREVIOUS,) * len(chain)))
     compound, fold = Choices(compound=True), Choices(compound=True, fold=True)
-    yield "the file's frames, every parameter", [operations(in_file_frames(chain))]
+    yield "the file's frames, all link parameters", [operations(in_file_frames(chain))]
     yield (
-        "frames of modified DH",
+        "link frames by the modified DH convention",
         [operations(in_frames(chain, plain.frames, plain.base_acceleration, plain))],
     )
-    yield "as few parameters as possible (carriers)", [best(iter([first]))]
-    yield "compound angles of parallel axes", [best(iter([replace(first, choices=compound)]))]
-    yield "last body folded", [best(iter([replace(first, choices=fold)]))]
-    yield "the best of all variants", [best(search.starts((PREVIOUS,) * len(chain)))]
+    yield "as many link parameters zero as possible", [best(iter([first]))]
+    yield "one rotation for parallel neighbouring axes", [best(iter([replace(first, choices=compound)]))]
+    yield "last body in the frame before its joint", [best(iter([replace(first, choices=fold)]))]
+    yield "cheapest combination of these ideas", [best(search.starts((PREVIOUS,) * len(chain)))]
     yield (
-        "best place of each frame on its axis",
+        "cheapest place of each frame on its axis",
         [best(one for feet in all_feet(chain) for one in search.starts(feet))],
     )
     found = search.best(INVERSE, SINGLE)
     yield (
-        "unit of length, carriers exchanged by cost",
+        "a length of the robot as unit of length",
         [operations(trace_dynamics(INVERSE, found, search.robot))],
     )
 

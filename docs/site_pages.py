@@ -23,6 +23,9 @@ BESIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "examples/README.md"
 TABLES = ("tables.css", "tables.js")
 """What makes wide tables fit, here and in the reports' pages."""
 
+UNSEARCHED = "---\nnosearch: true\n---\n\n"
+"""Front matter that keeps a page out of the site's search index: a decision record would outrank the pages for users."""
+
 LANDING = {"README.md": "index.md"}
 """Documents whose links lead to another page."""
 
@@ -48,6 +51,7 @@ MENU = {
         "how-to/batch",
         "how-to/derivatives",
         "how-to/casadi",
+        "how-to/floating-base",
         "how-to/whole-body",
         "how-to/many-robots",
         "how-to/plan-campaign",
@@ -114,7 +118,8 @@ def gather(to: Path) -> None:
     _write(to / "decisions/index.md", _decisions(to / "decisions"))
     known = {str(path.relative_to(to)) for path in to.rglob("*") if path.is_file()}
     for page in sorted(to.rglob("*.md")):
-        _write(page, linked(page.read_text(encoding="utf-8"), str(page.relative_to(to)), known))
+        text = linked(page.read_text(encoding="utf-8"), str(page.relative_to(to)), known)
+        _write(page, UNSEARCHED + text if page.parent.name == "decisions" else text)
     with (to / "index.md").open("a", encoding="utf-8") as index:
         index.writelines(_toctree(pages, title) for title, pages in MENU.items())
 

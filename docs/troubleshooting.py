@@ -269,7 +269,7 @@ LOGS = (
     Entry(
         "write JOINT=NUMBER",
         "A torque constant has no joint's name.",
-        "Write `--torque-constants shoulder=0.1`, in N m/A.",
+        "Write `--torque-constants shoulder=0.1`, in N m/A at the joint, gear included.",
         "calibrate arm.npz words.csv -o found.npz --torque-constants 3",
     ),
     Entry(

@@ -38,9 +38,8 @@ from psdmc.target.native import NATIVE
 from psdmc.target.presets import preset
 from psdmc.target.target import Real, Target, Trig
 from psdmc.toolchain.call import CompiledRobot
-from psdmc.toolchain.kept_kernels import lowered_once
-from psdmc.toolchain.kept_libraries import compiled_once
-from psdmc.toolchain.origin import Origin
+from psdmc.toolchain.compile import compiled_once, lowered_once
+from psdmc.toolchain.interface import Origin
 
 if TYPE_CHECKING:
     import numpy as np

@@ -25,10 +25,10 @@ from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.mechanism import BASE_FRAME, Array, Mechanism
 from psdmc.robot.unit_lengths import units_of
-from psdmc.toolchain import given_outputs
 from psdmc.toolchain.call_arguments import (
     RobotAxes,
     bound_arguments,
+    checked_outputs,
     common_lead,
     parameters,
     signature_of,
@@ -94,7 +94,7 @@ def evaluated(
     found = _values(model, recipe, _parameters(model, signature, theta_b), given, axes.sizes)
     outputs = [found[o.name].reshape(lead + tail) for o, tail in zip(signature.outputs, tails, strict=True)]
     if out is not None:
-        kept = given_outputs.checked(signature, out, [lead + tail for tail in tails], np.dtype(np.float64))
+        kept = checked_outputs(signature, out, [lead + tail for tail in tails], np.dtype(np.float64))
         for array, values in zip(kept, outputs, strict=True):
             array[...] = values
         outputs = list(kept)

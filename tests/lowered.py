@@ -8,7 +8,7 @@ from psdmc.lower.kernels import Lowering, lower, wanted
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
 from psdmc.target.native import COSTS
-from psdmc.toolchain.kept_kernels import lowered_once
+from psdmc.toolchain.compile import lowered_once
 
 
 def lowered(

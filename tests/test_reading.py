@@ -155,7 +155,7 @@ READS_ALL = {"read_text", "read_bytes"}
 """Methods that read a file to its end."""
 
 OWN = {
-    "bench/cold.py": "the kernel's figures",
+    "bench/measure.py": "the kernel's figures",
     "bench/callgrind.py": "valgrind's output",
     "bench/contestant.py": "psdmc's own sources",
     "bench/fresh.py": "the kernel's figures",
@@ -169,10 +169,9 @@ OWN = {
     "backends/render.py": "psdmc's own templates",
     "report/bench_page.py": "psdmc's own templates",
     "robot/new_file.py": "psdmc's own template",
-    "toolchain/cache_entry.py": "the user's own cache, by its size",
+    "toolchain/cache_room.py": "the user's own cache, by its size",
     "toolchain/direct_calls.py": "psdmc's own sources",
-    "toolchain/kept_kernels.py": "the user's own cache, sealed",
-    "toolchain/kept_libraries.py": "the user's own cache, sealed",
+    "toolchain/compile.py": "the user's own cache, sealed",
     "toolchain/stubs.py": "psdmc's own sources",
 }
 """What is read whole and is no input of a user's: file of psdmc, and whose it is."""

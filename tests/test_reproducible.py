@@ -34,12 +34,10 @@ STRANGE |= {"sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "asin"
 
 DECISIONS = {
     "robot/reference.py": "Pinocchio's side of a comparison",
-    "robot/reference_followers.py": "Pinocchio's side of a comparison",
     "robot/mujoco_reading.py": "MuJoCo's side of a comparison",
-    "robot/dh_textbook.py": "the textbook's side of a comparison",
     "robot/unit_lengths.py": "a refusal",
     "robot/joints/joint_type.py": "a rank",
-    "robot/reference_model.py": "a rank",
+    "robot/reference_model.py": "a rank, and the textbook's side of a comparison",
     "robot/inertia.py": "a refusal, whose rounding is not printed",
     "derivation/reduce.py": "from_callable, an independent derivation that only tests run",
     "derivation/from_callable.py": "an independent derivation that only tests run",

@@ -15,7 +15,6 @@ from psdmc.backends.c.package import PackageView
 from psdmc.target.native import NATIVE
 from psdmc.target.target import Target
 from psdmc.toolchain import compile as toolchain
-from psdmc.toolchain import kept_libraries
 from psdmc.toolchain.compiler_command import Compiler, find_compiler
 
 
@@ -29,8 +28,7 @@ def unoptimised_compiler(target: Target = NATIVE) -> Compiler:
 def without_optimisation() -> Iterator[None]:
     """Libraries compiled in this process inside are not optimised."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (toolchain, kept_libraries):
-            patch.setattr(module, "find_compiler", unoptimised_compiler)
+        patch.setattr(toolchain, "find_compiler", unoptimised_compiler)
         yield
 
 

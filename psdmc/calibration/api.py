@@ -31,7 +31,8 @@ def calibrate(
     model              a model, or the path of a model file
     logs               paths of the logs, or the path of a log description (TOML)
     options            filter and friction law of the fit; None: those of the log description, or the defaults
-    torque_constants   N m/A by joint name, for logs of currents; with `loaded`, only for joints that do not feel the load
+    torque_constants   N m/A at the joint (gear included) by joint name, for logs of currents; with `loaded`, only for
+                       joints that do not feel the load
     validation         logs that only test the fit; psdmc then fits to all other logs, and tests with none of them
     loaded             more logs of currents, recorded with a known load on the robot, to find torque constants
     load               the known load: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load file

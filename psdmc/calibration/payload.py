@@ -56,7 +56,7 @@ def identify_payload(
     frame             name of the model's frame for the results; None: the tip
     logs              logs that were recorded with the load, or a log description
     options           filter and friction law of the fit; None: those of the log description, or of the model's calibration
-    torque_constants  N m/A by joint name, for logs of currents; None: the model's
+    torque_constants  N m/A at the joint (gear included) by joint name, for logs of currents; None: the model's
     regressor         function that computes the regressor; None: psdmc's own in NumPy
     progress          function that psdmc calls with the name of each stage, such as print
 

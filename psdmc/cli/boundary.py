@@ -10,7 +10,7 @@ import sys
 from psdmc.cli import interrupt
 from psdmc.cli.commands import app
 from psdmc.cli.lists import with_numbers_joined
-from psdmc.cli.one_line import one_line
+from psdmc.cli.next_step import one_line
 from psdmc.errors import CLOSED_STATUS, INTERRUPTED_STATUS, InternalError, PsdmcError, ToolchainError
 
 INTERNAL_STATUS = 70
@@ -19,7 +19,10 @@ INTERNAL_STATUS = 70
 def run(arguments: list[str] | None = None) -> None:
     """Run the command line."""
     words = sys.argv[1:] if arguments is None else arguments
-    _accept_any_text()
+    # Names that the terminal's encoding lacks are printed as escapes.
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         with interrupt.as_error():
             _run(words)
@@ -66,13 +69,6 @@ def _fail(words: list[str], message: str, hint: str | None, status: int) -> None
         if sys.stderr is not None:  # closed by the caller
             print("\n".join(said), file=sys.stderr)
     sys.exit(status)
-
-
-def _accept_any_text() -> None:
-    """Names that the terminal's encoding lacks are printed as escapes."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
 
 
 def _silence(stream: object) -> None:

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
+from psdmc.cli.lists import parsed_torque_constants
 from psdmc.cli.next_step import say_next
 from psdmc.cli.output import check_output
 from psdmc.cli.progress import steps
-from psdmc.cli.torque_constants import parsed_torque_constants
 
 
 def payload(
@@ -36,7 +36,7 @@ def payload(
         list[str] | None,
         typer.Option(
             metavar="JOINT=KT,...",
-            help="torque constants in N m/A, for logs of currents; default: the model's",
+            help="joint torque per ampere in N m/A, gear included; default: the model's",
         ),
     ] = None,
     keep: Annotated[

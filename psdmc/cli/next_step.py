@@ -6,8 +6,6 @@ import contextlib
 import shlex
 import sys
 
-from psdmc.cli.one_line import one_line
-
 
 def say_next(*words: object) -> None:
     """Print `next: psdmc WORDS`, quoted for a shell, to standard error: standard output holds results alone."""
@@ -25,3 +23,8 @@ def say_next_line(line: str) -> None:
     with contextlib.suppress(OSError):  # whoever closed it does not want to know
         if sys.stderr is not None:
             print(f"next: {one_line(line)}", file=sys.stderr)
+
+
+def one_line(text: str) -> str:
+    """Untrusted text on one line of a terminal: control characters escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

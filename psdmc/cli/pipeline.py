@@ -180,18 +180,6 @@ def package_folders(given: list[str] | None) -> dict[str, Path]:
     return found
 
 
-def _with_kept(kept: dict[str, str], given: dict[str, str]) -> dict[str, str]:
-    """Arguments of a xacro file: given ones, else those that the model was derived with. The file's expressions evaluate
-    their values, so that a model's, which may be forged, are taken only where they cannot call anything."""
-    for name, value in kept.items():
-        if name not in given and not PLAIN_VALUE.fullmatch(value):
-            raise InputError(
-                f"the model's value of xacro argument {name!r} is more than a word or numbers",
-                f"give it again: {name}:=VALUE",
-            )
-    return {**kept, **given}
-
-
 def _drive_inertia(given: list[str] | None) -> bool | tuple[float, ...]:
     if given == ["all"]:
         return True
@@ -235,7 +223,14 @@ def check(
         options = dict(found.provenance.get("options", {}))
         kept = options.pop("xacro_args", {})
         kept = kept if robot.suffix.lower() == ".xacro" else {}
-        source = load_robot(robot, **options, xacro_args=_with_kept(kept, given), packages=folders)
+        # A model may be forged, and xacro evaluates values: kept ones are taken only where they cannot call anything.
+        for name, value in kept.items():
+            if name not in given and not PLAIN_VALUE.fullmatch(value):
+                raise InputError(
+                    f"the model's value of xacro argument {name!r} is more than a word or numbers",
+                    f"give it again: {name}:=VALUE",
+                )
+        source = load_robot(robot, **options, xacro_args={**kept, **given}, packages=folders)
     with steps() as progress:
         progress("checking against other readers")
         rows = check_model(found, source)
@@ -325,7 +320,7 @@ def emit(
     from psdmc.backends.c.adapters import lacking
     from psdmc.backends.protocol import back_end
     from psdmc.backends.write import require_own_folder
-    from psdmc.cli.one_line import one_line
+    from psdmc.cli.next_step import one_line
     from psdmc.lower import kernels
     from psdmc.lower.admitted import run_time_only
     from psdmc.model.linear_friction import beyond_friction

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from psdmc.cli.one_line import one_line
+from psdmc.cli.next_step import one_line
 from psdmc.progress import Progress, Step
 
 PATIENCE = 2.0

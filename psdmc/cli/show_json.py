@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+import shlex
+from collections.abc import Sequence
 from typing import Any
 
-from psdmc.cli.show import cost_rows, joint_errors
-from psdmc.cli.show_robot import why_not_derived
+from psdmc.cli.show import cost_rows, followed, joint_errors, position_range
+from psdmc.cli.tables import Table, print_line, print_note, print_table
+from psdmc.errors import InputError
 from psdmc.lower.kernels import Lowering
 from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import summary, term_texts
+from psdmc.robot.coordinates import leaders
+from psdmc.robot.derivable import require_derivable
 from psdmc.robot.mechanism import Joint, Mechanism
 
 SCHEMA = 1
@@ -30,6 +34,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
     found, robot = summary(model), model.mechanism
     errors = joint_errors(robot, found.certificate)
     joints = [{**joint, "error": error} for joint, error in zip(_joints(robot), errors, strict=True)]
+    values = model.provenance.get("snap_torque_change")
     return {
         "name": found.name,
         "base": found.base,
@@ -44,7 +49,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
         "entries_of_P": found.entries,
         "base_parameters": model.base_parameters.plain(),
         "largest_torque_error": max(found.certificate),
-        "snap_torque_change": _numbers(model.provenance.get("snap_torque_change")),
+        "snap_torque_change": None if values is None else [_finite(float(value)) for value in values],
         "notes": list(found.notes),
         "calibration": None if model.calibrated is None else document(model.calibrated),
         "source": {"name": found.source_name, "sha256": found.source_sha256},
@@ -115,10 +120,6 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _numbers(values: Iterable[float] | None) -> list[float | None] | None:
-    return None if values is None else [_finite(float(value)) for value in values]
-
-
 def _plain(value: Any) -> Any:
     """JSON's own types, numbers that JSON lacks as null."""
     if isinstance(value, dict):
@@ -126,3 +127,45 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
     return _finite(value) if isinstance(value, float) else value
+
+
+def print_mechanism(found: Mechanism) -> None:
+    """Print a robot file's bodies, what each hangs on and follows, and whether psdmc derives it."""
+    count, own = len(found), len(leaders(found.coordinates))
+    shape = "a serial chain" if found.is_serial else f"a tree with {len(found.leaves)} ends"
+    print_line(f"{found.name}: {shape} of {count} joints with {own} coordinates, from {found.base_name}")
+    print()
+    rows = []
+    for i, joint in enumerate(found.joints):
+        limits = joint.limits
+        rows.append(
+            (
+                joint.name,
+                joint.link_name,
+                found.parent_link(i),
+                joint.type.word,
+                followed(found, i),
+                position_range(limits.lower, limits.upper, joint.type.position_unit),
+                "unknown" if math.isnan(found.parameters[i, 0]) else f"{found.parameters[i, 0]:.6g} kg",
+            )
+        )
+    print_table(Table(("joint", "link", "hangs on", "type", "q", "position", "mass"), rows))
+    print()
+    for note in found.notes:
+        print_note(note)
+    refused = why_not_derived(found)
+    if refused is not None:
+        print_line(f"not derived as a whole: {refused}")
+        print_line(f"hint: {refused.hint}")
+    for leaf in found.leaves if len(found.leaves) > 1 else ():
+        moving = len(found.path_to(leaf))
+        print_line(f"--tip {shlex.quote(found.joints[leaf].link_name)}: {moving} joints")
+
+
+def why_not_derived(found: Mechanism) -> InputError | None:
+    """The error with which a derivation of the whole robot would end, if any."""
+    try:
+        require_derivable(found)
+    except InputError as refused:
+        return refused
+    return None

@@ -24,7 +24,6 @@ from psdmc.robot.file_kinds import ROBOT_SUFFIXES
 
 if TYPE_CHECKING:
     from psdmc.lower.kernels import Lowering
-    from psdmc.model.dynamics_model import DynamicsModel
     from psdmc.robot.mechanism import Mechanism
 
 LARGEST_EXPANDED = 2000
@@ -89,7 +88,7 @@ def _show_robot(found: Mechanism, json: bool) -> None:
 
         print_json("robot", mechanism_json(found))
         return
-    from psdmc.cli.show_robot import print_mechanism
+    from psdmc.cli.show_json import print_mechanism
 
     print_mechanism(found)
 
@@ -100,7 +99,17 @@ def _show_model(path: Path, terms: bool, cost: bool, json: bool) -> None:
 
     found = load(path)
     if cost:
-        _show_cost(found, json)
+        from psdmc.cli.show import print_cost
+        from psdmc.cli.show_json import cost_json, print_json
+
+        small = found.p is not None and found.p <= LARGEST_EXPANDED
+        both: tuple[Lowering, ...] = ("factored", "expanded") if small else ("factored",)
+        with steps() as progress:
+            progress("lowering")
+            if json:
+                print_json("cost", cost_json(found, both))
+            else:
+                print_cost(found, both)
     elif json:
         from psdmc.cli.show_json import model_json, print_json, terms_json
 
@@ -111,17 +120,3 @@ def _show_model(path: Path, terms: bool, cost: bool, json: bool) -> None:
         print_model(found)
     if not json:
         say_what_a_model_is_for(path, found)
-
-
-def _show_cost(found: DynamicsModel, json: bool) -> None:
-    from psdmc.cli.show import print_cost
-    from psdmc.cli.show_json import cost_json, print_json
-
-    small = found.p is not None and found.p <= LARGEST_EXPANDED
-    both: tuple[Lowering, ...] = ("factored", "expanded") if small else ("factored",)
-    with steps() as progress:
-        progress("lowering")
-        if json:
-            print_json("cost", cost_json(found, both))
-        else:
-            print_cost(found, both)

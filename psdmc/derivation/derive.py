@@ -94,13 +94,15 @@ def derive_model(
 
     def made(precision: Precision) -> DynamicsModel:
         used = {"tolerances": tolerances(precision, reduction)}
+        # As a model file gives the values back: tuples become lists.
+        plain: dict[str, Any] = json.loads(json.dumps(dict(provenance or {}) | used))
         return DynamicsModel(
             expansion=_expanded(robot, reduction, precision, tell, memory) if expand else None,
             theta_b=theta_b,
             B=B,
             mechanism=chain,
             certificate=np.zeros(chain.nv),
-            provenance=_plain(dict(provenance or {}) | used),
+            provenance=plain,
         )
 
     precision = precision_for(robot, reduction)
@@ -137,12 +139,6 @@ def _refuse_absurd(chain: Mechanism) -> None:
             f"{SIZES[0]:g} to {SIZES[1]:g}",
             "check the units of lengths: they are metres",
         )
-
-
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values as a model file gives them back: tuples become lists."""
-    plain: dict[str, Any] = json.loads(json.dumps(values))
-    return plain
 
 
 def tolerances(precision: Precision, reduction: Reduction) -> dict[str, float]:

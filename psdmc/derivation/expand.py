@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from psdmc.derivation.extended import extended, has_small_entries, is_of_many_scales
-from psdmc.derivation.gravity import gravity_terms
-from psdmc.derivation.inertia import mass_matrix_terms
+from psdmc.derivation.inertia import Moving, coefficients, column, expanded, mass_matrix_terms, moving
+from psdmc.derivation.interpolate import linear_sizes
 from psdmc.derivation.memory import (
     available_memory,
     grid_bytes,
@@ -24,15 +24,16 @@ from psdmc.derivation.memory import (
 from psdmc.derivation.monomials import Monomials
 from psdmc.derivation.reduce import Reduction
 from psdmc.derivation.rounding import merged
-from psdmc.derivation.terms import Terms, joined, times_matrix
+from psdmc.derivation.terms import Array, Terms, joined, summed, times_matrix
 from psdmc.derivation.units import Scaled, monomial_units, parameter_units, torque_units
-from psdmc.derivation.velocity import acceleration_terms, velocity_terms
-from psdmc.dynamics.kinematics import carried_by
-from psdmc.dynamics.scalar import Vector
+from psdmc.derivation.velocity import acceleration_terms, derivative, velocity_terms
+from psdmc.dynamics.frames import BASE, Frame
+from psdmc.dynamics.kinematics import carried_by, path_to
+from psdmc.dynamics.regressor import Placed, carried, twist_in
+from psdmc.dynamics.scalar import ZERO, Scalar, Vector, dot
 from psdmc.model.expansion import Expansion
 from psdmc.progress import Progress
-
-Array = NDArray[np.float64]
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 COEFFICIENT_TOLERANCE = 1e-12
 """Coefficients below this are zero, lengths in the robot's unit (units.py). Six joints with oblique axes have the same
@@ -80,7 +81,8 @@ def expand(
     chosen = scaled.span[:, reduction.pivots]
     mass = _mass_matrix(scaled, chosen, monomials, precision.zero)
     progress("gravity")
-    gravity = _gravity(scaled, chosen, monomials, precision.zero)
+    potential = gravity_terms(scaled.frames, scaled.link_frames, scaled.up, monomials, precision.zero)
+    gravity = times_matrix(potential, chosen, precision.zero)
     progress("velocity terms")
     carried = carried_by(scaled.frames)
     count, needed = velocity_bytes(mass, monomials, carried)
@@ -116,12 +118,6 @@ def _mass_matrix(
     }
 
 
-def _gravity(scaled: Scaled, chosen: Array, monomials: Monomials, zero: float) -> Terms:
-    up: Vector = scaled.up
-    terms = gravity_terms(scaled.frames, scaled.link_frames, up, monomials, zero)
-    return times_matrix(terms, chosen, zero)
-
-
 def assembled(
     terms: Terms,
     monomials: Monomials,
@@ -149,3 +145,58 @@ def assembled(
         matrix.sort_indices()
         matrices.append(matrix)
     return exponents, tuple(matrices)
+
+
+# Gravity: the derivative of a potential that is of first order in every joint.
+def gravity_terms(
+    frames: Sequence[Frame],
+    link_frames: Sequence[Placed],
+    up: Vector,
+    monomials: Monomials,
+    tolerance: float,
+) -> Terms:
+    """Torque terms per unit of |g|; `up` is the unit vector against gravity in the base frame.
+
+    The potential of a unit mass at r in a link's frame is direction . r + height; both are carried outward from joint
+    to joint. The coefficient of a link's mass is the height; those of mx, my, mz are the direction.
+    """
+    parts: list[Terms] = []
+    at_base: tuple[Vector, Array] = (
+        (np.array([up[0]]), np.array([up[1]]), np.array([up[2]])),
+        np.zeros(1),
+    )
+    found: list[tuple[Vector, Array]] = []
+    for k, frame in enumerate(frames):
+        before = at_base if frame.parent == BASE else found[frame.parent]
+        found.append(_carried(moving(frame), *before))
+        path = path_to(frames, k)
+        potential = _link_potential(link_frames[k], *found[k], path, monomials, tolerance)
+        for i in path:
+            slope = derivative(potential, monomials, i)
+            parts.append(Terms(np.full_like(slope.row, i), slope.monomial, slope.column, slope.value))
+    return summed(joined(parts), tolerance)
+
+
+def _carried(joint: Moving, direction: Vector, height: Array) -> tuple[Vector, Array]:
+    before, count = column(direction), len(height)
+    raised: Scalar = height[:, None] + dot(before, joint.state.offset)
+    turned, _ = carried(joint.frame, joint.state, (before, ZERO))
+    return expanded(turned, count, joint.basis), coefficients(raised, count, joint.basis)
+
+
+def _link_potential(
+    place: Placed,
+    direction: Vector,
+    height: Array,
+    path: Sequence[int],
+    monomials: Monomials,
+    tolerance: float,
+) -> Terms:
+    x, y, z = place.translation.tolist()
+    about_link, _ = twist_in(place, (direction, ZERO))
+    values = np.stack([height + dot(direction, (x, y, z)), *about_link])
+    parameter, position = np.nonzero(np.abs(values) > tolerance)
+    k = path[-1]
+    codes = monomials.tensor_codes(path, linear_sizes(monomials.types[j] for j in path))
+    columns = PARAMETERS_PER_LINK * k + parameter
+    return Terms(np.full(len(columns), k), codes[position], columns, values[parameter, position])

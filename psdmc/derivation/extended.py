@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from psdmc.derivation.units import Scaled
 from psdmc.dynamics.frames import Frame
-from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
 from psdmc.reproducible import times
 
@@ -62,13 +61,12 @@ def extended(robot: Scaled) -> Scaled:
     return replace(
         robot,
         frames=tuple(_frame(frame) for frame in robot.frames),
-        link_frames=tuple(_placement(place) for place in robot.link_frames),
+        link_frames=tuple(
+            LongPlacement(orthonormal(place.rotation), place.translation.astype(np.longdouble))
+            for place in robot.link_frames
+        ),
         up=_vector(up / strength if strength else up),
     )
-
-
-def _placement(place: Placed) -> LongPlacement:
-    return LongPlacement(orthonormal(place.rotation), place.translation.astype(np.longdouble))
 
 
 def _frame(frame: Frame) -> Frame:

@@ -15,14 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from psdmc.derivation.extended import Long, extended
+from psdmc.derivation.extended import Long, extended, has_small_entries, is_of_many_scales
 from psdmc.derivation.link_by_link import reduced_to_digits, reduction_link_by_link
 from psdmc.derivation.reduce import Reduction, reduced
-from psdmc.derivation.sampled import is_plain, reduction_of, sampled_regressor
 from psdmc.derivation.units import Scaled
 from psdmc.dynamics.following import any_follows
+from psdmc.dynamics.regressor import regressor
+from psdmc.dynamics.slices import first_rates, neutral, normalized
 from psdmc.dynamics.torque_rows import echelon_rows
 from psdmc.reproducible import times
+from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
 STATES = 32
 """Sampled motions: three for each of the eleven columns that a joint's own link has to tell apart."""
@@ -40,7 +42,9 @@ def _of_followers(scaled: Scaled) -> Reduction:
         own = reduced(_flat(_seen(scaled, tree.pivots)))
         if own.is_clear:
             return Reduction(tree.pivots[own.pivots], times(own.echelon, tree.echelon), True)
-    rows = echelon_rows(_flat(_to_own_torque(_seen(extended(scaled), tree.pivots))))
+    rows = _seen(extended(scaled), tree.pivots)
+    largest = np.abs(rows).max(axis=(1, 2), keepdims=True, initial=0.0)
+    rows = echelon_rows(_flat(np.asarray(rows / np.where(largest > 0.0, largest, 1.0))))
     own = reduced_to_digits(rows, np.zeros(rows.shape[1], dtype=np.int64))
     return Reduction(tree.pivots[own.pivots], times(own.echelon, tree.echelon), False)
 
@@ -53,12 +57,67 @@ def _seen(scaled: Scaled, columns: NDArray[np.int64]) -> Long:
     return np.asarray(span[:, columns].reshape(count, nv, -1).swapaxes(0, 1))
 
 
-def _to_own_torque(rows: Long) -> Long:
-    """(nv, STATES, k) with each coordinate's largest entry one."""
-    largest = np.abs(rows).max(axis=(1, 2), keepdims=True, initial=0.0)
-    return np.asarray(rows / np.where(largest > 0.0, largest, 1.0))
-
-
 def _flat(rows: Long) -> Long:
     """All coordinates' rows at one state after those at the one before."""
     return np.ascontiguousarray(rows.swapaxes(0, 1)).reshape(-1, rows.shape[-1])
+
+
+Array = NDArray[np.float64]
+
+# The free tree: the echelon form of the regressor at sampled states, or link by link for long chains.
+SEED = 20_210_156
+"""Seed of the sampled states. Any seed gives the same pivots; a fixed one gives the same bytes."""
+
+STATES_PER_JOINT = 24
+"""Sampled states for each joint, n rows each. Eleven are enough for the rank, more improve its condition."""
+
+
+SAMPLED_JOINTS = 10
+"""Longest chain that is sampled as a whole; its rows grow as n^3."""
+
+
+def reduction_of(scaled: Scaled) -> Reduction:
+    """The base parameters. They are found from sampled rows of doubles where joints have one coordinate each, rows are few
+    and of one scale, angles and
+    lengths are not so small that their squares are rounding, and no column is nearly dependent; else link by link in
+    extended precision."""
+    if (
+        is_plain(scaled)
+        and len(scaled.types) <= SAMPLED_JOINTS
+        and all(joint.about_z for joint in scaled.types)
+    ):
+        reduction = sampled_reduction(scaled)
+        if reduction.is_clear:
+            return reduction
+    return reduction_link_by_link(scaled)
+
+
+def is_plain(scaled: Scaled) -> bool:
+    """Whether the robot is of one scale and has no angle or length whose square is rounding."""
+    return not is_of_many_scales(scaled) and not has_small_entries(scaled)
+
+
+def sampled_reduction(scaled: Scaled) -> Reduction:
+    """Find the base parameters of the expanded path from samples, within the span's columns."""
+    n = len(scaled.types)
+    rows = sampled_regressor(scaled, STATES_PER_JOINT * n).reshape(-1, PARAMETERS_PER_LINK * n)
+    return reduced((sparse.csr_array(scaled.span.T) @ rows.T).T)
+
+
+def sampled_regressor(scaled: Scaled, count: int) -> Array:
+    """(count, nv, 11 n) regressor at random states, in the robot's unit and the precision of its vertical; gravity of
+    strength one."""
+    n, nv = len(scaled.types), first_rates(scaled.frames)[-1]
+    rng, real = np.random.default_rng(SEED), np.asarray(scaled.up).dtype
+    drawn, qd, qdd = (
+        list(rng.uniform(-np.pi, np.pi, (size, count)).astype(real))
+        for size in (len(neutral(scaled.frames)), nv, nv)
+    )
+    q = list(normalized(scaled.frames, np.array(drawn)))
+    wanted = frozenset(range(PARAMETERS_PER_LINK * n))
+    rows = regressor(scaled.frames, scaled.link_frames, wanted, q, qd, qdd, scaled.up)
+    values = np.zeros((count, nv, PARAMETERS_PER_LINK * n), real)
+    for i, row in enumerate(rows):
+        for column, entry in row.items():
+            values[:, i, column] = entry
+    return values

@@ -22,7 +22,7 @@ from psdmc.derivation.reduce import Reduction, reduced, row_space
 from psdmc.derivation.terms import Terms, joined, restricted
 from psdmc.errors import InputError
 from psdmc.model.expansion import RowBlocks
-from psdmc.robot.joints import JOINT_TYPES, JointType
+from psdmc.robot.joints import JOINT_TYPES
 from psdmc.robot.limits import shown
 
 Array = NDArray[np.float64]
@@ -85,7 +85,10 @@ def derive_from_callable(
     Raises InputError where f returns something else or is no such function, DerivationError where the grids exceed the
     memory.
     """
-    types = _types(kinds)
+    unknown = [kind for kind in kinds if kind not in JOINT_TYPES]
+    if unknown:
+        raise InputError(f"joint type {shown(unknown[0])} is not known", f"one of {', '.join(JOINT_TYPES)}")
+    types = tuple(JOINT_TYPES[kind] for kind in kinds)
     monomials = Monomials(types)
     names = tuple(parameter_names)
     cells = int(np.prod(quadratic_sizes(types), dtype=np.int64))
@@ -99,13 +102,6 @@ def derive_from_callable(
     pivots = restricted(terms, reduction.pivots)
     E, P = assembled(pivots, monomials, np.ones(len(reduction.pivots)), 1.0)
     return _certified(E, P, reduction, names, sample)
-
-
-def _types(kinds: Sequence[str]) -> tuple[JointType, ...]:
-    unknown = [kind for kind in kinds if kind not in JOINT_TYPES]
-    if unknown:
-        raise InputError(f"joint type {shown(unknown[0])} is not known", f"one of {', '.join(JOINT_TYPES)}")
-    return tuple(JOINT_TYPES[kind] for kind in kinds)
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,8 +27,9 @@ from psdmc.derivation.terms import Terms, joined
 from psdmc.dynamics.frames import BASE, Frame, joint_angle, joint_offset
 from psdmc.dynamics.kinematics import path_to
 from psdmc.dynamics.motion import JointState
-from psdmc.dynamics.regressor import Placed, Twist, carried, own_twist, twist_in
+from psdmc.dynamics.regressor import Placed, Twist, carried, twist_in
 from psdmc.dynamics.scalar import Scalar, Vector, cross, dot
+from psdmc.dynamics.twist import axis_twist
 from psdmc.robot.joints import JointType
 from psdmc.robot.joints.basis import Basis
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
@@ -72,13 +73,11 @@ def formal_coordinate(basis: Basis) -> Scalar:
 
 def coefficients(at_points: Scalar, count: int, basis: Basis) -> Array:
     """Coefficients of degree one from values at the formal points, the new joint's axis last: (count * linear,)."""
-    values = np.broadcast_to(_at_least_double(at_points), (count, basis.linear))
+    found = np.asarray(at_points)
+    values = np.broadcast_to(
+        np.asarray(found, dtype=np.result_type(found, np.float64)), (count, basis.linear)
+    )
     return np.concatenate([values[:, :1], values[:, 1:] - values[:, :1]], axis=1).reshape(-1)
-
-
-def _at_least_double(values: Scalar) -> Array:
-    found = np.asarray(values)
-    return np.asarray(found, dtype=np.result_type(found, np.float64))
 
 
 def column(v: Vector) -> Vector:
@@ -100,12 +99,6 @@ def carried_twist(joint: Moving, twist: Twist) -> Twist:
     return expanded(moved[0], count, joint.basis), expanded(moved[1], count, joint.basis)
 
 
-def constant_twist(frame: Frame) -> Twist:
-    """The twist of a frame's own joint, as coefficients of the factor 1 alone."""
-    linear, angular = own_twist(frame)
-    return _as_arrays(linear), _as_arrays(angular)
-
-
 def _as_arrays(v: Vector) -> Vector:
     return (np.array([v[0]]), np.array([v[1]]), np.array([v[2]]))
 
@@ -125,18 +118,16 @@ def mass_matrix_terms(
     for k, frame in enumerate(frames):
         joint = moving(frame)
         before = [] if frame.parent == BASE else twists[frame.parent]
-        twists.append([carried_twist(joint, twist) for twist in before] + [constant_twist(frame)])
+        linear, angular = axis_twist(frame.joint)
+        twists.append(
+            [carried_twist(joint, twist) for twist in before] + [(_as_arrays(linear), _as_arrays(angular))]
+        )
         seen = [np.stack([*v, *w]) for v, w in (twist_in(link_frames[k], twist) for twist in twists[k])]
         for i, j, found in _link_terms(seen, paths[k], monomials, tolerance):
             parts[i, j].append(found)
-        parts[k, k].append(_drive_term(k))
+        parameter = PARAMETERS_PER_LINK * k + DRIVE
+        parts[k, k].append(Terms(np.array([k]), np.array([0]), np.array([parameter]), np.array([1.0])))
     return {pair: joined(found) for pair, found in parts.items()}
-
-
-def _drive_term(k: int) -> Terms:
-    """The drive inertia of joint k, which adds to M_kk alone."""
-    parameter = PARAMETERS_PER_LINK * k + DRIVE
-    return Terms(np.array([k]), np.array([0]), np.array([parameter]), np.array([1.0]))
 
 
 def _link_terms(

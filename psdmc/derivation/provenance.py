@@ -5,8 +5,16 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
-from psdmc.derivation.snap_effect import snap_effect
+import numpy as np
+from numpy.typing import NDArray
+
+from psdmc.dynamics.frames import base_acceleration, frames_of
+from psdmc.dynamics.newton_euler import inverse_dynamics
+from psdmc.dynamics.parameters import bodies_of, drive_inertia_of
+from psdmc.dynamics.slices import first_rates, neutral, normalized
+from psdmc.model.random_states import RANGES
 from psdmc.robot.load import LoadedRobot
+from psdmc.robot.mechanism import Mechanism
 
 
 def provenance(loaded: LoadedRobot) -> dict[str, Any]:
@@ -21,3 +29,37 @@ def provenance(loaded: LoadedRobot) -> dict[str, Any]:
         "snapped": [{"where": snap.where, "angle_rad": snap.angle} for snap in loaded.snap_report],
         "snap_torque_change": None if effect is None else effect.tolist(),
     }
+
+
+Array = NDArray[np.float64]
+
+SEED = 31_416
+SAMPLES = 256
+
+
+def snap_effect(snapped: Mechanism, unsnapped: Mechanism) -> Array | None:
+    """(nv,) largest torque change per rate over random states, N m (N); None where parameters are unknown."""
+    if np.isnan(snapped.parameters).any() or np.isnan(unsnapped.parameters).any():
+        return None
+    return np.asarray(np.max(np.abs(_torques(snapped) - _torques(unsnapped)), axis=1))
+
+
+def _torques(chain: Mechanism) -> Array:
+    """(nv, SAMPLES)"""
+    rng = np.random.default_rng(SEED)
+    frames = frames_of(chain)
+    rates = first_rates(frames)[-1]
+    sizes = (len(neutral(frames)), rates, rates)
+    q, qd, qdd = (
+        limit * rng.uniform(-1.0, 1.0, (size, SAMPLES)) for limit, size in zip(RANGES, sizes, strict=True)
+    )
+    torques = inverse_dynamics(
+        frames,
+        bodies_of(chain, chain.parameters),
+        drive_inertia_of(chain.parameters),
+        list(normalized(frames, q)),
+        list(qd),
+        list(qdd),
+        base_acceleration(chain),
+    )
+    return np.stack([np.broadcast_to(torque, (SAMPLES,)) for torque in torques])

@@ -96,14 +96,12 @@ def reduced(rows: Array) -> Reduction:
     work[:, small] = 0.0
     pivots, taken, left = graded_pivots(work, norms, halving_shares(PIVOT_TOLERANCE))
     is_clear = taken >= CLEAR and max(left, dropped) <= NOISE
-    return _back_substituted(work[: len(pivots)], np.array(pivots, dtype=np.int64), is_clear)
-
-
-def _back_substituted(rows: Array, pivots: NDArray[np.int64], is_clear: bool) -> Reduction:
-    echelon = triangle_solved(rows[:, pivots], rows)
+    # Back substitution.
+    found, kept = np.array(pivots, dtype=np.int64), work[: len(pivots)]
+    echelon = triangle_solved(kept[:, found], kept)
     largest = np.abs(echelon).max(axis=1, keepdims=True, initial=0.0)
     echelon[np.abs(echelon) < ECHELON_TOLERANCE * largest] = 0.0
-    echelon[:, pivots] = np.eye(len(pivots))
-    order = np.argsort(pivots)
+    echelon[:, found] = np.eye(len(found))
+    order = np.argsort(found)
     is_fair = bool(np.abs(echelon).max(initial=0.0) <= FAIR_ENTRY)
-    return Reduction(pivots[order], echelon[order], is_clear and is_fair)
+    return Reduction(found[order], echelon[order], is_clear and is_fair)

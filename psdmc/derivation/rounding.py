@@ -33,18 +33,14 @@ def merged(values: Array, noise: Array) -> Array:
     counts = np.diff(np.append(starts, len(size)))
     middle = np.add.reduceat(size, starts) / counts
     least = np.minimum.reduceat(reach, starts)
-    shared = _simplest(middle, least)
+    # Each number to DIGITS decimal digits where that moves it by no more than its noise.
+    exponent = DIGITS - 1 - np.floor(np.log10(np.where(middle > 0, middle, 1.0)))
+    # An integer below 2^53 divided by a power of ten up to 10^22 is the double nearest to that decimal.
+    power = 10.0 ** np.clip(exponent, 0, 22)
+    decimal = np.round(middle * power) / power
+    shared = np.where(np.abs(decimal - middle) <= np.minimum(least, SIMPLE * middle), decimal, middle)
     candidate = np.repeat(shared, counts)
     accepted = np.where(np.abs(candidate - size) <= reach, candidate, size)
     result = np.empty_like(values)
     result[order] = accepted
     return np.copysign(result, values)
-
-
-def _simplest(sizes: Array, noise: Array) -> Array:
-    """Each number to DIGITS decimal digits where that moves it by no more than its noise."""
-    exponent = DIGITS - 1 - np.floor(np.log10(np.where(sizes > 0, sizes, 1.0)))
-    # An integer below 2^53 divided by a power of ten up to 10^22 is the double nearest to that decimal.
-    power = 10.0 ** np.clip(exponent, 0, 22)
-    decimal = np.round(sizes * power) / power
-    return np.where(np.abs(decimal - sizes) <= np.minimum(noise, SIMPLE * sizes), decimal, sizes)

@@ -28,16 +28,11 @@ class Terms(NamedTuple):
     value: Array
 
 
-def no_terms() -> Terms:
-    """An empty list of terms."""
-    none = np.zeros(0, dtype=np.int64)
-    return Terms(none, none, none, np.zeros(0))
-
-
 def joined(parts: Sequence[Terms]) -> Terms:
     """All terms one after the other."""
     if not parts:
-        return no_terms()
+        none = np.zeros(0, dtype=np.int64)
+        return Terms(none, none, none, np.zeros(0))
     return Terms(
         np.concatenate([part.row for part in parts]),
         np.concatenate([part.monomial for part in parts]),

@@ -43,13 +43,17 @@ def mass_matrix(
     offsets = [joint_offset(frame, value) for frame, value in zip(frames, own, strict=True)]
     composites = list(bodies)
     for i in reversed(range(n)):
+        # M_ji = s_j^T I_i s_i, I_i the composite of all bodies beyond joint i, for the joints j from i to the base.
         for k, twist in enumerate(frames[i].joint.twists):
             _fill_row(rows, first, first[i] + k, i, momentum(composites[i], twist), frames, turns, offsets)
         if frames[i].joint.about_z:
             rows[first[i]][first[i]] = rows[first[i]][first[i]] + drive_inertia[i]
         parent = frames[i].parent
         if parent != BASE:
-            double = _double(frames[i], own[i]) if choices.fold_double_angle else None
+            double = None
+            if choices.fold_double_angle and frames[i].joint.about_z:
+                angle = joint_angle(frames[i], own[i])
+                double = (angle + angle).turn()
             before = turned(composites[i], turns[i], double)
             moved = shifted(in_previous(frames[i], before), offsets[i])
             composites[parent] = joined(composites[parent], handed_body(frames[i], moved))
@@ -78,11 +82,3 @@ def _fill_row(
         moment = to_previous(frames[j], inward(turns[j], moment))
         moment = add(moment, cross(offsets[j], force))
         j = frames[j].parent
-
-
-def _double(frame: Frame, q: Scalar) -> Turn | None:
-    """The turn by twice the joint's angle about z; None where it has none."""
-    if not frame.joint.about_z:
-        return None
-    angle = joint_angle(frame, q)
-    return (angle + angle).turn()

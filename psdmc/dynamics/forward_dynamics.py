@@ -11,27 +11,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from psdmc.dynamics.articulated import (
-    Articulated,
-    along_parent,
-    before_turn,
-    both,
-    from_rows,
-    handed,
-    moved_to,
-    rigid,
-    rows_of,
-)
 from psdmc.dynamics.body import Body
 from psdmc.dynamics.choices import PLAIN, Choices
 from psdmc.dynamics.following import any_follows
-from psdmc.dynamics.frames import BASE, Frame, from_previous, outward
+from psdmc.dynamics.frames import (
+    BASE,
+    Frame,
+    Rotation,
+    Turn,
+    from_previous,
+    handed_on,
+    handed_vector,
+    outward,
+)
 from psdmc.dynamics.motion import Forward, sweep_outward
 from psdmc.dynamics.newton_euler import NO_WRENCHES, Wrench, seen_bodies, sweep_inward
-from psdmc.dynamics.scalar import ZERO, Scalar, Vector, add, cross
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, multiply, transpose
 from psdmc.dynamics.slices import first_rates, flat, rates
-from psdmc.dynamics.solve import Factors, SingularMassMatrix, factorize, solve
+from psdmc.dynamics.solve import Factors, SingularMassMatrix, factorize, inner_product, solve
 from psdmc.dynamics.twist import combined, efforts, own_rates
 
 Accelerations = tuple[list[Scalar], tuple[Scalar, ...]]
@@ -103,18 +102,31 @@ class _Inward:
             whole = both(whole, self.beyond[i])
         given = own_rates(frame.joint, self.torques[i])
         left = [tau - own for tau, own in zip(given, needed, strict=True)]
+        # With I the articulated inertia and S the joint's axes: the columns U = I S, factors of D = S^T U, and D^-1 left.
         rows = rows_of(whole)
         columns = [_combined(rows, twist) for twist in frame.joint.twists]
         factors = self._factors(i, columns)
-        along = _along(frame) if _is_nothing(self.drives[i]) else None
+        drive = self.drives[i]
+        along = _along(frame) if isinstance(drive, float) and drive == 0.0 else None
         own = solve(factors, left)
         if frame.parent == BASE:
             self.found[i] = _Held(own, [], factors.pivots, along)
             return ZERO, ZERO
-        loads = _transposed([solve(factors, [column[k] for column in columns]) for k in range(6)])
+        solved = [solve(factors, [column[k] for column in columns]) for k in range(6)]
+        loads = [list(row) for row in zip(*solved, strict=True)]
         self.found[i] = _Held(own, loads, factors.pivots, along)
-        self._hand_on(i, from_rows(_relieved(rows, columns, loads, along)))
-        total = [_dot(own, [column[k] for column in columns]) for k in range(6)]
+        # Seen through the joint: I - U D^-1 U^T, its upper triangle; exactly nothing is left along the joint.
+        relieved = [
+            [
+                0.0
+                if b < a or along in (a, b)
+                else rows[a][b] - inner_product([c[a] for c in columns], [load[b] for load in loads])
+                for b in range(6)
+            ]
+            for a in range(6)
+        ]
+        self._hand_on(i, from_rows(relieved))
+        total = [inner_product(own, [column[k] for column in columns]) for k in range(6)]
         return (total[0], total[1], total[2]), (total[3], total[4], total[5])
 
     def _factors(self, i: int, columns: Sequence[Sequence[Scalar]]) -> Factors:
@@ -161,10 +173,10 @@ def _accelerated(
     """A joint's accelerations, and those of its frame besides; `before`: without the joint's."""
     if joint.along is not None:
         others = [k for k in range(6) if k != joint.along]
-        whole = joint.own[0] - _dot([joint.loads[0][k] for k in others], [before[k] for k in others])
+        whole = joint.own[0] - inner_product([joint.loads[0][k] for k in others], [before[k] for k in others])
         values = [whole if k == joint.along else x for k, x in enumerate(before)]
         return [whole - before[joint.along]], _halves(values)
-    own = [a - _dot(load, before) for a, load in zip(joint.own, joint.loads, strict=True)]
+    own = [a - inner_product(load, before) for a, load in zip(joint.own, joint.loads, strict=True)]
     linear, angular = combined(frame.joint, own)
     moved, turned = _halves(before)
     return own, (add(moved, linear), add(turned, angular))
@@ -177,24 +189,6 @@ def _along(frame: Frame) -> int | None:
     ((linear, angular),) = frame.joint.twists
     weights = (*linear, *angular)
     return weights.index(1.0) if sorted(weights) == [0.0] * 5 + [1.0] else None
-
-
-def _relieved(
-    rows: Sequence[Sequence[Scalar]],
-    columns: Sequence[Sequence[Scalar]],
-    loads: Sequence[Sequence[Scalar]],
-    along: int | None,
-) -> list[list[Scalar]]:
-    """The inertia seen through a joint that moves freely, its upper triangle; exactly nothing is left along the joint."""
-    return [
-        [
-            0.0
-            if b < a or along in (a, b)
-            else rows[a][b] - _dot([c[a] for c in columns], [load[b] for load in loads])
-            for b in range(6)
-        ]
-        for a in range(6)
-    ]
 
 
 def _combined(
@@ -211,20 +205,141 @@ def _combined(
     return found
 
 
-def _transposed(rows: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    return [list(column) for column in zip(*rows, strict=True)]
-
-
 def _halves(values: Sequence[Scalar]) -> tuple[Vector, Vector]:
     return (values[0], values[1], values[2]), (values[3], values[4], values[5])
 
 
-def _dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    total: Scalar = 0.0
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
+# Articulated inertias: the wrench per acceleration of a body whose further joints move freely, as symmetric 6 x 6 matrices
+# in blocks.
+Six = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+"""A symmetric matrix: xx, yy, zz, xy, xz, yz; or a force and a moment, a linear and an angular acceleration."""
+
+_PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
-def _is_nothing(value: Scalar) -> bool:
-    return isinstance(value, float) and value == 0.0
+class Articulated(NamedTuple):
+    """Articulated inertia of a frame: force = linear a + mixed alpha, moment = mixed^T a + angular alpha.
+
+    linear   kg, symmetric
+    mixed    kg m
+    angular  kg m^2, symmetric
+    """
+
+    linear: Six
+    mixed: Matrix
+    angular: Six
+
+
+NOTHING = Articulated((0.0,) * 6, (ZERO, ZERO, ZERO), (0.0,) * 6)
+
+
+def rigid(body: Body) -> Articulated:
+    """A body with no joint beyond it."""
+    m, (x, y, z), (xx, yy, zz, xy, xz, yz) = body
+    return Articulated(
+        (m, m, m, 0.0, 0.0, 0.0),
+        ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)),
+        (yy + zz, xx + zz, xx + yy, -xy, -xz, -yz),
+    )
+
+
+def both(a: Articulated, b: Articulated) -> Articulated:
+    """Two about one frame as one."""
+    mixed = tuple(add(x, y) for x, y in zip(a.mixed, b.mixed, strict=True))
+    return Articulated(_sum(a.linear, b.linear), mixed, _sum(a.angular, b.angular))  # type: ignore[arg-type]
+
+
+def moved_to(inertia: Articulated, offset: Vector) -> Articulated:
+    """About a point from which the present one lies at `offset` p: with G = mixed - linear [p], angular gets
+    [p] G + ([p] mixed)^T."""
+    x, y, z = offset
+    skew: Matrix = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+    pushed = multiply(full(inertia.linear), skew)
+    mixed: Matrix = tuple(  # type: ignore[assignment]
+        tuple(a - b for a, b in zip(row, other, strict=True))
+        for row, other in zip(inertia.mixed, pushed, strict=True)
+    )
+    near, far = multiply(skew, mixed), multiply(skew, inertia.mixed)
+    angular = tuple(
+        own + (near[i][j] + far[j][i]) for own, (i, j) in zip(inertia.angular, _PLACES, strict=True)
+    )
+    return Articulated(inertia.linear, mixed, angular)
+
+
+def handed(frame: Frame, inertia: Articulated) -> Articulated:
+    """Return what a frame passes to its parent, about the parent's frame: the sum over all limbs that the frame
+    represents."""
+    rows = tuple(handed_vector(frame, row) for row in inertia.mixed)
+    linear, angular = (tuple(handed_on(frame, part)) for part in (inertia.linear, inertia.angular))
+    return Articulated(linear, rows, angular)  # type: ignore[arg-type]
+
+
+def along_parent(frame: Frame, inertia: Articulated) -> Articulated:
+    """Rotate from the axes before a joint's motion to the axes of the frame that carries the joint."""
+    return inertia if frame.is_parallel else rotated(inertia, frame.rotation)
+
+
+def before_turn(inertia: Articulated, turn: Turn | Rotation | None) -> Articulated:
+    """Seen from before a joint's turn."""
+    if turn is None:
+        return inertia
+    if isinstance(turn, Rotation):
+        return rotated(inertia, turn.rows)
+    linear = _turned(inertia.linear, turn)
+    # The cross block is not symmetric.
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = inertia.mixed
+    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
+    moved, crossed = turn.sine * slope, turn.cosine * slope
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    zx, zy, _ = turn.inward((zx, zy, 0.0))
+    mixed = ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
+    return Articulated(linear, mixed, _turned(inertia.angular, turn))
+
+
+def rotated(inertia: Articulated, rows: Matrix) -> Articulated:
+    """Along other axes, of which the rows give the present ones."""
+    back = transpose(rows)
+    linear, mixed, angular = (
+        multiply(multiply(rows, part), back)
+        for part in (full(inertia.linear), inertia.mixed, full(inertia.angular))
+    )
+    return Articulated(_half(linear), mixed, _half(angular))
+
+
+def full(six: Six) -> Matrix:
+    """The symmetric matrix."""
+    xx, yy, zz, xy, xz, yz = six
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def rows_of(inertia: Articulated) -> list[list[Scalar]]:
+    """6 x 6, linear parts first."""
+    upper = [[*a, *b] for a, b in zip(full(inertia.linear), inertia.mixed, strict=True)]
+    lower = [[*a, *b] for a, b in zip(transpose(inertia.mixed), full(inertia.angular), strict=True)]
+    return upper + lower
+
+
+def from_rows(rows: Sequence[Sequence[Scalar]]) -> Articulated:
+    """Build from a 6 x 6 matrix; of its symmetric blocks only the upper triangles are read."""
+    linear = tuple(rows[i][j] for i, j in _PLACES)
+    mixed = tuple((row[3], row[4], row[5]) for row in rows[:3])
+    angular = tuple(rows[i + 3][j + 3] for i, j in _PLACES)
+    return Articulated(linear, mixed, angular)  # type: ignore[arg-type]
+
+
+def _sum(a: Six, b: Six) -> Six:
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+def _half(rows: Matrix) -> Six:
+    return tuple(rows[i][j] for i, j in _PLACES)
+
+
+def _turned(six: Six, turn: Turn) -> Six:
+    """Symmetric, before a turn about z, products nested: with t = s (xx - yy) + 2 c xy, xx loses s t and xy becomes
+    c t - xy."""
+    xx, yy, zz, xy, xz, yz = six
+    slope = turn.sine * (xx - yy) + turn.cosine * (xy + xy)
+    moved = turn.sine * slope
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    return (xx - moved, yy + moved, zz, turn.cosine * slope - xy, xz, yz)

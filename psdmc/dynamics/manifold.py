@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from psdmc.dynamics.frames import Frame
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.slices import leading
+from psdmc.dynamics.solve import inner_product
 from psdmc.robot.joints import JointType
 
 
@@ -53,10 +54,7 @@ def pulled_back(frames: Sequence[Frame], q: Sequence[Scalar], gradient: Sequence
     for joint, here, own in _coordinates(frames, q, gradient):
         for k in range(joint.nv):
             moved = joint.coordinate_rates(here, [1.0 if i == k else 0.0 for i in range(joint.nv)])
-            total: Scalar = 0.0
-            for rate, slope in zip(moved, own, strict=True):
-                total = total + rate * slope
-            found.append(total)
+            found.append(inner_product(moved, own))
     return found
 
 

@@ -93,7 +93,14 @@ def before_turn(composite: Composite, turn: Turn | Rotation | None) -> Composite
     if isinstance(turn, Rotation):
         return _rotated(composite, turn)
     force, moment = (turn.inward(v) for v in composite.wrench)
-    return Composite(spun(composite.body, turn), _turned(composite.momenta, turn), (force, moment))
+    body = spun(composite.body, turn)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = composite.momenta.second
+    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
+    moved, crossed = turn.sine * slope, turn.cosine * slope
+    xz, yz, _ = turn.inward((xz, yz, 0.0))
+    zx, zy, _ = turn.inward((zx, zy, 0.0))
+    second = ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
+    return Composite(body, Momenta(second, turn.inward(composite.momenta.first)), (force, moment))
 
 
 def _rotated(composite: Composite, turn: Rotation) -> Composite:
@@ -101,16 +108,6 @@ def _rotated(composite: Composite, turn: Rotation) -> Composite:
     second = multiply(multiply(turn.rows, second), transpose(turn.rows))
     force, moment = (turn.inward(v) for v in composite.wrench)
     return Composite(turned(composite.body, turn), Momenta(second, turn.inward(first)), (force, moment))
-
-
-def _turned(momenta: Momenta, turn: Turn) -> Momenta:
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = momenta.second
-    slope = turn.sine * (xx - yy) + turn.cosine * (xy + yx)
-    moved, crossed = turn.sine * slope, turn.cosine * slope
-    xz, yz, _ = turn.inward((xz, yz, 0.0))
-    zx, zy, _ = turn.inward((zx, zy, 0.0))
-    second = ((xx - moved, crossed - yx, xz), (crossed - xy, yy + moved, yz), (zx, zy, zz))
-    return Momenta(second, turn.inward(momenta.first))
 
 
 def driven(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:

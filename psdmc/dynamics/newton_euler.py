@@ -109,17 +109,23 @@ def sweep_inward(
     forces, moments, gathered = [ZERO] * n, [ZERO] * n, [ZERO] * n
     for i in reversed(range(n)):
         frame, state, parent = frames[i], forward.states[i], frames[i].parent
+        # The wrench f that the body's motion requires, with those of the bodies beyond it.
         own_force, own_moment = wrench(forward.motions[i], bodies[i])
         if i in external:
             turn = state.turn if forward.folded[i] else None
             own_force, own_moment = _relieved(own_force, own_moment, external[i], turn)
         force, moment = add(forces[i], own_force), add(moments[i], own_moment)
-        torques[i] = _driven(efforts(frame.joint, force, moment), frame, drive_inertia[i], changes[i])
+        # Each rate takes the component along its axis s: tau = s^T f.
+        own = efforts(frame.joint, force, moment)
+        if frame.joint.about_z:  # joints of several rates have no drive
+            own = (own[0] + drive_inertia[i] * changes[i],)
+        torques[i] = own
         if yielded is not None:
             further_force, further_moment = yielded(i, torques[i])
             force, moment = add(force, further_force), add(moment, further_moment)
         if parent == BASE:
             continue
+        # All of f goes on to the parent, turned back and about the parent's origin.
         own_turn = None if forward.folded[i] else state.turn
         force = to_previous(frame, inward(own_turn, force))
         if forward.joins[i]:
@@ -135,10 +141,3 @@ def sweep_inward(
         force = handed_vector(frame, force)
         forces[parent], moments[parent] = add(forces[parent], force), add(moments[parent], carried)
     return tuple(flat(torques))
-
-
-def _driven(
-    efforts: tuple[Scalar, ...], frame: Frame, drive_inertia: Scalar, qdd: Scalar
-) -> tuple[Scalar, ...]:
-    """A joint's efforts with the torque of its own drive inertia, drive_inertia qdd; joints of several rates have none."""
-    return (efforts[0] + drive_inertia * qdd,) if frame.joint.about_z else efforts

@@ -55,7 +55,7 @@ def composite_along(composite: Composite, number: int) -> Composite:
 
 def bending(own: Vectors, number: int, turns: bool) -> Vectors:
     """V x E, linear and angular: how the joint's own motion V bends the unit twist E."""
-    (u, s), e = own, _unit(number)
+    (u, s), e = own, (float(number == 0), float(number == 1), float(number == 2))
     return (cross(u, e), cross(s, e)) if turns else (cross(s, e), ZERO)
 
 
@@ -83,7 +83,3 @@ def by_own_axes(
     bent = add(scale(axis.w, 2.0), s)
     by_qd = efforts(joint, cross(c, bent), add(add(cross(a, bent), b), cross(c, u)))
     return by_q, by_qd, efforts(joint, c, a)
-
-
-def _unit(number: int) -> Vector:
-    return (float(number == 0), float(number == 1), float(number == 2))

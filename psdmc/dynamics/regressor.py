@@ -15,10 +15,9 @@ from psdmc.dynamics.choices import PLAIN
 from psdmc.dynamics.following import on_coordinates, sparse_rows_summed
 from psdmc.dynamics.frames import BASE, Frame, from_previous, outward
 from psdmc.dynamics.motion import JointState, LinkMotion, sweep_outward
-from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, transform, transpose
+from psdmc.dynamics.scalar import ZERO, Matrix, Scalar, Vector, add, cross, dot, transform, transpose
 from psdmc.dynamics.slices import first_rates, rates
 from psdmc.dynamics.spin import Rates, spin_of
-from psdmc.dynamics.twist import axis_twist
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK
 
 Twist = tuple[Vector, Vector]
@@ -67,35 +66,11 @@ def regressor(
             if column in wanted:
                 force, moment = unit_wrench(name, motion)
                 for i, (linear, angular) in seen.items():
-                    _put(rows[i], column, linear, force, angular, moment)
-        if PARAMETERS_PER_LINK * k + DRIVE in wanted:
-            _put_drive(rows, first[k], frame, PARAMETERS_PER_LINK * k + DRIVE, changes[k])
+                    rows[i][column] = dot(linear, force) + dot(angular, moment)
+        drive = PARAMETERS_PER_LINK * k + DRIVE
+        if drive in wanted and frame.joint.about_z:  # joints of several rates have no drive
+            rows[first[k]][drive] = changes[k]
     return rows
-
-
-def _put_drive(
-    rows: Sequence[dict[int, Scalar]], row: int, frame: Frame, column: int, change: Scalar
-) -> None:
-    """Joints of several rates have no drive."""
-    if frame.joint.about_z:
-        rows[row][column] = change
-
-
-def _put(
-    row: dict[int, Scalar], column: int, linear: Vector, force: Vector, angular: Vector, moment: Vector
-) -> None:
-    value = (
-        linear[0] * force[0]
-        + linear[1] * force[1]
-        + linear[2] * force[2]
-        + (angular[0] * moment[0] + angular[1] * moment[1] + angular[2] * moment[2])
-    )
-    row[column] = value
-
-
-def own_twist(frame: Frame) -> Twist:
-    """The twist that the unit rate of a joint of one rate gives its own frame."""
-    return axis_twist(frame.joint)
 
 
 def carried(frame: Frame, state: JointState, twist: Twist) -> Twist:

@@ -62,13 +62,12 @@ def momentum(body: Body, twist: Twist) -> tuple[Vector, Vector]:
     for weight, part in zip((*twist[0], *twist[1]), range(6), strict=True):
         if weight == 0.0:
             continue
-        force, moment = (_scaled(v, weight) for v in _unit_momentum(body, part))
+        force, moment = (
+            v if weight == 1.0 else (v[0] * weight, v[1] * weight, v[2] * weight)
+            for v in _unit_momentum(body, part)
+        )
         found = (force, moment) if found is None else (add(found[0], force), add(found[1], moment))
     return (ZERO, ZERO) if found is None else found
-
-
-def _scaled(v: Vector, weight: float) -> Vector:
-    return v if weight == 1.0 else (v[0] * weight, v[1] * weight, v[2] * weight)
 
 
 def _unit_momentum(body: Body, part: int) -> tuple[Vector, Vector]:

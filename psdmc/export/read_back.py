@@ -14,8 +14,7 @@ from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array
 from psdmc.robot.mujoco_reading import NotCompared, force_from_mujoco, mujoco_torques, to_mujoco
 from psdmc.robot.mujoco_warnings import kept_warnings
-from psdmc.robot.reference import reference
-from psdmc.robot.reference_followers import OnCoordinates
+from psdmc.robot.reference import OnCoordinates, reference
 
 STATES, SEED = 200, 77_029
 NO_TORQUE = 1e-9

@@ -3,34 +3,21 @@
 from __future__ import annotations
 
 import math
+import sys
 import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 from psdmc.errors import InputError
 from psdmc.robot import limits
-from psdmc.robot.dh_parents import parents_of
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import JOINT_TYPES, REVOLUTE, JointType
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import Range, shown
 from psdmc.robot.mechanism import BASE, Limits
 from psdmc.robot.names import name_faults, naming_faults
-from psdmc.robot.toml_values import (
-    LENGTH,
-    CheckedTable,
-    Triple,
-    angle,
-    any_list,
-    as_it_is,
-    finite,
-    not_negative,
-    one_of,
-    plain_text,
-    range_of,
-    triple_of,
-    within,
-)
+from psdmc.robot.numerals import WHITE_SPACE, decimal
 from psdmc.robot.zeros import ZERO_NAMES
 
 Convention = Literal["standard", "modified"]
@@ -85,22 +72,18 @@ class DhRobot:
 def read_dh(text: str, source: str) -> DhRobot:
     """The file's content; InputError names everything that is wrong with it at once."""
     problems: list[str] = []
-    robot = _robot(_parsed(text, source), problems)
+    hint = "give a URDF or a DH .toml file"
+    try:
+        value = tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{source}: not a TOML file: nested too deeply", hint) from None
+    except ValueError as error:  # also of integers of thousands of digits
+        reason = " ".join(str(error).split())
+        raise InputError(f"{source}: not a TOML file: {reason}", hint) from None
+    robot = _robot(value, problems)
     if problems or robot is None:
         raise InputError(f"{source}: {limits.joined(problems)}", "see the DH format in docs/robot_files.md")
     return robot
-
-
-def _parsed(text: str, source: str) -> object:
-    """The parsed TOML; ValueError also for integers of thousands of digits, which the parser raises."""
-    hint = "give a URDF or a DH .toml file"
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InputError(f"{source}: not a TOML file: nested too deeply", hint) from None
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{source}: not a TOML file: {reason}", hint) from None
 
 
 def _robot(value: object, problems: list[str]) -> DhRobot | None:
@@ -161,7 +144,14 @@ def _joint(value: object, number: int, problems: list[str]) -> DhJoint:
 def _limits(value: object, joint: JointType, where: str, problems: list[str]) -> Limits:
     table = CheckedTable(value, where, LIMIT_KEYS, problems)
     convert = partial(angle, accepted=limits.ANY) if joint.position_unit == "rad" else finite
-    lower, upper = table.read("position", range_of(convert), (-math.inf, math.inf))
+
+    def read(value: object) -> tuple[float, float]:
+        values = any_list(value)
+        if len(values) != 2 or convert(values[0]) > convert(values[1]):
+            raise ValueError(f"found {shown(value)}, expected [lower, upper]")
+        return convert(values[0]), convert(values[1])
+
+    lower, upper = table.read("position", read, (-math.inf, math.inf))
     speed, acceleration, effort = (
         table.read(key, not_negative(reader), math.inf)
         for key, reader in (("speed", convert), ("acceleration", convert), ("effort", finite))
@@ -197,3 +187,166 @@ def _zero_names(value: object) -> tuple[str, ...]:
     if unknown:
         raise ValueError(f"unknown {', '.join(map(_plain, unknown))} (known: {', '.join(ZERO_NAMES)})")
     return names
+
+
+# Readers of values: each returns a typed value, or raises ValueError with what was found and expected.
+Triple = tuple[float, float, float]
+
+
+def angle(value: object, accepted: Range = limits.ANGLE) -> float:
+    """An angle in rad, from a number (rad) or a text such as "90 deg" or "1.5 rad"; ValueError on anything else."""
+    if not isinstance(value, str):
+        return within(accepted)(value)
+    plain = value.strip(WHITE_SPACE)
+    number, unit = decimal(plain[:-3].strip(WHITE_SPACE)), plain[-3:]
+    if number is None or unit not in ("deg", "rad"):
+        raise ValueError(f'{shown(value)} is no angle: write radians, or "90 deg"')
+    return within(accepted)(math.radians(number) if unit == "deg" else number)
+
+
+def finite(value: object) -> float:
+    """A finite number within the range of 64 bits; ValueError on anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"found {shown(value)}, expected a finite number")
+    if not abs(value) <= sys.float_info.max:
+        raise ValueError(f"found {shown(value)}, expected a finite number")
+    return float(value)
+
+
+def within(accepted: Range) -> Callable[[object], float]:
+    """A reader of finite numbers whose magnitude is in the range; its ValueError names the range."""
+
+    def convert(value: object) -> float:
+        number = finite(value)
+        fault = accepted.fault(number)
+        if fault:
+            raise ValueError(f"{number:g} {fault}")
+        return number
+
+    return convert
+
+
+class CheckedTable:
+    """One TOML table, read key by key; faults go to `problems`, under the table's name."""
+
+    def __init__(self, value: object, where: str, keys: tuple[str, ...], problems: list[str]) -> None:
+        self.where, self.problems = where, problems
+        self.table: Mapping[str, Any] = value if isinstance(value, dict) else {}
+        if not isinstance(value, dict):
+            problems.append(f"{where}: found {shown(value)}, expected a table")
+        for key in self.table:
+            if key not in keys:
+                problems.append(f"{where}: unknown key {shown(key)} (known: {', '.join(keys)})")
+
+    def read(self, key: str, convert: Callable[[Any], Any], default: Any) -> Any:
+        """The converted value, or `default` where it is missing or wrong."""
+        if key not in self.table:
+            return default
+        try:
+            return convert(self.table[key])
+        except ValueError as error:
+            self.problems.append(f"{self.where}: {key}: {error}")
+            return default
+
+
+LENGTH = within(limits.LENGTH)
+"""A reader of lengths, m."""
+
+
+def as_it_is(value: object) -> object:
+    """The value itself, whatever it is: its parts are read one by one."""
+    return value
+
+
+def plain_text(value: object) -> str:
+    """A text that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"found {shown(value)}, expected a text")
+    return value
+
+
+def any_list(value: object) -> list[object]:
+    """A list of anything."""
+    if not isinstance(value, list):
+        raise ValueError(f"found {shown(value)}, expected a list")
+    return value
+
+
+def triple_of(convert: Callable[[object], float]) -> Callable[[object], Triple]:
+    """A reader of three values that `convert` reads."""
+
+    def read(value: object) -> Triple:
+        values = any_list(value)
+        if len(values) != 3:
+            raise ValueError(f"found {shown(value)}, expected three numbers")
+        x, y, z = (convert(v) for v in values)
+        return (x, y, z)
+
+    return read
+
+
+def not_negative(convert: Callable[[object], float]) -> Callable[[object], float]:
+    """A reader of zero and what is above it."""
+
+    def read(value: object) -> float:
+        number = convert(value)
+        if number < 0.0:
+            raise ValueError(f"found {number:g}, expected no less than zero")
+        return number
+
+    return read
+
+
+def one_of(*words: str) -> Callable[[object], str]:
+    """A reader of one of these words."""
+
+    def read(value: object) -> str:
+        if not isinstance(value, str) or value not in words:
+            raise ValueError(f"found {shown(value)}, expected one of {', '.join(words)}")
+        return str(value)
+
+    return read
+
+
+BASE_NAME = "base"
+"""The name of the base in `parent`, as in messages and frames."""
+
+
+def parents_of(names: Sequence[str], given: Sequence[object]) -> tuple[tuple[int, ...], list[str]]:
+    """Each row's parent, counted from 0, or BASE; and faults, one sentence each.
+
+    names   of the rows' joints
+    given   each row's `parent` as the file has it: the name of a joint, or "base"; None: the row before
+
+    The rows of a branch stand together: a row's parent is the row before it, or one that carries that row.
+    """
+    parents: list[int] = []
+    faults: list[str] = []
+    if BASE_NAME in names and BASE_NAME in given:
+        faults.append(f"a joint is called '{BASE_NAME}', and a parent: rename the joint")
+    for i, parent in enumerate(given):
+        # Open are the base, the row before, and the rows that carry that one, from the base outward.
+        row = i - 1
+        found: list[int] = []
+        while row != BASE:
+            found.append(row)
+            row = parents[row]
+        open_rows = [BASE, *found[::-1]]
+        where = i - 1 if parent is None else _row(names, parent)
+        if where is None:
+            said = f"found {shown(parent)}, expected '{BASE_NAME}' or the name of a joint"
+        elif where not in open_rows:
+            can = ", ".join(shown(BASE_NAME if k == BASE else names[k]) for k in open_rows)
+            said = f"{shown(parent)} is not open here: a branch's joints follow one another; expected one of {can}"
+        else:
+            parents.append(where)
+            continue
+        faults.append(f"joint {shown(names[i])}: parent: {said}")
+        parents.append(i - 1)
+    return tuple(parents), faults
+
+
+def _row(names: Sequence[str], parent: object) -> int | None:
+    if parent == BASE_NAME:
+        return BASE
+    return names.index(parent) if isinstance(parent, str) and parent in names else None

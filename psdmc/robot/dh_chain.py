@@ -14,15 +14,13 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.reproducible import times
-from psdmc.robot.dh import DhJoint, DhLink, DhRobot, read_dh
-from psdmc.robot.dh_parents import BASE_NAME
+from psdmc.robot.dh import BASE_NAME, DhJoint, DhLink, DhRobot, read_dh
 from psdmc.robot.draft import Draft, Snap
 from psdmc.robot.inertia import physical_fault, standard_parameters
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import BASE, Array, Joint, NamedFrame, Placement
-from psdmc.robot.right_angles import coarse_right_angles
 from psdmc.robot.rotation import about
-from psdmc.robot.snap import ROUNDING, snap_rotation
+from psdmc.robot.snap import ROUNDING, coarse_right_angles, snap_rotation
 from psdmc.robot.zeros import COM_NAMES, canonical
 
 

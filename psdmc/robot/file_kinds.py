@@ -38,7 +38,13 @@ def as_source(
     is_xacro = (
         tag != "mujoco" and suffix != ".toml" and (suffix == ".xacro" or MACRO in COMMENT.sub("", text))
     )
-    _refuse_options(file.name, options, tag == "mujoco", is_xacro)
+    if options.root is not None and tag != "mujoco":
+        raise InputError(f"{file.name}: --root names a body of an MJCF", "--base LINK is for URDFs")
+    if options.xacro_args and not is_xacro:
+        raise InputError(
+            f"{file.name}: no xacro file, and {next(iter(options.xacro_args))!r} is given as an argument of one",
+            "leave it out",
+        )
     if (tag == "mujoco" or is_xacro) and not file.is_file():
         raise InputError(
             "cannot read an MJCF or xacro file from a pipe: it is read again with all that it includes",
@@ -58,16 +64,6 @@ def as_source(
 
         return expanded(file, file.name, options.xacro_args, packages), "urdf", options
     return text, "urdf", options
-
-
-def _refuse_options(source: str, options: LoadOptions, is_mjcf: bool, is_xacro: bool) -> None:
-    if options.root is not None and not is_mjcf:
-        raise InputError(f"{source}: --root names a body of an MJCF", "--base LINK is for URDFs")
-    if options.xacro_args and not is_xacro:
-        raise InputError(
-            f"{source}: no xacro file, and {next(iter(options.xacro_args))!r} is given as an argument of one",
-            "leave it out",
-        )
 
 
 def _from_mjcf(file: Path, options: LoadOptions) -> tuple[str, SourceFormat, LoadOptions]:

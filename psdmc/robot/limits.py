@@ -108,6 +108,12 @@ def joined(faults: Sequence[str]) -> str:
     return "; ".join([*faults[:MOST_FAULTS], *more])
 
 
+def listed(names: Iterable[str], most: int = 12) -> str:
+    """Names in quotes for a message, shortened where there are many."""
+    quoted = [f"'{name}'" for name in names]
+    return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
+
+
 def gravity_fault(gravity: Sequence[float]) -> str | None:
     """Describe the fault of a gravity vector (three finite numbers, m/s^2), or return None."""
     faults = [GRAVITY.fault(component) for component in gravity]

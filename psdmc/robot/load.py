@@ -19,10 +19,10 @@ from psdmc.robot.inertia import PRODUCT_NOISE
 from psdmc.robot.load_options import DEFAULT_SNAP, LoadOptions, checked_options
 from psdmc.robot.mechanism import DRIVE, Array, Mechanism, NamedFrame
 from psdmc.robot.missing_inertia import with_massless_warning
-from psdmc.robot.ros_packages import checked_packages
 from psdmc.robot.source_words import with_source_words
-from psdmc.robot.tool import TOOL, tool_frame
+from psdmc.robot.urdf_bodies import TOOL, tool_frame
 from psdmc.robot.urdf_chain import urdf_draft
+from psdmc.robot.xacro_file import checked_packages
 from psdmc.robot.zeros import block_diagonal, link_span, link_values, parse_statements
 
 PACKED = b"PK\x03\x04"
@@ -175,21 +175,8 @@ def robot_text(file: Path) -> str:
 
 
 def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> Draft:
-    gravity = None if options.gravity is None else np.array(options.gravity)
     if source_format == "urdf":
-        draft = urdf_draft(
-            text,
-            source,
-            options.base,
-            options.tip,
-            gravity,
-            options.snap,
-            options.frames,
-            options.lock,
-            options.floating,
-            options.unknown,
-        )
-        return with_source_words(draft, text, source)
+        return with_source_words(urdf_draft(text, source, options), text, source)
     if options.base is not None or options.tip is not None:
         raise InputError(f"{source}: --base and --tip name links of a URDF", "leave them out for a DH table")
     if options.lock:
@@ -203,6 +190,7 @@ def _draft(text: str, source_format: SourceFormat, source: str, options: LoadOpt
         raise InputError(
             f"{source}: --unknown names links of a URDF", "in a DH table leave out what is unknown of a link"
         )
+    gravity = None if options.gravity is None else np.array(options.gravity)
     return dh_draft(text, source, gravity, options.snap, options.frames)
 
 
@@ -220,6 +208,10 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         link_values(np.append(x[:DRIVE], drive or 0.0), zero)
         for x, drive, zero in zip(draft.parameters, given, zeros, strict=True)
     ]
+    # Each turn once, though several joints of a tree may lie beyond it.
+    turned = dict.fromkeys(
+        f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in draft.snaps
+    )
     mechanism = Mechanism(
         name=draft.name,
         convention=draft.convention,
@@ -230,7 +222,7 @@ def _settled(draft: Draft, options: LoadOptions, source: str) -> Mechanism:
         parameter_span=block_diagonal([link_span(zero) for zero in zeros]),
         gravity=draft.gravity,
         tip=draft.tip,
-        notes=(*_snap_notes(draft.snaps), *draft.notes, *_zero_notes(draft, said, values)),
+        notes=(*turned, *draft.notes, *_zero_notes(draft, said, values)),
         frames=_frames(draft, options, source),
         parents=draft.parents,
         tip_body=draft.tip_body,
@@ -271,12 +263,6 @@ def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float
         )
     value_of = dict(zip(driven, given, strict=True))
     return [value_of.get(k) for k in range(len(own))]
-
-
-def _snap_notes(snaps: Sequence[Snap]) -> list[str]:
-    """Each turn once, though several joints of a tree may lie beyond it."""
-    said = [f"{snap.where}: turned by {snap.angle:.2g} rad to exact zeros" for snap in snaps]
-    return list(dict.fromkeys(said))
 
 
 def _zero_notes(draft: Draft, said: Sequence[Sequence[str]], values: Sequence[Array]) -> list[str]:

@@ -9,11 +9,10 @@ import numpy as np
 
 from psdmc.errors import InputError
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.limits import ANGLE, LENGTH, shown
+from psdmc.robot.limits import ANGLE, LENGTH, listed, shown
 from psdmc.robot.mimic import followed
 from psdmc.robot.placement import Placement
 from psdmc.robot.snap import link_rotation, snap_axis
-from psdmc.robot.tree import listed
 from psdmc.robot.urdf import LOCKABLE, UrdfJoint, UrdfRobot
 
 
@@ -50,19 +49,16 @@ def held_positions(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> 
             f"{source}: joint {shown(strange[0])}, to be locked, is of type {shown(known[strange[0]].type)}",
             f"types of joints that can be held: {listed([kind for kind in LOCKABLE if kind != 'fixed'])}",
         )
-    _refuse_far(found, known, source)
-    return found
-
-
-def _refuse_far(held: Mapping[str, float], known: Mapping[str, UrdfJoint], source: str) -> None:
-    """InputError where a position is none that sines are exact for, or no length of a robot."""
-    for name, value in held.items():
-        fault = (LENGTH if _is_moved_by_lengths(known[name]) else ANGLE).fault(value)
+    # A position must be one that sines are exact for, or a length of a robot.
+    for name, value in found.items():
+        kind = URDF_TYPES.get(known[name].type)
+        fault = (LENGTH if kind is not None and kind.length_order > 0 else ANGLE).fault(value)
         if fault:
             raise InputError(
                 f"{source}: joint {shown(name)} is to be locked at {value:g}, which {fault}",
                 "positions are in rad or m",
             )
+    return found
 
 
 def locked(robot: UrdfRobot, lock: Mapping[str, float], source: str) -> UrdfRobot:
@@ -100,10 +96,6 @@ def _moved(joint: UrdfJoint, value: float) -> Placement:
 def _has_position(joint: UrdfJoint) -> bool:
     """Whether one number says where it is."""
     return joint.type in URDF_TYPES and URDF_TYPES[joint.type].about_z
-
-
-def _is_moved_by_lengths(joint: UrdfJoint) -> bool:
-    return joint.type in URDF_TYPES and URDF_TYPES[joint.type].length_order > 0
 
 
 def parsed(texts: Sequence[str]) -> dict[str, float]:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psdmc.errors import InputError
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import listed, shown
 from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, WARNING, Array, Mechanism, Placement
-from psdmc.robot.tree import Route, listed
+from psdmc.robot.tree import Route
 from psdmc.robot.urdf import UrdfRobot
 
 ALL = "all"

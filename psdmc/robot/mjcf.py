@@ -7,26 +7,26 @@ then holds for it, and a model file has a source that can be read again without 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from psdmc.errors import InputError
-from psdmc.robot.limits import shown
+from psdmc.robot.limits import listed, shown
 from psdmc.robot.mjcf_copies import refuse_many_copies
 from psdmc.robot.mjcf_faults import (
     followers,
+    of_balls,
     refuse_armatures,
     refuse_constraints,
     refuse_references,
 )
-from psdmc.robot.mjcf_names import Names
-from psdmc.robot.mjcf_notes import left_out
-from psdmc.robot.mjcf_terms import gravity
+from psdmc.robot.mjcf_terms import Names, acting, gravity, is_active, is_odd, named
 from psdmc.robot.mjcf_text import tree_text
 from psdmc.robot.mujoco_warnings import kept_warnings
-from psdmc.robot.tree import listed
 
 NOT_A_NUMBER = "NaN"
 """What MuJoCo's warning of such a number has in it."""
@@ -60,12 +60,29 @@ def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
 
     InputError where MuJoCo is not installed or refuses the file, and where the file has what psdmc does not model.
     """
-    mujoco = _mujoco(source)
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError(
+            f"{source}: an MJCF file, which MuJoCo reads, and MuJoCo is not installed",
+            "pip install 'psdmc[mjcf]', or give a URDF",
+        ) from None
     refuse_many_copies(path, source)
     model, warned = _compiled(mujoco, path, source)
     names = Names.of(mujoco, model)
     if root is not None:
-        others = _other_roots(mujoco, model, names, root, source)
+        # The world's other moving bodies are left out.
+        roots = _moving_roots(model)
+        if root not in [names.body(b) for b in roots]:
+            raise InputError(
+                f"{source}: --root {shown(root)} is none of the bodies under the world that move",
+                f"choose one of {_listed_roots(mujoco, model, names)}",
+            )
+        if not hasattr(getattr(mujoco, "MjSpec", None), "delete"):
+            raise InputError(
+                f"{source}: --root needs a newer MuJoCo than {mujoco.__version__}", "pip install -U mujoco"
+            )
+        others = [b for b in roots if names.body(b) != root]
         if others:
             model, warned = _compiled(mujoco, path, source, others)
             warned = [*warned, f"left out by --root {root}: {listed([names.body(b) for b in others])}"]
@@ -79,17 +96,6 @@ def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
     return MjcfRobot(
         tree_text(mujoco, model, names, follows, free, notes), gravity(mujoco, model), free is not None
     )
-
-
-def _mujoco(source: str) -> Any:
-    try:
-        import mujoco
-    except ImportError:
-        raise InputError(
-            f"{source}: an MJCF file, which MuJoCo reads, and MuJoCo is not installed",
-            "pip install 'psdmc[mjcf]', or give a URDF",
-        ) from None
-    return mujoco
 
 
 def _compiled(mujoco: Any, path: Path, source: str, left_out: Sequence[int] = ()) -> tuple[Any, list[str]]:
@@ -145,21 +151,6 @@ def _listed_roots(mujoco: Any, model: Any, names: Names) -> str:
     )
 
 
-def _other_roots(mujoco: Any, model: Any, names: Names, root: str, source: str) -> list[int]:
-    """The world's moving bodies but the one of that name; InputError where there is none of that name."""
-    roots = _moving_roots(model)
-    if root not in [names.body(b) for b in roots]:
-        raise InputError(
-            f"{source}: --root {shown(root)} is none of the bodies under the world that move",
-            f"choose one of {_listed_roots(mujoco, model, names)}",
-        )
-    if not hasattr(getattr(mujoco, "MjSpec", None), "delete"):
-        raise InputError(
-            f"{source}: --root needs a newer MuJoCo than {mujoco.__version__}", "pip install -U mujoco"
-        )
-    return [b for b in roots if names.body(b) != root]
-
-
 def _with_massless(mujoco: Any, path: Path, left_out: Sequence[int]) -> Any:
     """The compiled file without some bodies. MuJoCo refuses moving bodies without inertia: for the compiler those get the
     least that it takes, which is taken away again. ValueError where MuJoCo refuses the file for another reason."""
@@ -172,9 +163,8 @@ def _with_massless(mujoco: Any, path: Path, left_out: Sequence[int]) -> Any:
             raise
         model = _without(mujoco, path, left_out, LEAST)
         bare, least = model.body_mass == LEAST, model.body_inertia == LEAST
-        if (
-            least.any(axis=1) & ~bare
-        ).any():  # mass in a point, or none about an axis, which psdmc takes from nobody
+        # Mass in a point, or none about an axis, which psdmc takes from nobody.
+        if (least.any(axis=1) & ~bare).any():
             raise
         model.body_mass[bare], model.body_inertia[bare] = 0.0, 0.0
         return model
@@ -194,3 +184,63 @@ def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None
             f"choose one of them, such as --root {shlex.quote(names.body(roots[0]))}",
         )
     return free[0]
+
+
+def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
+    """Notes on what the model of rigid bodies leaves out, by name."""
+    joints, bodies = range(model.njnt), range(model.nbody)
+    found = {
+        "actuators are not modelled: efforts are those of the joints": _names(
+            mujoco, model, "ACTUATOR", range(len(model.actuator_trntype))
+        ),
+        "damping of actuators is not modelled": _names(
+            mujoco, model, "ACTUATOR", np.flatnonzero(acting(model, "actuator", "damping"))
+        ),
+        "tendons without forces of their own are left out": _names(
+            mujoco, model, "TENDON", range(model.ntendon)
+        ),
+        "equality constraints that are not active are left out": _names(
+            mujoco, model, "EQUALITY", (k for k in range(model.neq) if not is_active(mujoco, model, k))
+        ),
+        "springs of joints are not modelled": [
+            names.joint(int(j)) for j in np.flatnonzero(acting(model, "jnt", "stiffness"))
+        ],
+        "damping and friction that is negative, not linear or of a free joint is not modelled": [
+            names.joint(j) for j in joints if _resists_oddly(mujoco, model, j)
+        ],
+        "limits of efforts differ by direction, the smaller that is not zero is taken for both": [
+            names.joint(j)
+            for j in joints
+            if model.jnt_actfrclimited[j] and model.jnt_actfrcrange[j].sum() != 0.0
+        ],
+        "compensation of gravity is not modelled": [
+            names.body(b) for b in bodies if model.body_gravcomp[b] != 0.0
+        ],
+        "bodies that a program moves (mocap) stand where they are": [
+            names.body(b) for b in bodies if model.body_mocapid[b] >= 0
+        ],
+        "q of ball joints is a quaternion x y z w, MuJoCo's w x y z": [
+            names.joint(j) for j in of_balls(mujoco, model)
+        ],
+        "limits of ball joints are not read": [
+            names.joint(j) for j in of_balls(mujoco, model) if model.jnt_limited[j]
+        ],
+    }
+    notes = [f"{what}: {listed(which)}" for what, which in found.items() if which]
+    followed = followers(mujoco, model, names)
+    if followed:
+        notes.append(f"equality constraints of joints hold exactly: {listed(list(followed))}")
+    if model.opt.density > 0.0 or model.opt.viscosity > 0.0:
+        notes.append("forces of the medium (density, viscosity) are not modelled")
+    return [*notes, *(["plugins are not modelled"] if model.nplugin else [])]
+
+
+def _resists_oddly(mujoco: Any, model: Any, j: int) -> bool:
+    """Whether a joint has damping or friction that the text made of the file has no word for."""
+    dof = int(model.jnt_dofadr[j])
+    of = acting if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE else is_odd
+    return any(bool(of(model, "dof", word)[dof]) for word in ("damping", "frictionloss"))
+
+
+def _names(mujoco: Any, model: Any, kind: str, numbers: Iterable[int]) -> list[str]:
+    return [named(mujoco, model, kind, k) or f"number {k}" for k in map(int, numbers)]

@@ -19,7 +19,6 @@ from defusedxml.common import DefusedXmlException
 from psdmc.errors import InputError
 from psdmc.reading import read_file
 from psdmc.robot.limits import MAX_BYTES, MAX_COPIES, shown
-from psdmc.robot.mjcf_sizes import refuse_large
 
 REPEATING = ("replicate", "composite", "flexcomp")
 """Elements whose `count` says how many copies there are; of the last two, along up to three axes."""
@@ -114,11 +113,6 @@ def _root(path: Path, source: str) -> Element | None:
             f"{source}: not well-formed XML ({shown(str(error))}), so that what it repeats cannot be counted",
             "correct it, or write the copies out",
         ) from None
-    _refuse_depth(root, source)
-    return root
-
-
-def _refuse_depth(root: Element, source: str) -> None:
     level, depth = [root], 0
     while level:
         level, depth = [child for element in level for child in element], depth + 1
@@ -126,6 +120,7 @@ def _refuse_depth(root: Element, source: str) -> None:
         raise InputError(
             f"{source}: elements within each other {depth} deep, expected {MAX_DEPTH} at most", "nest less"
         )
+    return root
 
 
 def _text(path: Path, source: str) -> bytes:
@@ -149,7 +144,14 @@ def _of_element(element: Element, folder: Path, document: _Document, reading: _R
             for where in dict.fromkeys((folder, document.path.parent))
         ]
     elif element.tag == "model" and file:
-        inside.append(_model(folder / file, element.get("name"), document, reading))
+        # A model to attach, which MuJoCo reads where it is named; what is read again are copies.
+        path = folder / file
+        is_new = _resolved(path) not in reading.counts
+        found = _of_document(path, reading)
+        root = reading.documents[_resolved(path)].root
+        own = root.get("model") if root is not None else None
+        document.models[element.get("name") or own or ""] = path
+        inside.append(found if is_new else _Count(found.elements, found.elements))
     elif element.tag == "attach":
         inside.append(_attached(element, document, reading))
     elements = sum(part.elements for part in inside)
@@ -167,16 +169,6 @@ def _included(path: Path, document: _Document, reading: _Reading) -> _Count:
     document.included.add(where)
     root = _root(path, reading.source)
     return _Count(1.0, 0.0) if root is None else _of_element(root, path.parent, document, reading)
-
-
-def _model(path: Path, name: str | None, document: _Document, reading: _Reading) -> _Count:
-    """A model to attach, which MuJoCo reads where it is named; what is read again are copies."""
-    is_new = _resolved(path) not in reading.counts
-    found = _of_document(path, reading)
-    root = reading.documents[_resolved(path)].root
-    own = root.get("model") if root is not None else None
-    document.models[name or own or ""] = path
-    return found if is_new else _Count(found.elements, found.elements)
 
 
 def _attached(element: Element, document: _Document, reading: _Reading) -> _Count:
@@ -211,3 +203,71 @@ def _resolved(path: Path) -> Path:
         return path.resolve()
     except (OSError, ValueError, RuntimeError):
         return path
+
+
+# Sizes that a single line asks for: MuJoCo has no bounds of its own on the meshes, fields and arrays that it makes.
+MAX_POINTS = 10_000
+"""Of a mesh that MuJoCo makes: its hull takes a second or two."""
+MAX_CORNERS = 1_000
+"""Of a cone, whose base is one face: MuJoCo's time grows with a power of them."""
+MAX_CELLS = 4_000_000
+"""Of a height field or a texture: tens of megabytes."""
+MAX_ROOM = 1_000_000
+"""Of what <size> reserves for each object or for users."""
+
+SQUARED = ("supersphere", "supertorus")
+"""Meshes of as many points as the square of their first parameter."""
+GRIDS = ("plate", "wedge")
+"""Meshes of as many points as the product of their first two."""
+CONE = "cone"
+"""A mesh whose first parameter is the corners of its base."""
+ROOM = ("nkey", "nuserdata", "nuser_body", "nuser_jnt", "nuser_geom", "nuser_site", "nuser_cam", "nuser_tendon",
+        "nuser_actuator", "nuser_sensor")  # fmt: skip
+
+
+def refuse_large(element: Element, source: str) -> None:
+    """InputError where an element asks for more points, cells or numbers than a robot's file has use for."""
+    if element.tag == "mesh" and element.get("builtin"):
+        most = MAX_CORNERS if element.get("builtin") == CONE else MAX_POINTS
+        _refuse(_points(element), most, "points", f"mesh {_name(element)}", source)
+    elif element.tag == "hfield":
+        _refuse(
+            _product(element, "nrow", "ncol"), MAX_CELLS, "cells", f"height field {_name(element)}", source
+        )
+    elif element.tag == "texture":
+        _refuse(_product(element, "width", "height"), MAX_CELLS, "cells", f"texture {_name(element)}", source)
+    elif element.tag == "size":
+        for word in ROOM:
+            _refuse(_product(element, word), MAX_ROOM, "numbers", f"<size {word}>", source)
+
+
+def _refuse(asked: float, most: int, of_what: str, where: str, source: str) -> None:
+    if not asked <= most:
+        raise InputError(
+            f"{source}: {where} asks for {asked:.3g} {of_what}, expected {most} at most",
+            "give smaller numbers",
+        )
+
+
+def _points(element: Element) -> float:
+    numbers = [_number(word) for word in element.get("params", "").split()]
+    kind = element.get("builtin")
+    if kind in SQUARED:
+        return math.prod(numbers[:1] * 2)
+    return math.prod(numbers[:2]) if kind in GRIDS else max([1.0, *numbers[:1]])
+
+
+def _product(element: Element, *attributes: str) -> float:
+    return math.prod(_number(element.get(word, "1")) for word in attributes)
+
+
+def _number(word: str) -> float:
+    """At least one; one where it is no number, which MuJoCo refuses."""
+    try:
+        return max(1.0, float(word))
+    except ValueError:
+        return 1.0
+
+
+def _name(element: Element) -> str:
+    return shown(element.get("name", ""))

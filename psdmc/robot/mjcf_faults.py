@@ -8,8 +8,7 @@ from typing import Any
 
 from psdmc.errors import InputError
 from psdmc.robot.limits import ANGLE, LENGTH, joined, shown
-from psdmc.robot.mjcf_names import Names, named
-from psdmc.robot.mjcf_terms import acting, armatures, armatures_elsewhere, is_active, reflected
+from psdmc.robot.mjcf_terms import Names, acting, armatures, armatures_elsewhere, is_active, named, reflected
 
 REMEDY = "take them out of the file: psdmc models trees of rigid bodies"
 

@@ -14,14 +14,12 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.limits import TINIEST
 from psdmc.robot.mjcf_faults import Follows
-from psdmc.robot.mjcf_kept import kept_tree
-from psdmc.robot.mjcf_names import Names
-from psdmc.robot.mjcf_terms import armatures
+from psdmc.robot.mjcf_terms import Names, armatures
 from psdmc.robot.names import free_name
 from psdmc.robot.source_words import BALL, DRIVE, MJCF, NOTE
 
@@ -75,7 +73,12 @@ def tree_text(
     notes: Sequence[str],
 ) -> str:
     """A URDF; `follows` are the joints that follow others, `free` is the body that is to be the root, on a free joint."""
-    robot = Element("robot", name=_robot_name(model), version="1.1")
+    # The model's own name is the first of its names.
+    robot = Element(
+        "robot",
+        name=(model.names[: model.names.index(b"\0")].decode(errors="replace") or "robot"),
+        version="1.1",
+    )
     for note in notes:
         SubElement(robot, NOTE, text=note)
     drives = armatures(mujoco, model)
@@ -136,7 +139,9 @@ def _at_reference(writer: _Writer, j: int, origin: Array, turn: Array, axis: Arr
 def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array, Array]) -> None:
     model, name = writer.model, writer.names.joint(j)
     if _is_ball(writer, j):
-        _ball(writer, j, writer.joint(name, "floating", parent, child, place))
+        element = writer.joint(name, "floating", parent, child, place)
+        _dynamics(writer, j, element)
+        SubElement(element, BALL)
         return
     slides = model.jnt_type[j] == writer.mujoco.mjtJoint.mjJNT_SLIDE
     limited, forced = bool(model.jnt_limited[j]), bool(model.jnt_actfrclimited[j])
@@ -147,7 +152,10 @@ def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array
     if limited:
         limits |= dict(zip(("lower", "upper"), map(_number, model.jnt_range[j]), strict=True))
     if forced:
-        limits["effort"] = _number(_effort(*model.jnt_actfrcrange[j]))
+        # The effort that a joint has in both directions; where it has but one, what it has in that.
+        least, most = model.jnt_actfrcrange[j]
+        both = min(-least, most)
+        limits["effort"] = _number(both if both > 0.0 else max(abs(least), abs(most)))
     if limits:
         SubElement(element, "limit", limits)
     _dynamics(writer, j, element)
@@ -159,20 +167,8 @@ def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array
         SubElement(element, DRIVE, inertia=_number(writer.armatures[j]))
 
 
-def _effort(least: float, most: float) -> float:
-    """The effort that a joint has in both directions; where it has but one, what it has in that."""
-    both = min(-least, most)
-    return both if both > 0.0 else max(abs(least), abs(most))
-
-
 def _is_ball(writer: _Writer, j: int) -> bool:
     return bool(writer.model.jnt_type[j] == writer.mujoco.mjtJoint.mjJNT_BALL)
-
-
-def _ball(writer: _Writer, j: int, element: Element) -> None:
-    """Return the elements that turn a floating joint into a ball joint for psdmc."""
-    _dynamics(writer, j, element)
-    SubElement(element, BALL)
 
 
 def _dynamics(writer: _Writer, j: int, element: Element) -> None:
@@ -193,11 +189,6 @@ def _rotated(mujoco: Any, turn: Array, vector: Array) -> Array:
     return found
 
 
-def _robot_name(model: Any) -> str:
-    """The model's own name: the first of its names."""
-    return model.names[: model.names.index(b"\0")].decode(errors="replace") or "robot"
-
-
 def _numbers(values: Array | Sequence[float]) -> str:
     return " ".join(_number(value) for value in values)
 
@@ -206,3 +197,59 @@ def _number(value: Any) -> str:
     """All digits of a number; what is smaller than URDFs may have is zero."""
     plain = float(value)
     return repr(plain) if abs(plain) >= TINIEST else "0"
+
+
+# The same model in MJCF's own words. It shares no computation with the URDF above: every number is copied from MuJoCo's
+# arrays to the attribute that MuJoCo fills that array from.
+COMPILER = {
+    "angle": "radian",
+    "autolimits": "false",
+    "balanceinertia": "false",
+    "boundmass": "0",
+    "boundinertia": "0",
+    "fusestatic": "false",
+    "inertiafromgeom": "false",
+}
+"""Settings by which MuJoCo keeps these numbers."""
+
+
+def kept_tree(mujoco: Any, model: Any, names: Names) -> Element:
+    """A <mujoco> element: bodies, inertias, joints, their drives' inertias and gravity."""
+    root = Element("mujoco", model="kept")
+    SubElement(root, "compiler", COMPILER)
+    SubElement(root, "option", gravity=_kept_numbers(model.opt.gravity))
+    drives = armatures(mujoco, model)
+    elements = [SubElement(root, "worldbody")]
+    for body in range(1, model.nbody):
+        place = {
+            "pos": _kept_numbers(model.body_pos[body]),
+            "quat": _kept_numbers(model.body_quat[body]),
+        }
+        element = SubElement(elements[model.body_parentid[body]], "body", {"name": names.body(body), **place})
+        elements.append(element)
+        if model.body_mass[body] > 0.0 or model.body_inertia[body].any():
+            words = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
+            values = {word: getattr(model, f"body_{array}")[body] for word, array in words.items()}
+            SubElement(element, "inertial", {word: _kept_numbers(value) for word, value in values.items()})
+        first = int(model.body_jntadr[body])
+        for j in range(first, first + int(model.body_jntnum[body])):
+            _joint(element, mujoco, model, j, names.joint(j), drives[j])
+    return root
+
+
+def _joint(element: Element, mujoco: Any, model: Any, j: int, name: str, drive: float) -> None:
+    kinds = mujoco.mjtJoint
+    kind = kinds(model.jnt_type[j]).name.removeprefix("mjJNT_").lower()
+    joint = SubElement(element, "joint", name=name, type=kind)
+    if kind == "free":
+        return
+    joint.set("pos", _kept_numbers(model.jnt_pos[j]))
+    joint.set("armature", _kept_numbers(drive))
+    if kind != "ball":
+        joint.set("axis", _kept_numbers(model.jnt_axis[j]))
+        joint.set("ref", _kept_numbers(model.qpos0[model.jnt_qposadr[j]]))
+
+
+def _kept_numbers(values: ArrayLike) -> str:
+    """All digits of one or several numbers."""
+    return " ".join(repr(float(value)) for value in np.atleast_1d(values))

@@ -12,7 +12,7 @@ import numpy as np
 from psdmc.robot.limits import shown
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
-from psdmc.robot.mechanism import DRIVE, Array, Mechanism, Placement
+from psdmc.robot.mechanism import DRIVE, Array, Mechanism
 from psdmc.robot.mujoco_warnings import kept_warnings
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, dynamics_of
 from psdmc.robot.reference_model import has_assumptions
@@ -144,13 +144,11 @@ def _free_joint(chain: Mechanism) -> bool:
         raise NotCompared(f"MuJoCo has no joint like {shown(chain.joints[kinds.index('none')].name)}")
     if "free" in kinds[1:]:
         raise NotCompared("MuJoCo's free joints are compared where they come first")
-    if "free" in kinds and not _is_world(chain.joints[0].placement):
+    root = chain.joints[0].placement
+    is_world = np.all(root.rotation == np.eye(3)) and not root.translation.any()
+    if "free" in kinds and not is_world:
         raise NotCompared("MuJoCo's free joints are about the world's frame")
     return "free" in kinds
-
-
-def _is_world(placement: Placement) -> bool:
-    return bool(np.all(placement.rotation == np.eye(3)) and not placement.translation.any())
 
 
 def _entries(first: Array, counts: Sequence[int]) -> list[int]:
@@ -213,7 +211,11 @@ def _model(mujoco: Any, loaded: LoadedRobot) -> Any:
         raise NotCompared("MuJoCo reads no quat_xyzw")
     moving = [*loaded.mechanism.joint_names, *_held(loaded)]
     if loaded.options.floating:
-        _free_root(root, loaded.mechanism)
+        # The root link on a floating joint, which MuJoCo makes a free one.
+        free = SubElement(root, "joint", name=loaded.mechanism.joint_names[0], type="floating")
+        SubElement(root, "link", name=loaded.mechanism.base_name)
+        SubElement(free, "parent", link=loaded.mechanism.base_name)
+        SubElement(free, "child", link=loaded.mechanism.joints[0].link_name)
     _drop_still_bodies(root, moving)
     dropped = _massless(root)
     if dropped:
@@ -235,14 +237,6 @@ def _compiled(mujoco: Any, text: str, loaded: LoadedRobot) -> Any:
     disabled = mujoco.mjtDisableBit
     model.opt.disableflags |= disabled.mjDSBL_CONSTRAINT
     return model
-
-
-def _free_root(root: Element, chain: Mechanism) -> None:
-    """Put the root link on a floating joint, which MuJoCo makes a free one."""
-    free = SubElement(root, "joint", name=chain.joint_names[0], type="floating")
-    SubElement(root, "link", name=chain.base_name)
-    SubElement(free, "parent", link=chain.base_name)
-    SubElement(free, "child", link=chain.joints[0].link_name)
 
 
 def _drop_still_bodies(root: Element, moving: Collection[str]) -> None:

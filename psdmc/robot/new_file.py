@@ -22,11 +22,6 @@ def write_new_robot(path: Path) -> None:
         raise InputError(f"{path}: a DH table's name ends with .toml", f"such as psdmc new {path.stem}.toml")
     if os.path.lexists(path):
         raise InputError(f"{path}: exists already, and is left as it is", "give another name")
-    write_whole(path, robot_text_for(path))
-
-
-def robot_text_for(path: Path) -> str:
-    """The template with the name of a file in it."""
     text = resources.files("psdmc.robot").joinpath(TEMPLATE).read_text(encoding="utf-8")
     safe = path.name if path.name.isprintable() and path.name.isascii() else "ROBOT.toml"
-    return text.replace("@FILE@", safe).replace("@NAME@", json.dumps(path.stem))
+    write_whole(path, text.replace("@FILE@", safe).replace("@NAME@", json.dumps(path.stem)))

@@ -1,7 +1,7 @@
 """Pinocchio's own model of a robot's source, as the reference for everything else.
 
 It shares the file's text with the chain and as little code as possible: a URDF is read, merged and locked by Pinocchio,
-a DH table is read by dh_textbook. Only names come from the chain: of its joints, links, base and tip. For the snapped
+a DH table is read by `dh_model`. Only names come from the chain: of its joints, links, base and tip. For the snapped
 robot the joints' placements come from the chain too, because the file does not have them; the bodies are still
 Pinocchio's.
 
@@ -12,17 +12,21 @@ chain's base as their universe, and a frame for the tip: they work with any func
 
 from __future__ import annotations
 
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 import numpy as np
 import pinocchio
 
 from psdmc.errors import InputError
-from psdmc.robot.dh_textbook import dh_model
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.lock import held_positions
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array, Mechanism, Placement, frozen_array
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model, reduced
-from psdmc.robot.tool import TOOL
 from psdmc.robot.urdf import read_urdf
+from psdmc.robot.urdf_bodies import TOOL
 
 
 def reference_model(
@@ -47,7 +51,9 @@ def reference_model(
         )
     if np.isnan(values).any():
         raise ValueError("inertial parameters are unknown: give `parameters`")
-    _set_bodies(model, chain, values, replaced)
+    for k in replaced:
+        link = model.frames[model.getFrameId(chain.joints[k].link_name, pinocchio.FrameType.BODY)]
+        model.inertias[k + 1] = link.placement.act(body_of(values[k]))
     model.armature = np.repeat(values[:, DRIVE], [kind.nv for kind in chain.types])
     return _placed_as(chain, model) if snapped else model
 
@@ -57,17 +63,14 @@ def as_written(loaded: LoadedRobot) -> pinocchio.Model:
     is_urdf = loaded.source_format == "urdf"
     model = _urdf_model(loaded) if is_urdf else dh_model(loaded.source_text, loaded.options.gravity)
     if loaded.options.tool is not None:
-        _add_tool(model, loaded.mechanism.tip_name, loaded.options.tool)
+        # The tool frame in the tip's, by Pinocchio's own reading of the angles.
+        tool = loaded.options.tool
+        number = model.getFrameId(loaded.mechanism.tip_name)
+        place = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*tool[3:]), np.array(tool[:3]))
+        above = model.frames[number]
+        kind = pinocchio.FrameType.OP_FRAME
+        model.addFrame(pinocchio.Frame(TOOL, above.parentJoint, number, above.placement * place, kind))
     return model
-
-
-def _add_tool(model: pinocchio.Model, tip: str, tool: tuple[float, ...]) -> None:
-    """The tool frame in the tip's, by Pinocchio's own reading of the angles."""
-    number = model.getFrameId(tip)
-    place = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*tool[3:]), np.array(tool[:3]))
-    above = model.frames[number]
-    kind = pinocchio.FrameType.OP_FRAME
-    model.addFrame(pinocchio.Frame(TOOL, above.parentJoint, number, above.placement * place, kind))
 
 
 def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
@@ -115,13 +118,6 @@ def body_of(parameters: Array) -> pinocchio.Inertia:
     return pinocchio.Inertia.FromDynamicParameters(np.array([mass, *parameters[1:DRIVE]]))
 
 
-def _set_bodies(model: pinocchio.Model, chain: Mechanism, parameters: Array, which: list[int]) -> None:
-    """Give the joints `which` bodies by their standard parameters (n, 11) about the link frames."""
-    for k in which:
-        link = model.frames[model.getFrameId(chain.joints[k].link_name, pinocchio.FrameType.BODY)]
-        model.inertias[k + 1] = link.placement.act(body_of(parameters[k]))
-
-
 def has_assumptions(loaded: LoadedRobot) -> bool:
     """Whether some bodies are not determined by the file alone: assumed zeros and unknown values."""
     return bool(_assumed(loaded.mechanism))
@@ -161,3 +157,90 @@ def _placed_as(chain: Mechanism, model: pinocchio.Model) -> pinocchio.Model:
 
 def _se3(placement: Placement) -> pinocchio.SE3:
     return pinocchio.SE3(np.array(placement.rotation), np.array(placement.translation))
+
+
+# Standard (Denavit, Hartenberg 1955; Spong, Hutchinson, Vidyasagar, Robot Modeling and Control, eq. 3.10) and modified
+# (Craig, Introduction to Robotics, eq. 3.6). The joint variable is added to theta, or to d; either leaves a rotation
+# about z (a displacement along z) that commutes to the outer end of a standard row and to the inner end of a modified
+# one, where Pinocchio's joint is.
+MODELS = {"revolute": pinocchio.JointModelRZ, "prismatic": pinocchio.JointModelPZ}
+"""Pinocchio's joints by a row's type. Written here again, because this reader shares nothing with the other."""
+
+
+def dh_model(text: str, gravity: Sequence[float] | None) -> pinocchio.Model:
+    """Pinocchio's model of a table that read_dh has accepted, links called link1, link2 and so on.
+
+    gravity   m/s^2 in the base frame instead of the table's; bodies that the table leaves open in part are zero
+    """
+    table = tomllib.loads(text)
+    is_modified = table.get("convention", "standard") == "modified"
+    model = pinocchio.Model()
+    model.name = str(table.get("name", "robot"))
+    ends = {"base": (pinocchio.SE3.Identity(), 0, 0)}
+    last = "base"
+    for number, row in enumerate(table["joint"], start=1):
+        before, parent, frame = ends[row.get("parent", last)]
+        kind = MODELS[row.get("type", "revolute")]()
+        theta, alpha = _radians(row.get("theta", 0.0)), _radians(row.get("alpha", 0.0))
+        d, a = float(row.get("d", 0.0)), float(row.get("a", 0.0))
+        whole = pinocchio.SE3((modified_matrix if is_modified else standard_matrix)(theta, d, a, alpha))
+        place, link = (before * whole, pinocchio.SE3.Identity()) if is_modified else (before, whole)
+        last = row.get("name", f"joint{number}")
+        parent = model.addJoint(parent, kind, place, last)
+        model.appendBodyToJoint(parent, _body(row.get("link", {})), link)
+        frame = model.addFrame(
+            pinocchio.Frame(f"link{number}", parent, frame, link, pinocchio.FrameType.BODY)
+        )
+        ends[last] = link, parent, frame
+    model.gravity.linear = np.array(
+        table.get("gravity", (0.0, 0.0, -9.81)) if gravity is None else gravity, float
+    )
+    return model
+
+
+def standard_matrix(theta: float, d: float, a: float, alpha: float) -> Array:
+    """(4, 4) Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha), multiplied out."""
+    ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
+    return np.array(
+        [
+            [ct, -st * ca, st * sa, a * ct],
+            [st, ct * ca, -ct * sa, a * st],
+            [0.0, sa, ca, d],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def modified_matrix(theta: float, d: float, a: float, alpha: float) -> Array:
+    """(4, 4) Rot(x, alpha) Trans(x, a) Rot(z, theta) Trans(z, d), multiplied out."""
+    ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
+    return np.array(
+        [
+            [ct, -st, 0.0, a],
+            [st * ca, ct * ca, -sa, -sa * d],
+            [st * sa, ct * sa, ca, ca * d],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def _radians(value: float | str) -> float:
+    if not isinstance(value, str):
+        return float(value)
+    text = value.strip()
+    return float(text[:-3]) * (math.pi / 180.0 if text.endswith("deg") else 1.0)
+
+
+def _body(link: Mapping[str, Any]) -> pinocchio.Inertia:
+    """The row's body in its link's frame; zero where something is left out."""
+    six = link.get("inertia_com", {})
+    if not {"mass", "com"} <= set(link) or len(six) < 6:
+        return pinocchio.Inertia.Zero()
+    com, mass = np.array(link["com"], float), float(link["mass"])
+    xx, xy, yy, xz, yz, zz = (float(six[name]) for name in ("xx", "xy", "yy", "xz", "yz", "zz"))
+    about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    about_frame = about_com + mass * (com @ com * np.eye(3) - np.outer(com, com))
+    entries = about_frame[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
+    # Pinocchio divides by the mass: a body without any gets the smallest one.
+    divisor = mass or float(np.finfo(float).tiny)
+    return pinocchio.Inertia.FromDynamicParameters(np.array([divisor, *(mass * com), *entries]))

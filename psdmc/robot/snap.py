@@ -9,11 +9,13 @@ rows, because the rows are orthogonal. So only these three patterns are tried, t
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from itertools import permutations
 
 import numpy as np
 
 from psdmc.reproducible import arcsine, length
+from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Array
 
 ROUNDING = 1e-14
@@ -128,3 +130,41 @@ def link_rotation(axis: Array) -> Array:
     x = np.eye(3)[k] - axis[k] * axis
     x /= length(x)
     return np.array([x, np.cross(axis, x), axis]) + 0.0
+
+
+DIGITS = (2, 3, 4, 5)
+"""Digits behind the point. An angle that a calibration found has more of them, and is no right angle."""
+MOST = 8
+"""Joints in one note."""
+
+
+def coarse_right_angles(angles: Mapping[str, Sequence[float]], snap: float) -> tuple[str, ...]:
+    """A note where joints have multiples of pi/2 rounded to these digits, further than `snap` (rad) from the exact ones;
+    none where the file's angles are wanted as they are (snap 0).
+
+    angles  rad, by the joint's name
+    """
+    found = {
+        name: coarse
+        for name, own in angles.items()
+        if (coarse := [x for x in own if _off(x) > snap and any(x == round(_nearest(x), d) for d in DIGITS)])
+    }
+    if not found or snap == 0.0:
+        return ()
+    each = [f"{shown(name)} ({', '.join(f'{x:g}' for x in own)})" for name, own in found.items()]
+    said = ", ".join(each[:MOST]) + (f" and {len(each) - MOST} more" if len(each) > MOST else "")
+    off = max(_off(x) for own in found.values() for x in own)
+    unit = 10.0 ** math.floor(math.log10(off))
+    return (
+        f"right angles written with few digits, at joint(s) {said}: kept as written, up to {off:.1e} rad off; "
+        f"--snap {math.ceil(off / unit) * unit:g} takes them for exact",
+    )
+
+
+def _nearest(angle: float) -> float:
+    """The multiple of pi/2 that is nearest."""
+    return round(angle / (math.pi / 2)) * (math.pi / 2)
+
+
+def _off(angle: float) -> float:
+    return abs(angle - _nearest(angle))

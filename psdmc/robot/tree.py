@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from psdmc.errors import InputError
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.limits import MAX_JOINTS, shown
+from psdmc.robot.limits import MAX_JOINTS, listed, shown
 from psdmc.robot.urdf import LOCKABLE, MOVABLE, UrdfJoint, UrdfRobot
 
 BALLS = ("spherical", "ball")
@@ -54,7 +54,12 @@ def find_route(
             )
     is_tree = base is None and tip is None and len(_last_joints(robot)) > 1
     route = _tree(robot, frames, source) if is_tree else _chain(robot, base, tip, source)
-    _refuse_many(route, source)
+    where = "" if route.ends else f" from '{route.base}' to '{route.tip}'"
+    if len(route.movable) > MAX_JOINTS:
+        raise InputError(
+            f"{source}: {len(route.movable)} movable joints{where}, psdmc reads at most {MAX_JOINTS}",
+            "choose a shorter chain with --base and --tip",
+        )
     if not route.movable:
         raise InputError(
             f"{source}: no movable joint between '{route.base}' and '{route.tip}'",
@@ -70,7 +75,9 @@ def _chain(robot: UrdfRobot, base: str | None, tip: str | None, source: str) -> 
     end, notes = (tip, ()) if tip is not None else default_tip(robot, start, source)
     path = joints_between(robot, start, end)
     if path is None:
-        raise InputError(f"{source}: " + _not_below(robot, start, end), _way_out(robot, start, end))
+        above = " but above it" if joints_between(robot, end, start) is not None else ""
+        fault = f"{source}: tip link '{end}' is not below base link '{start}'{above}"
+        raise InputError(fault, _way_out(robot, start, end))
     return Route(start, end, joints_between(robot, robot.root, start) or (), path, notes)
 
 
@@ -78,7 +85,10 @@ def _tree(robot: UrdfRobot, frames: Sequence[str], source: str) -> Route:
     path = tuple(outward(robot))
     last = _last_joints(robot)
     ends = tuple(_fixed_end(robot, joint.child) for joint in path if joint in last)
-    moved = _moved_links(path)
+    moved: set[str] = set()
+    for joint in path:
+        if joint.is_movable or joint.parent in moved:
+            moved.add(joint.child)
     tip = next((name for name in frames[:1] if name in moved), ends[0])
     return Route(robot.root, tip, (), path, (_whole_note(robot, ends, source),), ends)
 
@@ -109,15 +119,6 @@ def _last_joints(robot: UrdfRobot) -> list[UrdfJoint]:
     return [joint for joint in robot.joints if joint.is_movable and joint.child not in carrying]
 
 
-def _moved_links(path: Sequence[UrdfJoint]) -> set[str]:
-    """Links of a tree that some joint moves."""
-    moved: set[str] = set()
-    for joint in path:
-        if joint.is_movable or joint.parent in moved:
-            moved.add(joint.child)
-    return moved
-
-
 def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
     """Describe the tree, and the options that select the chain that psdmc took in earlier releases, unless its root is
     free."""
@@ -130,15 +131,10 @@ def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
     return f"the whole tree, to its ends {listed(ends)}; --tip LINK takes one chain of it{before}"
 
 
-def _not_below(robot: UrdfRobot, start: str, end: str) -> str:
-    above = " but above it" if joints_between(robot, end, start) is not None else ""
-    return f"tip link '{end}' is not below base link '{start}'{above}"
-
-
 def _way_out(robot: UrdfRobot, start: str, end: str) -> str:
     if joints_between(robot, end, start) is not None:
         return f"a chain runs from its base to its tip: swap them, --base '{end}' --tip '{start}'"
-    below = _below(robot, start)
+    below = [link for link in _movable_depths(robot, start) if link != start]
     return (
         f"links below '{start}': {listed(below)}"
         if below
@@ -183,12 +179,6 @@ def default_tip(robot: UrdfRobot, base: str, source: str) -> tuple[str, tuple[st
     return parting, (note,)
 
 
-def listed(names: Iterable[str], most: int = 12) -> str:
-    """Names in quotes for a message, shortened where there are many."""
-    quoted = [f"'{name}'" for name in names]
-    return ", ".join(quoted[:most]) + (f" and {len(quoted) - most} more" if len(quoted) > most else "")
-
-
 def _movable_depths(robot: UrdfRobot, base: str) -> dict[str, int]:
     """Links from base down, each with the number of movable joints above it."""
     depth = {base: 0}
@@ -199,10 +189,6 @@ def _movable_depths(robot: UrdfRobot, base: str) -> dict[str, int]:
             depth[joint.child] = depth[link] + joint.is_movable
             queue.append(joint.child)
     return depth
-
-
-def _below(robot: UrdfRobot, base: str) -> list[str]:
-    return [link for link in _movable_depths(robot, base) if link != base]
 
 
 def _fixed_end(robot: UrdfRobot, link: str) -> str:
@@ -230,15 +216,6 @@ def _parting_link(robot: UrdfRobot, base: str, ends: Sequence[str]) -> str:
             break
         shared = links[0]
     return shared
-
-
-def _refuse_many(route: Route, source: str) -> None:
-    where = "" if route.ends else f" from '{route.base}' to '{route.tip}'"
-    if len(route.movable) > MAX_JOINTS:
-        raise InputError(
-            f"{source}: {len(route.movable)} movable joints{where}, psdmc reads at most {MAX_JOINTS}",
-            "choose a shorter chain with --base and --tip",
-        )
 
 
 def _refuse_other_planes(route: Route, source: str) -> None:

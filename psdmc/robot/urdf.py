@@ -12,9 +12,9 @@ from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import URDF_TYPES
+from psdmc.robot.limits import listed, shown
 from psdmc.robot.mechanism import WARNING, Limits, Placement
 from psdmc.robot.names import name_faults, naming_faults
-from psdmc.robot.urdf_tree import tree_faults
 from psdmc.robot.urdf_words import (
     VERSIONS,
     has_dynamics,
@@ -131,18 +131,26 @@ def read_urdf(text: str, source: str) -> UrdfRobot:
     _refuse(
         tree_faults(list(inertials), ends), source, "a robot is a tree: one root, one parent joint per link"
     )
-    _refuse(_scale_faults(inertials, joints), source, "lengths are in metres")
+    places = [joint.origin.xyz for joint in joints] + [b.origin.xyz for b in inertials.values() if b]
+    fault = limits.scale_fault(length for xyz in places for length in xyz)
+    _refuse([fault] if fault else [], source, "lengths are in metres")
     children = {joint.child for joint in joints}
     base = next(name for name in inertials if name not in children)
-    notes = _notes(root, inertials, joints)
-    shapes = tuple(link.get("name", "") for link in root.findall("link") if _is_shape(link))
-    return UrdfRobot(root.get("name") or "robot", base, inertials, tuple(joints), notes, shapes=shapes)
-
-
-def _is_shape(link: Element) -> bool:
-    return (
-        link.find("collision") is not None and link.find("inertial") is None and link.find("visual") is None
+    notes = [] if root.get("name") else ["the file names no robot: called 'robot'"]
+    origins = [joint.origin for joint in joints] + [body.origin for body in inertials.values() if body]
+    if root.get("version", "1.0").strip() == "1.0" and any(origin.quaternion for origin in origins):
+        notes.append(
+            "quat_xyzw is read as a rotation, though the file does not say version 1.1: others ignore it"
+        )
+    notes += [*_reversed_limits(root), *unread_words(root)]
+    shapes = tuple(
+        link.get("name", "")
+        for link in root.findall("link")
+        if link.find("collision") is not None
+        and link.find("inertial") is None
+        and link.find("visual") is None
     )
+    return UrdfRobot(root.get("name") or "robot", base, inertials, tuple(joints), tuple(notes), shapes=shapes)
 
 
 Made = TypeVar("Made")
@@ -161,10 +169,7 @@ def _each(root: Element, tag: str, read: Callable[[Element], Made], problems: li
 
 def _refuse(problems: Sequence[str], source: str, hint: str) -> None:
     if problems:
-        more = (
-            [f"and {len(problems) - limits.MOST_FAULTS} more"] if len(problems) > limits.MOST_FAULTS else []
-        )
-        raise InputError(f"{source}: " + "; ".join([*problems[: limits.MOST_FAULTS], *more]), hint)
+        raise InputError(f"{source}: {limits.joined(problems)}", hint)
 
 
 def _refuse_sizes(root: Element, source: str) -> None:
@@ -177,18 +182,6 @@ def _refuse_sizes(root: Element, source: str) -> None:
             )
 
 
-def _notes(
-    root: Element, inertials: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]
-) -> tuple[str, ...]:
-    notes = [] if root.get("name") else ["the file names no robot: called 'robot'"]
-    origins = [joint.origin for joint in joints] + [body.origin for body in inertials.values() if body]
-    if root.get("version", "1.0").strip() == "1.0" and any(origin.quaternion for origin in origins):
-        notes.append(
-            "quat_xyzw is read as a rotation, though the file does not say version 1.1: others ignore it"
-        )
-    return (*notes, *_reversed_limits(root), *unread_words(root))
-
-
 def _reversed_limits(root: Element) -> Iterator[str]:
     """A warning for each joint whose lower position limit is above its upper one."""
     for joint in root.findall("joint"):
@@ -199,12 +192,6 @@ def _reversed_limits(root: Element) -> Iterator[str]:
             name = limits.shown(joint.get("name", ""))
             said = f"<limit> lower {lower:g} is above upper {upper:g}"
             yield f"{WARNING}joint {name}: {said}: taken as no position limit"
-
-
-def _scale_faults(inertials: dict[str, UrdfInertial | None], joints: Sequence[UrdfJoint]) -> list[str]:
-    places = [joint.origin.xyz for joint in joints] + [b.origin.xyz for b in inertials.values() if b]
-    fault = limits.scale_fault(length for xyz in places for length in xyz)
-    return [fault] if fault else []
 
 
 def _inertial(link: Element) -> UrdfInertial | None:
@@ -249,7 +236,7 @@ def _axis(joint: Element, kind: str) -> Triple:
     if element is not None and element.get("xyz") is None:
         raise ValueError("<axis> has no xyz")
     x, y, z = numbers(element, "xyz", (1.0, 0.0, 0.0), limits.DIRECTION)
-    if kind not in MOVABLE or not _has_axis(kind):
+    if kind not in MOVABLE or not (URDF_TYPES[kind].follows_axis or URDF_TYPES[kind].only_axis is not None):
         return (x, y, z)
     if not any((x, y, z)):
         raise ValueError("<axis> is zero, expected a direction")
@@ -257,11 +244,6 @@ def _axis(joint: Element, kind: str) -> Triple:
     if fault:
         raise ValueError(f"length of <axis>, {math.hypot(x, y, z):g}, {fault}")
     return (x, y, z)
-
-
-def _has_axis(kind: str) -> bool:
-    """Whether <axis> says anything of a joint of this type."""
-    return URDF_TYPES[kind].follows_axis or URDF_TYPES[kind].only_axis is not None
 
 
 def _origin(parent: Element) -> Origin:
@@ -315,3 +297,42 @@ def _limits(joint: Element, kind: str) -> Limits:
     if lower > upper:
         return Limits(speed=speed, effort=effort, acceleration=acceleration)
     return Limits(lower=lower, upper=upper, speed=speed, effort=effort, acceleration=acceleration)
+
+
+Ends = tuple[str, str, str]
+"""A joint's name, its parent link and its child link."""
+
+
+def tree_faults(links: Sequence[str], joints: Sequence[Ends]) -> list[str]:
+    """The reasons why the links are not one tree, one sentence each."""
+    known = dict.fromkeys(links)
+    faults = []
+    parents: dict[str, list[str]] = {}
+    for name, parent, child in joints:
+        for role, link in (("parent", parent), ("child", child)):
+            if link not in known:
+                faults.append(f"joint '{name}': {role} link {shown(link)} does not exist")
+        parents.setdefault(child, []).append(name)
+    for link, above in parents.items():
+        if len(above) > 1:
+            quoted = " and ".join(f"'{name}'" for name in above)
+            faults.append(f"link '{link}' is the child of joints {quoted}: a loop")
+    roots = [name for name in links if name not in parents]
+    if not faults and len(roots) > 1:
+        faults.append(f"links {listed(roots)} all have no parent joint")
+    return faults or _cycle_faults(links, joints, roots)
+
+
+def _cycle_faults(links: Sequence[str], joints: Sequence[Ends], roots: Sequence[str]) -> list[str]:
+    """Faults of links that no root reaches: they form a ring."""
+    below: dict[str, list[str]] = {}
+    for _, parent, child in joints:
+        below.setdefault(parent, []).append(child)
+    reached = dict.fromkeys(roots)
+    queue = list(roots)
+    while queue:
+        for child in below.get(queue.pop(), []):
+            reached[child] = None
+            queue.append(child)
+    ring = [name for name in links if name not in reached]
+    return [f"links {listed(ring)} form a loop"] if ring else []

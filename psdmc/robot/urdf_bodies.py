@@ -10,7 +10,7 @@ from psdmc.errors import InputError
 from psdmc.reproducible import times
 from psdmc.robot.inertia import inertia_matrix, six_of, standard_parameters, without_noise
 from psdmc.robot.joints import REVOLUTE
-from psdmc.robot.mechanism import Array, Placement
+from psdmc.robot.mechanism import Array, NamedFrame, Placement
 from psdmc.robot.pinocchio_text import JOINT_PREFIX, locked_at, pinocchio_model
 from psdmc.robot.rotation import from_quaternion, roll_pitch_yaw
 from psdmc.robot.snap import snap_rotation
@@ -42,12 +42,7 @@ def merged_parameters(robot: UrdfRobot, route: Route) -> list[Array]:
 
     Joints beside the chain and beyond the tip are locked at neutral.
     """
-    return merged_onto(robot, route.movable)
-
-
-def merged_onto(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[Array]:
-    """Merged parameters as above for any movable joints; all others are locked at neutral."""
-    return [without_noise(_merged(robot, body)) for body in bodies_of(robot, movable)]
+    return [without_noise(_merged(robot, body)) for body in bodies_of(robot, route.movable)]
 
 
 def bodies_of(robot: UrdfRobot, movable: Sequence[UrdfJoint]) -> list[dict[str, Placement]]:
@@ -129,3 +124,16 @@ def _compare(own: Array, other: object, link: str, what: str, source: str) -> No
 
 def _listed(values: Array) -> str:
     return " ".join(f"{value:.9g}" for value in values)
+
+
+TOOL = "tool"
+"""Name of the frame."""
+
+
+def tool_frame(tip: NamedFrame, tool: Sequence[float]) -> NamedFrame:
+    """The frame 'tool', given by x y z (m), roll pitch yaw (rad) in the tip's."""
+    # Turns are about fixed axes x, y, z in turn, as in URDF.
+    x, y, z, roll, pitch, yaw = tool
+    return NamedFrame(
+        TOOL, tip.joint, tip.placement @ placement_of(Origin(xyz=(x, y, z), rpy=(roll, pitch, yaw)))
+    )

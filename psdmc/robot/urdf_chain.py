@@ -3,70 +3,63 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psdmc.errors import InputError
 from psdmc.reproducible import times
 from psdmc.robot.draft import BASE, Draft, Snap
 from psdmc.robot.inertia import physical_fault
-from psdmc.robot.joints import URDF_TYPES, JointType
-from psdmc.robot.limits import shown
+from psdmc.robot.joints import FREE, URDF_TYPES, JointType
+from psdmc.robot.limits import listed, shown
+from psdmc.robot.load_options import LoadOptions
 from psdmc.robot.lock import held_positions, locked
 from psdmc.robot.mechanism import BASE as ON_BASE
-from psdmc.robot.mechanism import Array, Joint, NamedFrame, Placement
+from psdmc.robot.mechanism import Array, Joint, Limits, NamedFrame, Placement
 from psdmc.robot.mimic import mimic_coordinates
 from psdmc.robot.missing_inertia import judged_bodies
-from psdmc.robot.right_angles import coarse_right_angles
+from psdmc.robot.names import free_name
 from psdmc.robot.snap import (
     ROUNDING,
     angle_between,
+    coarse_right_angles,
     link_rotation,
     snap_axis,
     snap_rotation,
     snap_translation,
 )
-from psdmc.robot.tree import Route, find_route, listed
-from psdmc.robot.urdf import UrdfJoint, UrdfRobot, read_urdf
+from psdmc.robot.tree import Route, find_route
+from psdmc.robot.urdf import Origin, UrdfJoint, UrdfRobot, read_urdf
 from psdmc.robot.urdf_bodies import bodies_of, hold_against_pinocchio, merged_parameters, place_of
-from psdmc.robot.urdf_floating import on_free_root
-from psdmc.robot.urdf_frames import urdf_frames
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2 in the root frame, as in Pinocchio."""
 
 ALONG_Z = (0.0, 0.0, 1.0)
 
-NO_LOCK: Mapping[str, float] = {}
 
-
-def urdf_draft(
-    text: str,
-    source: str,
-    base: str | None,
-    tip: str | None,
-    gravity: Array | None,
-    snap: float,
-    frames: Sequence[str] = (),
-    lock: Mapping[str, float] = NO_LOCK,
-    floating: bool = False,
-    unknown: Sequence[str] = (),
-) -> Draft:
-    """The chain from base to tip, or the whole tree (find_route); gravity in the root frame; rotations near exact ones
-    snapped (rad); the links `frames` as named frames, a tree's ends where none are named; the joints `lock` held;
-    `floating`: the root link on a free joint; `unknown`: links whose inertia is unknown, whatever the file says."""
+def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
+    """The chain from base to tip, or the whole tree (find_route), with gravity in the root frame, rotations near exact ones
+    snapped, joints locked, the root freed and inertias unknown as the options say. A tree's ends are its named frames
+    where none are named."""
+    snap, frames = options.snap, options.frames
     read = read_urdf(text, source)
-    robot = locked(read, lock, source)
-    if floating:
+    robot = locked(read, options.lock, source)
+    if options.floating:
         robot = on_free_root(robot)
-    route = find_route(robot, base, tip, source, frames)
+    route = find_route(robot, options.base, options.tip, source, frames)
     placed = _placed(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)
-    root_gravity = np.array(STANDARD_GRAVITY) if gravity is None else gravity
+    root_gravity = np.array(STANDARD_GRAVITY if options.gravity is None else options.gravity)
     bodies = merged_parameters(robot, route)
-    hold_against_pinocchio(robot, route, bodies, text, source, held_positions(read, lock, source))
-    found = judged_bodies(robot, route, bodies_of(robot, route.movable), bodies, unknown, source)
+    hold_against_pinocchio(robot, route, bodies, text, source, held_positions(read, options.lock, source))
+    found = judged_bodies(robot, route, bodies_of(robot, route.movable), bodies, options.unknown, source)
+    springy = [joint.name for joint in route.movable if joint.has_dynamics]
+    unmodelled = (
+        [f"<dynamics> (damping, friction) of joints is not modelled: {listed(springy)}"] if springy else []
+    )
     return Draft(
         name=robot.name,
         convention="urdf",
@@ -84,7 +77,7 @@ def urdf_draft(
             *route.notes,
             *found.notes,
             *_of_several_coordinates(route),
-            *_unmodelled(route),
+            *unmodelled,
             *coarse_right_angles(
                 {j.name: j.origin.rpy for j in route.path if j.origin.quaternion is None}, snap
             ),
@@ -140,7 +133,7 @@ def _placed(route: Route, snap: float) -> _Placed:
         link = Placement(link_rotation(axis), np.zeros(3))
         where = f"joint '{joint.name}', merged"
         placement = merged_placement(at @ link.inverse(), where, snap, turned, n, reach)
-        joints.append(movable_joint(joint, placement, link))
+        joints.append(Joint(joint.name, joint.child, _kind(joint), placement, link, joint.limits))
         parents.append(outer.body)
         snaps += [replace(one, segment=n) for one in turned]
         ways[joint.child] = _Way(n, link)
@@ -157,11 +150,6 @@ def _reach(route: Route) -> float:
     for joint in route.path:
         far[joint.child] = far[joint.parent] + math.hypot(*joint.origin.xyz)
     return max(far.values())
-
-
-def movable_joint(joint: UrdfJoint, placement: Placement, link: Placement) -> Joint:
-    """The joint with its child link, whose frame sits at `link` in the joint frame."""
-    return Joint(joint.name, joint.child, _kind(joint), placement, link, joint.limits)
 
 
 def _kind(joint: UrdfJoint) -> JointType:
@@ -209,13 +197,6 @@ def _of_several_coordinates(route: Route) -> list[str]:
     ]
 
 
-def _unmodelled(route: Route) -> list[str]:
-    """A note that names the chain's joints with friction, damping or springs, which the model of rigid bodies leaves
-    out."""
-    names = [joint.name for joint in route.movable if joint.has_dynamics]
-    return [f"<dynamics> (damping, friction) of joints is not modelled: {listed(names)}"] if names else []
-
-
 def _faults(robot: UrdfRobot) -> list[str]:
     """A note for each link whose inertia no body could have."""
     notes = []
@@ -226,3 +207,102 @@ def _faults(robot: UrdfRobot) -> list[str]:
         if fault:
             notes.append(f"link '{link}': {fault}: not physical")
     return notes
+
+
+# A root link on a free joint, and links as named frames.
+ROOT_JOINT = "root_joint"
+"""Pinocchio's name of the free joint; more underscores follow where a joint of the file is called so."""
+
+WORLD = "universe"
+"""Pinocchio's name of what the free joint hangs on; more underscores follow where a link of the file is called so."""
+
+
+def on_free_root(robot: UrdfRobot) -> UrdfRobot:
+    """The robot with its root link on a free joint, whose frames are the world's and the root link's own."""
+    name = free_name(ROOT_JOINT, {joint.name for joint in robot.joints})
+    world = free_name(WORLD, set(robot.inertials))
+    free = UrdfJoint(
+        name=name,
+        type=FREE.urdf_words[0],
+        parent=world,
+        child=robot.root,
+        origin=Origin(),
+        axis=(0.0, 0.0, 1.0),
+        limits=Limits(),
+        mimic=None,
+        has_dynamics=False,
+    )
+    return replace(
+        robot,
+        root=world,
+        inertials={world: None, **robot.inertials},
+        joints=(free, *robot.joints),
+        free_root=name,
+    )
+
+
+def urdf_frames(
+    robot: UrdfRobot,
+    route: Route,
+    joints: Sequence[Joint],
+    tip: NamedFrame,
+    names: Iterable[str],
+    source: str,
+) -> tuple[NamedFrame, ...]:
+    """The named links, placed by the file's own numbers; the tip as in the chain.
+
+    InputError where a link does not exist, does not move, or is not rigidly on one of the chain's links.
+    """
+    carriers = {joint.name: number for number, joint in enumerate(joints)}
+    return tuple(
+        tip if name == tip.name else _frame_on(robot, route, joints, carriers, name, source) for name in names
+    )
+
+
+def _frame_on(
+    robot: UrdfRobot, route: Route, joints: Sequence[Joint], carriers: dict[str, int], name: str, source: str
+) -> NamedFrame:
+    if name not in robot.inertials:
+        raise InputError(
+            f"{source}: frame {shown(name)} is no link of the file",
+            f"links that can be frames: {listed(_rigid(robot, carriers))}",
+        )
+    fixed, carrier = _carried_by(robot, name)
+    if carrier is None:
+        raise InputError(
+            f"{source}: frame {shown(name)} is fixed to the root: no joint moves it",
+            f"links that can be frames: {listed(_rigid(robot, carriers))}",
+        )
+    if carrier.name not in carriers:
+        above = carrier in route.to_base
+        where = "above the base" if above else f"not between '{route.base}' and the tip '{route.tip}'"
+        raise InputError(
+            f"{source}: frame {shown(name)} moves with joint '{carrier.name}', which is {where}: it is on no link of the "
+            "chain",
+            f"choose another --tip or --base, or one of {listed(_rigid(robot, carriers))}",
+        )
+    number = carriers[carrier.name]
+    place = joints[number].link_frame
+    for joint in fixed:
+        place = place @ place_of(joint)
+    return NamedFrame(name, number, place)
+
+
+def _carried_by(robot: UrdfRobot, link: str) -> tuple[list[UrdfJoint], UrdfJoint | None]:
+    """Fixed joints from the link that a joint moves down to this link, and that joint; None at the root."""
+    above = {joint.child: joint for joint in robot.joints}
+    fixed: list[UrdfJoint] = []
+    while link in above and not above[link].is_movable:
+        fixed.append(above[link])
+        link = above[link].parent
+    return fixed[::-1], above.get(link)
+
+
+def _rigid(robot: UrdfRobot, carriers: dict[str, int]) -> list[str]:
+    """The links that may be frames."""
+    found = []
+    for link in robot.inertials:
+        _, carrier = _carried_by(robot, link)
+        if carrier is not None and carrier.name in carriers:
+            found.append(link)
+    return found

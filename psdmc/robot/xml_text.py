@@ -105,7 +105,11 @@ def numbers(
     finite = [value for value in values if value is not None]
     if len(finite) != len(values) or len(values) != len(default):
         wanted = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers"
-        long = f" of at most {MAX_CHARACTERS} characters" if _is_long(text) else ""
+        long = (
+            f" of at most {MAX_CHARACTERS} characters"
+            if any(len(word) > MAX_CHARACTERS for word in words(text))
+            else ""
+        )
         raise ValueError(f"{written}, expected {wanted}{long}")
     for value in finite:
         fault = accepted.fault(value)
@@ -131,10 +135,6 @@ def required_number(element: Element | None, tag: str, attribute: str, accepted:
     if element.get(attribute) is None:
         raise ValueError(f"<{tag}> has no {attribute}")
     return number(element, attribute, math.nan, accepted)
-
-
-def _is_long(text: str) -> bool:
-    return any(len(word) > MAX_CHARACTERS for word in words(text))
 
 
 def _quoted(text: str) -> str:

@@ -7,14 +7,15 @@ import os
 import re
 import shlex
 import shutil
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from psdmc.atomic import make_folder, refuse_foreign_folder, system_errors_at
 from psdmc.backends.own_files import edited_files
 from psdmc.errors import InputError, ToolchainError
-from psdmc.progress import Progress, silent
-from psdmc.toolchain.build_progress import told
+from psdmc.progress import Progress, Step, silent
 from psdmc.toolchain.compiler_command import attempt, failure, find_compiler, run
 
 FAILED = ": FAILED"
@@ -47,15 +48,16 @@ def build_package(directory: str | Path, edited: bool = False, progress: Progres
     for tool in ("cmake", "make"):
         if shutil.which(tool):
             if tool == "cmake":
-                _check_name(root)
-            with _own_build(build), told(build, _files(root), progress):
+                path = Path(os.path.abspath(root))
+                found = NOT_FOR_CMAKE.search(path.as_posix().removeprefix(path.drive))
+                if found:
+                    raise InputError(
+                        f"{root}: CMake cannot take {found[0]!r} in a folder's path",
+                        "move the package to a folder without it, or build it with make in the package's folder",
+                    )
+            with _own_build(build), told(build, len(list((root / "src").glob("*.c"))) + 1, progress):
                 return _with_cmake(root) if tool == "cmake" else _with_make(root, compiler)
     raise ToolchainError("neither cmake nor make was found", "install one (Debian: apt install cmake)")
-
-
-def _files(root: Path) -> int:
-    """How many files a build compiles: the sources and the self-test."""
-    return len(list((root / "src").glob("*.c"))) + 1
 
 
 def _check_files(root: Path, edited: bool) -> None:
@@ -70,17 +72,6 @@ def _check_files(root: Path, edited: bool) -> None:
         raise InputError(
             f"{root}: not as emit-c wrote it: {', '.join(found[:3])}{' ...' if len(found) > 3 else ''}",
             "emit it again, or build it all the same with --edited",
-        )
-
-
-def _check_name(root: Path) -> None:
-    """InputError where CMake cannot take the folder's path."""
-    path = Path(os.path.abspath(root))
-    found = NOT_FOR_CMAKE.search(path.as_posix().removeprefix(path.drive))
-    if found:
-        raise InputError(
-            f"{root}: CMake cannot take {found[0]!r} in a folder's path",
-            "move the package to a folder without it, or build it with make in the package's folder",
         )
 
 
@@ -122,7 +113,8 @@ def _self_test(words: list[str], root: Path) -> str:
     done = attempt(words, str(root))
     if done.returncode == 0:
         return done.stdout
-    failed = failed_checks(done.stdout)
+    lines = (re.sub(r"^\d+: ", "", line.strip()) for line in done.stdout.splitlines())
+    failed = list(dict.fromkeys(line.removesuffix(FAILED) for line in lines if line.endswith(FAILED)))
     if not failed:
         raise failure(words, str(root), done)
     first = "; ".join(failed[:SHOWN]) + ("; ..." if len(failed) > SHOWN else "")
@@ -140,7 +132,42 @@ def checks_of(report: str) -> str:
     return found[-1] if found else "nothing to check"
 
 
-def failed_checks(report: str) -> list[str]:
-    """The failed checks of a self-test's report, each once: ctest numbers its lines, and repeats them."""
-    lines = (re.sub(r"^\d+: ", "", line.strip()) for line in report.splitlines())
-    return list(dict.fromkeys(line.removesuffix(FAILED) for line in lines if line.endswith(FAILED)))
+# How far a build is, by the object files that have come into its folder.
+TICK = 0.25
+"""s between two looks."""
+
+OBJECTS = ("*.o", "*.obj")
+
+FOLDERS = ("src", "test")
+"""Of a package, as CMake names them in its build folder: objects elsewhere are of CMake's own trials."""
+
+
+@contextmanager
+def told(build: Path, files: int, progress: Progress) -> Iterator[None]:
+    """Tell `progress` of the share of `files` object files that have come below `build`, until the block ends.
+
+    A compiler says nothing while it works: without this a build would be one step, however long. Files of an earlier
+    build are there from the beginning, and then the time left is not known.
+    """
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.wait(TICK):
+            progress(_step(build, files))
+
+    progress(_step(build, files))
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        done.set()
+        watcher.join()
+
+
+def _step(build: Path, files: int) -> Step:
+    count = 0
+    with suppress(OSError):  # a folder that the build takes away at this moment
+        found = [path.parent for pattern in OBJECTS for path in build.rglob(pattern)]
+        count = min(files, sum(1 for folder in found if folder == build or folder.name in FOLDERS))
+    return Step(f"building: {count} of {files} files", count / max(files, 1))

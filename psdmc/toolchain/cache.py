@@ -8,20 +8,32 @@ the same entry, each in a folder of its own that it renames into place: the late
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
 import shutil
 import sys
 import sysconfig
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from psdmc.atomic import can_lock, lock, unlock
 from psdmc.errors import ToolchainError
-from psdmc.toolchain.cache_entry import is_sound, seal, touch
-from psdmc.toolchain.cache_place import cache_limit, open_cache, unusable
-from psdmc.toolchain.cache_room import hold, make_room, new_folder, remove, sweep
-from psdmc.toolchain.cache_turns import turn
+from psdmc.toolchain.cache_room import (
+    cache_limit,
+    hold,
+    is_sound,
+    make_room,
+    new_folder,
+    open_cache,
+    remove,
+    seal,
+    sweep,
+    touch,
+    unusable,
+)
 
 
 def cache_key(files: Mapping[str, str], parts: Sequence[str]) -> str:
@@ -54,7 +66,19 @@ def cached(key: str, build: Callable[[Path], None], products: Sequence[str] = ()
             if is_sound(final):  # made by another process meanwhile
                 touch(final)
                 return final
-            _build(place, final, build, products)
+            handle, own = new_folder(place)
+            try:
+                build(own)
+                for product in products:
+                    if not (own / product).is_file() or not (own / product).stat().st_size:
+                        raise ToolchainError(
+                            f"the compiler made no {product}", "set CC to a C compiler, or unset it"
+                        )
+                seal(own)
+                _install(own, final)
+            finally:
+                shutil.rmtree(own, ignore_errors=True)
+                os.close(handle)
         make_room(place, final, limit)
     except OSError as error:
         raise unusable(place, error) from error
@@ -70,20 +94,6 @@ def found(key: str) -> Path | None:
     return final
 
 
-def _build(place: Path, final: Path, build: Callable[[Path], None], products: Sequence[str]) -> None:
-    handle, own = new_folder(place)
-    try:
-        build(own)
-        for product in products:
-            if not (own / product).is_file() or not (own / product).stat().st_size:
-                raise ToolchainError(f"the compiler made no {product}", "set CC to a C compiler, or unset it")
-        seal(own)
-        _install(own, final)
-    finally:
-        shutil.rmtree(own, ignore_errors=True)
-        os.close(handle)
-
-
 def _install(own: Path, final: Path) -> None:
     """Move a folder into place, over a damaged or foreign one; a sound entry of another process stays."""
     with hold(final.parent):
@@ -92,3 +102,44 @@ def _install(own: Path, final: Path) -> None:
         if os.path.lexists(final):
             remove(final)
         own.rename(final)
+
+
+# One builder at a time for each entry: others wait for it and use what it made.
+LONGEST = 600.0
+"""Seconds that one waits for another process: as long as a run of the compiler may take. Then one builds beside it."""
+BETWEEN = 0.02
+"""Seconds between two looks."""
+
+
+@contextlib.contextmanager
+def turn(place: Path, key: str) -> Iterator[None]:
+    """Hold the only right to build an entry, waiting for the process or thread that has it.
+
+    The lock is given back explicitly: a process that was forked meanwhile has a copy of the handle, which would keep it.
+    Where the file system has no locks, no process waits.
+    """
+    path = place / f".turn-{key[:16]}"
+    handle = _taken(path)
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        unlock(handle)
+        os.close(handle)
+
+
+def _taken(path: Path) -> int:
+    """The lock file, open and locked. A file that was removed before it was locked excludes no other process: it is made
+    and locked again."""
+    until = time.monotonic() + LONGEST
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+        if not can_lock(handle):
+            return handle
+        while not lock(handle, wait=False):
+            if time.monotonic() > until:
+                return handle
+            time.sleep(BETWEEN)
+        if os.fstat(handle).st_nlink:
+            return handle
+        os.close(handle)

@@ -4,19 +4,22 @@ removed."""
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
 import re
 import secrets
 import shutil
+import stat
 import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from psdmc.atomic import lock
-from psdmc.toolchain.cache_entry import used_and_size
-from psdmc.toolchain.cache_place import cache_directory, cache_limit, check_place, unusable
+from psdmc.errors import InputError, ToolchainError
 
 IN_USE = 600.0
 """Seconds after its last use during which an entry is kept whatever the limit: a process may be about to open it."""
@@ -136,18 +139,195 @@ def _entries(place: Path) -> list[tuple[float, int, Path]]:
     return known
 
 
-def _removed(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
-
-
 def _remove_if_dead(folder: Path) -> None:
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
         try:
             if lock(handle, wait=False):
-                _removed(folder)
+                if folder.is_dir() and not folder.is_symlink():
+                    shutil.rmtree(folder, ignore_errors=True)
+                else:
+                    folder.unlink(missing_ok=True)
         finally:
             os.close(handle)
+
+
+# Entries: a folder each, with the digests of its files, used only while they agree.
+SEAL = "entry.json"
+"""Lists an entry's files with their SHA-256; its time is that of the entry's last use."""
+
+_PLAIN = re.compile(r"[\w-][\w.-]*")
+"""A file's name without a folder: most are."""
+
+LARGEST_SEAL = 1 << 20
+"""Bytes; a six-joint arm's has 6 kB."""
+
+
+def seal(folder: Path) -> None:
+    """List every file with its digest, and make all of them writable by nobody but this user."""
+    files: dict[str, str] = {}
+    size = 0
+    for path in sorted(folder.rglob("*")):
+        if path.is_symlink():
+            continue
+        path.chmod(path.stat().st_mode & ~0o022)
+        if path.is_file():
+            files[str(path.relative_to(folder))] = _digest(path)
+            size += path.stat().st_size
+    text = json.dumps({"files": files, "bytes": size}, indent=1) + "\n"
+    (folder / SEAL).write_text(text, encoding="utf-8")
+    (folder / SEAL).chmod(0o600)
+
+
+def is_sound(folder: Path) -> bool:
+    """Whether an entry is complete, unaltered and writable by this user alone, and so safe to open."""
+    try:
+        if not _is_own(folder, stat.S_ISDIR):
+            return False
+        files = _seal_of(folder)[0]["files"]
+        return bool(files) and all(
+            _is_own(folder / name, stat.S_ISREG) and _digest(folder / name) == value
+            for name, value in files.items()
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return False
+
+
+def touch(folder: Path) -> None:
+    """Note that an entry was used now; ignored where the cache cannot be written."""
+    with contextlib.suppress(OSError):
+        os.utime(folder / SEAL)
+
+
+def used_and_size(folder: Path) -> tuple[float, int]:
+    """When an entry was last used (s since 1970) and its bytes; for one without seal, when it was made."""
+    try:
+        content, used = _seal_of(folder)
+        return used, int(content["bytes"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        sizes = (Path(top, name).lstat().st_size for top, _, names in os.walk(folder) for name in names)
+        return folder.lstat().st_mtime, sum(sizes)
+
+
+def _is_own(path: Path, kind: object) -> bool:
+    """Whether the path is a file or folder of that kind, no link, that no other user may write."""
+    status = path.lstat()
+    return bool(kind(status.st_mode)) and is_private(status)  # type: ignore[operator]
+
+
+def _seal_of(folder: Path) -> tuple[dict[str, Any], float]:
+    """A seal's content, and when the entry was last used. A cache has thousands, all read at each build: paths are texts."""
+    path = os.path.join(folder, SEAL)
+    status = os.lstat(path)
+    if not stat.S_ISREG(status.st_mode) or not is_private(status) or status.st_size > LARGEST_SEAL:
+        raise ValueError(f"{path} is no seal")
+    with open(path, "rb", buffering=0) as stream:
+        content = json.loads(stream.read())
+    if any(map(_is_elsewhere, content["files"])):
+        raise ValueError(f"{path} names files elsewhere")
+    return dict(content), status.st_mtime
+
+
+def _is_elsewhere(name: str) -> bool:
+    """Whether a name leads out of the folder."""
+    if _PLAIN.fullmatch(name):
+        return False
+    path = Path(name)
+    return path.is_absolute() or ".." in path.parts
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+# Libraries in it run inside the caller's process. Only folders and files that belong to this user or to root, and that no
+# other user may write, are used.
+VARIABLE = "PSDMC_CACHE_DIR"
+SIZE_VARIABLE = "PSDMC_CACHE_SIZE"
+DEFAULT_SIZE = "1G"
+"""Some 500 six-joint arms with all functions."""
+
+_UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
+_OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def cache_directory() -> Path:
+    """PSDMC_CACHE_DIR, else the platform's place for caches, as an absolute path; ToolchainError where neither is
+    known."""
+    chosen = os.environ.get(VARIABLE)
+    if chosen:
+        return Path(os.path.abspath(chosen))
+    if sys.platform == "darwin":
+        return _home() / "Library" / "Caches" / "psdmc"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or _home()) / "psdmc" / "cache"
+    below = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (below if below.is_absolute() else _home() / ".cache") / "psdmc"
+
+
+def _home() -> Path:
+    try:
+        home = Path() if os.environ.get("HOME") == "" else Path.home()
+    except RuntimeError:
+        home = Path()
+    if not home.is_absolute():
+        raise ToolchainError("no home folder for the compile cache: HOME is not set", _choose())
+    return home
+
+
+def cache_limit() -> int:
+    """Bytes that PSDMC_CACHE_SIZE allows: a number, or one with K, M, G or T; InputError where it is neither."""
+    text = os.environ.get(SIZE_VARIABLE) or DEFAULT_SIZE
+    found = re.fullmatch(r"([0-9]{1,12})([KMGT]?)", text.strip().upper())
+    if found is None:
+        raise InputError(f"{SIZE_VARIABLE} is {text!r}", "give bytes, or a number with K, M, G or T: 500M")
+    return int(found[1]) * _UNITS[found[2]]
+
+
+def open_cache() -> Path:
+    """The cache's folder, made where it is missing; ToolchainError where it cannot be made or other users could write
+    into it."""
+    place = cache_directory()
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.mkdir(mode=0o700, exist_ok=True)
+        check_place(place)
+    except OSError as error:
+        raise unusable(place, error) from error
+    return place
+
+
+def check_place(place: Path) -> None:
+    """ToolchainError where other users own the cache's folder, may write it, or may replace it."""
+    resolved = Path(os.path.realpath(place))
+    status = resolved.stat()
+    if not is_private(status):
+        owner = "" if _is_ours(status) else f" belongs to user {status.st_uid} and"
+        hint = f"{_choose()}, or: chmod go-w {place}" if _is_ours(status) else _choose()
+        what = "could hold libraries of theirs" if owner else "may be written by other users"
+        raise ToolchainError(f"{place}: not used as compile cache: it{owner} {what}", hint)
+    for folder in resolved.parents:
+        mode = folder.stat().st_mode
+        if os.name == "posix" and mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+            raise ToolchainError(
+                f"{place}: not used as compile cache: everybody may rename folders in {folder}", _choose()
+            )
+
+
+def is_private(status: os.stat_result) -> bool:
+    """Whether a file or folder belongs to this user or root, and no other user may write it."""
+    return os.name != "posix" or (_is_ours(status) and not status.st_mode & _OTHERS_MAY_WRITE)
+
+
+def _is_ours(status: os.stat_result) -> bool:
+    return sys.platform == "win32" or status.st_uid in (0, os.geteuid())
+
+
+def unusable(place: Path, error: OSError) -> ToolchainError:
+    """The error for a cache folder that cannot be written to."""
+    return ToolchainError(f"{place}: cannot write to the compile cache: {error.strerror or error}", _choose())
+
+
+def _choose() -> str:
+    return f"set {VARIABLE} to a folder of yours"

@@ -6,7 +6,6 @@ Type checkers and editors read the methods' types from call.pyi, which `python -
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from types import GenericAlias, MethodType
 from typing import Any
 
@@ -17,8 +16,6 @@ from psdmc.program.signature import Q, Signature
 from psdmc.toolchain.call_arguments import bound_arguments, signature_of
 from psdmc.toolchain.compiled_functions import CompiledFunctions, results
 from psdmc.toolchain.direct_calls import MOST_ARRAYS, MOST_UNITS, direct_calls
-from psdmc.toolchain.interface import Interface
-from psdmc.toolchain.origin import Origin
 from psdmc.toolchain.stubs import documentation
 
 
@@ -37,16 +34,6 @@ class CompiledRobot(CompiledFunctions):
     contiguous, of the robot's dtype and of one leading shape, and about 10 us more otherwise. Without Python's C headers,
     every call takes 10 us more.
     """
-
-    def __init__(
-        self,
-        interface: Interface,
-        library: Path,
-        more: Callable[[str], CompiledFunctions] | None = None,
-        origin: Origin | None = None,
-    ) -> None:
-        super().__init__(interface, library, more, origin)
-        self._bind(self)
 
     def _bind(self, compiled: CompiledFunctions) -> None:
         """Put a direct call in the place of each method whose kernel this library has."""

@@ -1,14 +1,81 @@
-"""Emitted sources -> a shared library, compiled once per content."""
+"""Compiled libraries with their interfaces kept in the compile cache: an equal call of `compile` only opens one."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
+from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
+
+import numpy as np
 
 from psdmc.backends.c.package import PackageView
 from psdmc.backends.c.package_files import library_files
-from psdmc.toolchain.cache import cache_key, cached
+from psdmc.errors import InternalError, ToolchainError
+from psdmc.functions import SIGNATURES
+from psdmc.program.kernel import Kernel
+from psdmc.program.kernel_json import kernels_from_json, kernels_to_json
+from psdmc.target.native import NATIVE
+from psdmc.target.target import Target
+from psdmc.toolchain.cache import cache_key, cached, found
 from psdmc.toolchain.compiler_command import Compiler, find_compiler, run
+from psdmc.toolchain.interface import Interface, interface_from_json, interface_of, interface_to_json
+from psdmc.version import psdmc_version
+
+INTERFACE = "interface.json"
+
+
+def compiled_once(
+    parts: Sequence[str], make: Callable[[], PackageView], target: Target = NATIVE
+) -> tuple[Interface, Path]:
+    """Interface and shared library of the package that `make` returns, from the cache where an equal call was made
+    before.
+
+    parts   all that the package depends on besides psdmc's own sources: the model's hash, the options
+    target  the package's
+
+    Raises what `make` and `compile_library` raise. An interface whose library is missing or altered is not used.
+    """
+    made: list[tuple[Interface, Path]] = []
+
+    def build(folder: Path) -> None:
+        package = make()
+        library = compile_library(package)
+        made.append((interface_of(package), library))
+        (folder / INTERFACE).write_text(interface_to_json(made[0][0], library.parent.name), encoding="utf-8")
+
+    decides = (*sources_digests(), *_emission(), *find_compiler(target).identity, repr(target), *parts)
+    key = cache_key({}, ("interface", *decides))
+    entry = cached(key, build, [INTERFACE])
+    return made[0] if made else _opened(entry) or _made(make())
+
+
+@cache
+def _emission() -> tuple[str, ...]:
+    """psdmc's version and the digest of the files that turn kernels into C and C into a library."""
+    from importlib.metadata import version  # here: emission, which compiles nothing, does not wait for it
+
+    root = resources.files("psdmc")
+    files = digest([root / "backends", root / "toolchain", resources.files("psdmc.templates")])
+    return (psdmc_version(), version("jinja2"), files)
+
+
+def _opened(entry: Path) -> tuple[Interface, Path] | None:
+    """The contents of an entry; None where it cannot be read or its library is missing."""
+    try:
+        interface, key = interface_from_json((entry / INTERFACE).read_text(encoding="utf-8"))
+    except (InternalError, OSError, UnicodeDecodeError):
+        return None
+    folder = found(key)
+    return None if folder is None else (interface, folder / LIBRARY)
+
+
+def _made(package: PackageView) -> tuple[Interface, Path]:
+    return interface_of(package), compile_library(package)
+
 
 LIBRARY = "library.so"
 
@@ -31,8 +98,17 @@ def _build(package: PackageView, files: dict[str, str], compiler: Compiler, fold
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8", newline="\n")
-    commands = [_compile_command(compiler, source) for source in package.sources]
-    _run_all(commands, package.robot, folder)
+    commands = [
+        [*compiler.command, "-std=c99", *compiler.flags, "-Iinclude", "-c", source, "-o", _object(source)]
+        for source in package.sources
+    ]
+    from concurrent.futures import ThreadPoolExecutor  # here: who compiles nothing does not wait for it
+
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
+        list(pool.map(lambda words: run(words, package.robot, str(folder)), commands))
+    finally:
+        pool.shutdown(cancel_futures=True)
     objects = [_object(source) for source in package.sources]
     link = [*compiler.command, "-shared", "-o", LIBRARY, *objects, "-lm"]
     run(link, package.robot, str(folder))
@@ -40,20 +116,57 @@ def _build(package: PackageView, files: dict[str, str], compiler: Compiler, fold
         (folder / name).unlink(missing_ok=True)
 
 
-def _run_all(commands: list[list[str]], robot: str, folder: Path) -> None:
-    """Run the commands, several at a time; after an error or Ctrl-C no further one is started."""
-    from concurrent.futures import ThreadPoolExecutor  # here: who compiles nothing does not wait for it
-
-    pool = ThreadPoolExecutor(os.cpu_count())
-    try:
-        list(pool.map(lambda words: run(words, robot, str(folder)), commands))
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _compile_command(compiler: Compiler, source: str) -> list[str]:
-    return [*compiler.command, "-std=c99", *compiler.flags, "-Iinclude", "-c", source, "-o", _object(source)]
-
-
 def _object(source: str) -> str:
     return source.removesuffix(".c") + ".o"
+
+
+KERNELS = "kernels.json"
+
+DECIDES = ("dynamics", "functions", "lower", "model", "program", "recipes", "robot", "target")
+"""Folders of psdmc whose files the result of a lowering depends on, beside the modules at psdmc's top level."""
+
+
+def lowered_once(parts: Sequence[str], lower: Callable[[], dict[str, Kernel]]) -> dict[str, Kernel]:
+    """The kernels that `lower` returns, from the compile cache where an equal call was made before.
+
+    parts  all that the result depends on besides psdmc's own sources: the model's hash, the options
+
+    Where the cache cannot be used, `lower` is called and nothing is kept.
+    """
+    made: dict[str, Kernel] = {}
+
+    def build(folder: Path) -> None:
+        made.update(lower())
+        (folder / KERNELS).write_text(kernels_to_json(made), encoding="utf-8")
+
+    key = cache_key({}, ("kernels", *sources_digests(), *parts))
+    try:
+        kept = cached(key, build, [KERNELS]) / KERNELS
+        return made or kernels_from_json(kept.read_text(encoding="utf-8"), SIGNATURES)
+    except (ToolchainError, InternalError, OSError):
+        return made or lower()
+
+
+@cache
+def sources_digests() -> tuple[str, ...]:
+    """NumPy's version and the digest of the files that lowering runs, so that an edited psdmc lowers again."""
+    root = resources.files("psdmc")
+    modules = [file for file in root.iterdir() if file.name.endswith(".py")]
+    return (np.__version__, digest([*modules, *(root / folder for folder in DECIDES)]))
+
+
+def digest(places: Iterable[Traversable]) -> str:
+    """SHA-256 of the names and contents of these files, and of all files in these folders and the folders within them."""
+    found = hashlib.sha256()
+    for name, content in _files("", places):
+        found.update(repr((name, content)).encode())
+    return found.hexdigest()
+
+
+def _files(within: str, places: Iterable[Traversable]) -> Iterator[tuple[str, bytes]]:
+    for place in sorted(places, key=lambda place: place.name):
+        name = f"{within}/{place.name}"
+        if place.is_file():
+            yield name, place.read_bytes()
+        elif place.name != "__pycache__":
+            yield from _files(name, place.iterdir())

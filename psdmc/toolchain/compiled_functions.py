@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
+from html import escape
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import cffi
 import numpy as np
@@ -16,13 +17,148 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.errors import InputError, ToolchainError
 from psdmc.program.signature import Signature
-from psdmc.toolchain import given_outputs
-from psdmc.toolchain.call_arguments import RobotAxes, common_lead, parameters, states
-from psdmc.toolchain.interface import Interface, batch_symbol
+from psdmc.toolchain.call_arguments import (
+    RobotAxes,
+    checked_outputs,
+    common_lead,
+    parameters,
+    states,
+    takes_results,
+)
+from psdmc.toolchain.interface import Interface, Origin, batch_symbol
 from psdmc.toolchain.labelled_arrays import foreign, is_foreign, refuse_out
-from psdmc.toolchain.origin import Origin
-from psdmc.toolchain.robot_facts import RobotFacts
 from psdmc.toolchain.stubs import result_name
+
+MOST_NAMES = 8
+"""Names that a repr lists."""
+
+Vector = NDArray[np.float64]
+
+
+class JointLimits(NamedTuple):
+    """Limits of n joints as (n,) arrays, in rad or m and their rates, N m or N; infinite where the robot's file has none."""
+
+    lower: Vector
+    upper: Vector
+    speed: Vector
+    acceleration: Vector
+    effort: Vector
+
+
+class RobotFacts:
+    """Names, sizes, limits and parameters of a compiled robot with n joints and l base parameters."""
+
+    def __init__(self, interface: Interface) -> None:
+        self._interface = interface
+
+    @property
+    def name(self) -> str:
+        """Return the name of the robot in C, with which the names of its C functions begin."""
+        return self._interface.robot
+
+    @property
+    def n(self) -> int:
+        """Return the number of joints; mimic joints, which follow another joint, are not counted."""
+        return self._interface.n
+
+    @property
+    def nq(self) -> int:
+        """Return the length of q: the joint positions, with four entries for a quaternion."""
+        return self._interface.nq
+
+    @property
+    def nv(self) -> int:
+        """Return the length of qd, qdd and tau: the number of joint rates."""
+        return self._interface.nv
+
+    @property
+    def l(self) -> int:  # noqa: E743  the paper's letter
+        """Return the number of base parameters, the length of theta_b."""
+        return self._interface.l
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Return the names of the n joints, from base to tip."""
+        return self._interface.joint_names
+
+    @property
+    def q_names(self) -> tuple[str, ...]:
+        """Return the names of the nq entries of q, such as 'elbow', or 'root_joint.x' if a joint has several entries."""
+        return self._interface.q_names
+
+    @property
+    def v_names(self) -> tuple[str, ...]:
+        """Return the names of the nv entries of rates, accelerations and torques, such as 'elbow' or 'root_joint.vx'."""
+        return self._interface.v_names
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Return the names of the frames for poses, Jacobians and wrenches, in the order of the results."""
+        return self._interface.frame_names
+
+    @property
+    def dtype(self) -> np.dtype[np.float64] | np.dtype[np.float32]:
+        """Return the NumPy type of all results: float64 or float32."""
+        single, double = np.dtype(np.float32), np.dtype(np.float64)
+        return single if self._interface.dtype == "float32" else double
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """Return the names of the functions that are compiled so far, such as 'inverse_dynamics'."""
+        return tuple(dict.fromkeys(name.removesuffix("_theta") for name in self._interface.kernels))
+
+    @cached_property
+    def limits(self) -> JointLimits:
+        """Return the joint limits of the robot file, each (n,). The functions do not enforce these limits."""
+        columns = np.array(self._interface.limits, np.float64).T
+        return JointLimits(*(_frozen(column) for column in columns))
+
+    @cached_property
+    def gravity_acceleration(self) -> Vector:
+        """Return the acceleration of gravity in the code, (3,) m/s^2 in the base frame (world frame for a floating base)."""
+        return _frozen(self._interface.gravity)
+
+    @cached_property
+    def theta_b(self) -> Vector | None:
+        """Return the compiled-in base parameters, (l,), SI units; None if unknown: pass `theta_b` in each call then."""
+        values = self._interface.theta_b
+        return None if values is None else _frozen(values)
+
+    def __repr__(self) -> str:
+        return "\n  ".join([self._title, *self._facts()])
+
+    def _repr_html_(self) -> str:
+        facts = "".join(f"<li>{escape(fact)}</li>" for fact in self._facts())
+        return f"<div><p><b>{escape(self._title)}</b></p><ul>{facts}</ul></div>"
+
+    @property
+    def _title(self) -> str:
+        return f"CompiledRobot {self.name!r}: {self.n} joints, {self._interface.dtype}"
+
+    def _facts(self) -> list[str]:
+        lengths = [] if self.nq == self.nv == self.n else [f"nq = {self.nq}, nv = {self.nv}"]
+        gravity = " ".join(f"{value:g}" for value in self._interface.gravity)
+        compiled_in = "given in calls" if self._interface.theta_b is None else "compiled in"
+        return [
+            f"joints: {_listed(map(repr, self.joint_names))}",
+            *lengths,
+            f"gravity: {gravity} m/s^2 in the {self._interface.base_frame}",
+            f"l = {self.l} base parameters, {compiled_in}",
+            f"functions: {_listed(self.functions)}",
+        ]
+
+
+def _listed(names: Iterable[str]) -> str:
+    found = tuple(names)
+    more = len(found) - MOST_NAMES
+    return ", ".join(found[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _frozen(values: object) -> Vector:
+    array = np.array(values, np.float64)
+    array.setflags(write=False)
+    return array
+
 
 Array = NDArray[Any]
 
@@ -51,12 +187,18 @@ class CompiledFunctions(RobotFacts):
         self._axes = RobotAxes(interface.sizes, interface.names, interface.units)
         self._dtype = np.dtype(interface.dtype)
         self._pointer = self._ffi.typeof(f"{interface.real} *")
-        self._kernels = {name: _bound(interface, self._library, name) for name in interface.kernels}
+        self._kernels = {
+            name: _Kernel(
+                interface.kernels[name], getattr(self._library, batch_symbol(interface.robot, name))
+            )
+            for name in interface.kernels
+        }
         self._patterns = dict(interface.patterns)
         self.library = library
         self._more = more
         self._origin = origin
         self._others: list[CompiledFunctions] = []  # whose libraries stay open as long as this one's
+        self._bind(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the request that the robot was compiled for, its model included, without machine code."""
@@ -99,8 +241,8 @@ class CompiledFunctions(RobotFacts):
         if theta_b is not None:
             rows.append(parameters(function, self._sizes.l, theta_b, self._dtype))
         shapes = [lead + tail for tail in kernel.tails]
-        kept = () if out is None else given_outputs.checked(function, out, shapes, self._dtype)
-        is_direct = bool(kept) and all(given_outputs.is_direct(array, rows) for array in kept)
+        kept = () if out is None else checked_outputs(function, out, shapes, self._dtype)
+        is_direct = bool(kept) and all(takes_results(array, rows) for array in kept)
         outs = kept if is_direct else tuple(np.empty(shape, self._dtype) for shape in shapes)
         kernel.batch(math.prod(lead), *map(self._address, rows), *map(self._address, outs))
         if kept and not is_direct:
@@ -211,10 +353,6 @@ class _Kernel:
 
     tails: tuple[tuple[int, ...], ...]
     batch: Callable[..., int | None]
-
-
-def _bound(interface: Interface, library: Any, name: str) -> _Kernel:
-    return _Kernel(interface.kernels[name], getattr(library, batch_symbol(interface.robot, name)))
 
 
 @cache

@@ -57,7 +57,15 @@ def find_compiler(target: Target = NATIVE) -> Compiler:
 
 def _command(wanted: str) -> tuple[str, ...]:
     if wanted.strip():
-        return _named(wanted)
+        # The words of CC, a path among them made absolute, as compilers run in folders of their own.
+        hint = "set CC to a compiler, or unset it"
+        try:
+            program, *options = shlex.split(wanted)
+        except ValueError as error:
+            raise ToolchainError(f"C compiler {wanted!r} (from CC) is no command: {error}", hint) from None
+        if not shutil.which(program):
+            raise ToolchainError(f"C compiler {wanted!r} (from CC) was not found", hint)
+        return (os.path.abspath(program) if os.path.dirname(program) else program, *options)
     for name in CANDIDATES:
         if shutil.which(name):
             return (name,)
@@ -65,18 +73,6 @@ def _command(wanted: str) -> tuple[str, ...]:
         f"no C compiler found (looked for {', '.join(CANDIDATES)})",
         "install one (Debian: apt install gcc) or set CC",
     )
-
-
-def _named(wanted: str) -> tuple[str, ...]:
-    """The words of CC, a path among them made absolute, as compilers run in folders of their own."""
-    hint = "set CC to a compiler, or unset it"
-    try:
-        program, *options = shlex.split(wanted)
-    except ValueError as error:
-        raise ToolchainError(f"C compiler {wanted!r} (from CC) is no command: {error}", hint) from None
-    if not shutil.which(program):
-        raise ToolchainError(f"C compiler {wanted!r} (from CC) was not found", hint)
-    return (os.path.abspath(program) if os.path.dirname(program) else program, *options)
 
 
 @cache

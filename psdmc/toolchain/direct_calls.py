@@ -67,7 +67,14 @@ def _found() -> DirectCalls:
     if not (headers / "Python.h").is_file():
         return DirectCalls(None, f"no Python.h in {headers}", "apt install python3-dev")
     try:
-        return DirectCalls(_loaded(_library(headers)).DirectCall)
+        path = _library(headers)
+        loader = ExtensionFileLoader(MODULE, str(path))
+        spec = importlib.util.spec_from_file_location(MODULE, path, loader=loader)
+        if spec is None:
+            raise ImportError(f"{path} is no extension module")
+        module = importlib.util.module_from_spec(spec)
+        loader.exec_module(module)
+        return DirectCalls(module.DirectCall)
     except (ToolchainError, ImportError, OSError) as error:
         return DirectCalls(
             None, str(error), getattr(error, "hint", None) or "set CC to a compiler that works here"
@@ -78,7 +85,14 @@ def _library(headers: Path) -> Path:
     """The compiled module, from the cache or compiled now."""
     text = SOURCE.read_text(encoding="utf-8")
     compiler = find_compiler()
-    words = [*compiler.command, *FLAGS, *_platform_flags(), f"-I{headers}", f"-I{np.get_include()}"]
+    # An extension module takes Python's own functions from the process that loads it.
+    words = [
+        *compiler.command,
+        *FLAGS,
+        *(("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()),
+        f"-I{headers}",
+        f"-I{np.get_include()}",
+    ]
     parts = ("direct calls", sys.version, np.__version__, *words, *compiler.identity)
 
     def build(folder: Path) -> None:
@@ -86,18 +100,3 @@ def _library(headers: Path) -> Path:
         run([*words, SOURCE.name, "-o", PRODUCT], "direct calls", str(folder))
 
     return cached(cache_key({SOURCE.name: text}, parts), build, [PRODUCT]) / PRODUCT
-
-
-def _platform_flags() -> tuple[str, ...]:
-    """An extension module takes Python's own functions from the process that loads it."""
-    return ("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()
-
-
-def _loaded(path: Path) -> Any:
-    loader = ExtensionFileLoader(MODULE, str(path))
-    spec = importlib.util.spec_from_file_location(MODULE, path, loader=loader)
-    if spec is None:
-        raise ImportError(f"{path} is no extension module")
-    module = importlib.util.module_from_spec(spec)
-    loader.exec_module(module)
-    return module

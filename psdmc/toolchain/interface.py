@@ -8,7 +8,7 @@ rendered or parsed again.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -76,6 +76,8 @@ class Interface:
 
 def interface_of(package: PackageView) -> Interface:
     """The interface of a package's library: the batch function of each kernel."""
+    values = [parameter.value for parameter in package.info.parameters]
+    known = tuple(value for value in values if value is not None)
     return Interface(
         robot=package.robot,
         real=package.real,
@@ -92,7 +94,7 @@ def interface_of(package: PackageView) -> Interface:
         limits=tuple((j.lower, j.upper, j.speed, j.acceleration, j.effort) for j in package.info.joints),
         gravity=package.info.gravity,
         base_frame=package.info.base_frame,
-        theta_b=_known([parameter.value for parameter in package.info.parameters]),
+        theta_b=known if len(known) == len(values) else None,
         kernels={kernel.name: tuple(output.shape for output in kernel.outputs) for kernel in package.kernels},
         patterns={pattern.function: pattern.places for pattern in patterns(package.functions)},
         cdef="".join(
@@ -102,11 +104,6 @@ def interface_of(package: PackageView) -> Interface:
             if prototype.symbol == batch_symbol(package.robot, kernel.name)
         ),
     )
-
-
-def _known(values: Sequence[float | None]) -> tuple[float, ...] | None:
-    known = tuple(value for value in values if value is not None)
-    return known if len(known) == len(values) else None
 
 
 def batch_symbol(robot: str, kernel: str) -> str:
@@ -125,31 +122,43 @@ def interface_from_json(text: str) -> tuple[Interface, str]:
         whole = json.loads(text)
         if whole["format"] != FORMAT:
             raise ValueError(f"format {whole['format']}, expected {FORMAT}")
-        return _from_plain(whole["interface"]), str(whole["library"])
+        plain = whole["interface"]
+        joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
+        coordinates, rates = tuple(plain.pop("q_names")), tuple(plain.pop("v_names"))
+        units = tuple((int(start), int(stop)) for start, stop in plain.pop("units"))
+        kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
+        places = {
+            name: tuple((row, column) for row, column in own) for name, own in plain.pop("patterns").items()
+        }
+        limits, gravity = tuple(map(tuple, plain.pop("limits"))), tuple(plain.pop("gravity"))
+        values = plain.pop("theta_b")
+        found = Interface(
+            joint_names=joints,
+            q_names=coordinates,
+            v_names=rates,
+            frame_names=frames,
+            units=units,
+            limits=limits,
+            gravity=gravity,
+            theta_b=None if values is None else tuple(values),
+            kernels=kernels,
+            patterns=places,
+            **plain,
+        )
+        return found, str(whole["library"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InternalError(f"a kept interface cannot be read: {error}") from error
 
 
-def _from_plain(plain: dict[str, Any]) -> Interface:
-    joints, frames = tuple(plain.pop("joint_names")), tuple(plain.pop("frame_names"))
-    coordinates, rates = tuple(plain.pop("q_names")), tuple(plain.pop("v_names"))
-    units = tuple((int(start), int(stop)) for start, stop in plain.pop("units"))
-    kernels = {name: tuple(map(tuple, tails)) for name, tails in plain.pop("kernels").items()}
-    places = {
-        name: tuple((row, column) for row, column in own) for name, own in plain.pop("patterns").items()
-    }
-    limits, gravity = tuple(map(tuple, plain.pop("limits"))), tuple(plain.pop("gravity"))
-    values = plain.pop("theta_b")
-    return Interface(
-        joint_names=joints,
-        q_names=coordinates,
-        v_names=rates,
-        frame_names=frames,
-        units=units,
-        limits=limits,
-        gravity=gravity,
-        theta_b=None if values is None else tuple(values),
-        kernels=kernels,
-        patterns=places,
-        **plain,
-    )
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """How a compiled robot is had again.
+
+    again    importable by name; returns the robot
+    request  its argument, which can be pickled
+    key      the same for equal robots
+    """
+
+    again: Callable[[Any], Any]
+    request: Any
+    key: str

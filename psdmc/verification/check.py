@@ -18,14 +18,11 @@ from psdmc.model.random_states import states_of
 from psdmc.recipes.recipe import Needs
 from psdmc.robot.coordinates import Following
 from psdmc.robot.load import LoadedRobot
-from psdmc.robot.mechanism import Array, Mechanism
+from psdmc.robot.mechanism import BASE, Array, Mechanism, Placement
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
-from psdmc.robot.reference import Reference, pinocchio_version, reference
-from psdmc.robot.reference_followers import OnCoordinates
+from psdmc.robot.reference import OnCoordinates, Reference, pinocchio_version, reference
 from psdmc.robot.snap_bound import angles_by_segment, torque_bound
 from psdmc.verification.functions import function_errors
-from psdmc.verification.placements import chain_poses, frames_above, gravity_error, placement_errors, reach_of
-from psdmc.verification.relative_errors import NO_TORQUE, relative_error, worst
 from psdmc.verification.source import compared_parameters, require_same_robot, source_of
 
 STATES = 200
@@ -93,7 +90,7 @@ def check_model(model: DynamicsModel, source: LoadedRobot | None = None) -> tupl
     free = reference(loaded, parameters=parameters) if snapped else written
     robot = OnCoordinates.of(free, model.mechanism)
     angles = angles_by_segment(loaded.snap_report, model.n, loaded.options.snap)
-    condition = _condition(model, robot)
+    condition = float(np.linalg.cond(robot.mass_matrix(_states(model.mechanism)[0])).max())
     rows = (*_compared(model, theta, robot, condition), *_functions(model, theta, robot, condition))
     rows += _placements(model, written, angles)
     if snapped:
@@ -112,11 +109,6 @@ def readers(rows: Sequence[CheckRow]) -> str:
 def _states(robot: Mechanism) -> tuple[Array, Array, Array]:
     """q (STATES, nq), qd and qdd (STATES, nv)."""
     return states_of(robot, np.random.default_rng(SEED), STATES)
-
-
-def _condition(model: DynamicsModel, robot: OnCoordinates) -> float:
-    """The largest condition number of the mass matrix at the states that are compared."""
-    return float(np.linalg.cond(robot.mass_matrix(_states(model.mechanism)[0])).max())
 
 
 def _compared(
@@ -182,8 +174,8 @@ def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tupl
     q = Following.of(chain.coordinates, chain.types).positions(_states(model.mechanism)[0])
     links = [joint.link_name for joint in chain.joints]
     expected = written.poses(q, links)
-    above = frames_above(chain)
-    errors = placement_errors(chain_poses(chain, q), expected, above)
+    above = (*chain.parents, chain.tip_body)
+    errors = placement_errors(np.array([_poses_at(chain, row) for row in q]), expected, above)
     lever = max(1.0, written.path_length / reach_of(expected, above))
     beyond = errors - ANGLES_ACTED_ON * lever * angles[:-1]
     gravity = gravity_error(chain.gravity, written.gravity_vector) - ANGLES_ACTED_ON * angles[-1]
@@ -231,3 +223,96 @@ def _bound(robot: OnCoordinates, angles: Array, states: tuple[Array, Array, Arra
     """(nv,) what the angles can change of each coordinate's torque."""
     bound = torque_bound(robot.free, angles, *robot.on_joints(*states))
     return np.asarray(bound @ np.abs(robot.following.ratios))
+
+
+def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Array:
+    """(n + 1,) largest error of each link's pose in the one that it hangs on, and the tip's in its link.
+
+    found, expected   (k, n + 1, 4, 4), poses in the base frame
+    above             n + 1 of these that each hangs on, or BASE
+
+    The larger of the angle between (rad) and the distance between, relative to the robot's reach.
+    """
+    reach = reach_of(expected, above)
+    own, other = _in_the_one_above(found, above), _in_the_one_above(expected, above)
+    chord = np.linalg.norm((own - other)[..., :3, :3], axis=(-2, -1)) / np.sqrt(8.0)
+    angle = 2.0 * np.arcsin(np.minimum(1.0, chord))
+    distance = np.linalg.norm((own - other)[..., :3, 3], axis=-1) / reach
+    return np.asarray(np.maximum(angle, distance).max(axis=0))
+
+
+def gravity_error(found: Array, expected: Array) -> float:
+    """Distance between two vectors (3,), relative to the larger."""
+    size = max(float(np.linalg.norm(found)), float(np.linalg.norm(expected)), np.finfo(float).tiny)
+    return float(np.linalg.norm(found - expected)) / size
+
+
+def reach_of(poses: Array, above: Sequence[int]) -> float:
+    """Longest way outward over the largest distances from each frame to the next, m; one where there are none."""
+    steps = np.linalg.norm(_in_the_one_above(poses, above)[..., :3, 3], axis=-1).max(axis=0)
+    far: list[float] = []
+    for step, outer in zip(steps.tolist(), above, strict=True):
+        far.append(step + (0.0 if outer == BASE else far[outer]))
+    return max(far) or 1.0
+
+
+def _in_the_one_above(poses: Array, above: Sequence[int]) -> Array:
+    base = np.broadcast_to(np.eye(4), (len(poses), 1, 4, 4))
+    return np.linalg.inv(np.concatenate([poses, base], axis=1)[:, list(above)]) @ poses
+
+
+def _poses_at(chain: Mechanism, q: Array) -> list[Array]:
+    frames: list[Placement] = []
+    values = np.split(q, np.cumsum([kind.nq for kind in chain.types])[:-1])
+    for joint, parent, value in zip(chain.joints, chain.parents, values, strict=True):
+        before = Placement.identity() if parent == BASE else frames[parent]
+        frames.append(before @ joint.placement @ joint.type.transform(value.tolist()))
+    links = [_matrix(frame @ joint.link_frame) for frame, joint in zip(frames, chain.joints, strict=True)]
+    return [*links, _matrix(frames[chain.tip_body] @ chain.tip)]
+
+
+def _matrix(place: Placement) -> Array:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = place.rotation, place.translation
+    return matrix
+
+
+# Differences relative to the size of torques and matrices, joint by joint.
+NO_TORQUE = 1e-9
+"""Share of the largest torque below which a joint's torque is rounding."""
+
+
+def worst(values: Array, expected: Array, bound: Array, share: float) -> tuple[float, float]:
+    """Error and limit, `share` and bound, of the joint that uses most of it, both relative to its largest torque.
+
+    values, expected  (states, nv);  bound  (nv,) what the errors may be beside `share` of the largest torque
+    """
+    scale = _scales(expected)
+    error = np.abs(values - expected).max(axis=0)
+    joint = int(np.argmax(error / (bound + share * scale)))
+    return float(error[joint] / scale[joint]), float(bound[joint] / scale[joint]) + share
+
+
+def relative_error(values: Array, expected: Array, least: float = 0.0) -> float:
+    """Largest difference relative to the largest magnitude, joint by joint; a matrix as one.
+
+    A joint that does less than NO_TORQUE of the largest torque, such as one with a vertical axis under
+    gravity, is measured against that largest one; where all do less than `least`, against `least` / NO_TORQUE.
+    """
+    if expected.ndim == 3:
+        return float(np.abs(values - expected).max()) / _largest(expected)
+    return float((np.abs(values - expected).max(axis=0) / _scales(expected, least)).max())
+
+
+def _largest(expected: Array) -> float:
+    """The largest magnitude, never zero."""
+    return max(float(np.abs(expected).max(initial=0.0)), float(np.finfo(float).tiny))
+
+
+def _scales(expected: Array, least: float = 0.0) -> Array:
+    """(nv,) scale that each joint's error is relative to."""
+    overall = _largest(expected)
+    if overall < least:
+        return np.full(expected.shape[-1], least / NO_TORQUE)
+    largest = np.abs(expected).max(axis=0)
+    return np.where(largest > NO_TORQUE * overall, largest, overall)

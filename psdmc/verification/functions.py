@@ -16,7 +16,7 @@ from psdmc.recipes.packed import VALUES, unpacked
 from psdmc.recipes.recipe import Needs, Recipe
 from psdmc.reproducible import in_any_order
 from psdmc.robot.mechanism import Array
-from psdmc.robot.reference_followers import OnCoordinates
+from psdmc.robot.reference import OnCoordinates
 
 STATES = 100
 SEED = 14_631
@@ -38,7 +38,15 @@ def function_errors(
     """(recipe, largest error relative to each output's largest value, why there is none) for all functions that are no
     part of the expansion; `solvable`: whether the mass matrix can be inverted."""
     arrays = RobotOnArrays.of(model, theta)
-    given = _states(model, robot)
+    # States and all else that functions read, (STATES, ...) each.
+    rng = np.random.default_rng(SEED)
+    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
+    given = {
+        q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()
+    }
+    given |= {q.name: on_joints(model.mechanism, given[q.name]) for q in read.values() if q.axes == Q.axes}
+    given[TAU.name] = robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])
     least = NOTHING * max(1.0, float(np.abs(given[TAU.name]).max(initial=0.0)))
     for recipe in RECIPES.values():
         if recipe.polynomials is not None:
@@ -53,30 +61,15 @@ def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvabl
         return lack_of_standard_parameters(model)
     if recipe.needs is Needs.POSITIVE_MASS and not solvable:
         return "the mass matrix is singular"
-    if robot.follows and _is_of_positions(recipe):
+    # From positions to positions, or to the way between them.
+    places = not recipe.signature.theta and all(
+        q.axes in (("nq",), ("nv",)) for q in recipe.signature.outputs
+    )
+    if robot.follows and places:
         return "Pinocchio's positions are of every joint, followers included"
     if recipe.needs is Needs.POSITIVE_MASS and robot.follows:
         return "Pinocchio solves no robots with mimic joints"
     return None
-
-
-def _is_of_positions(recipe: Recipe) -> bool:
-    """Whether it goes from positions to positions, or to the way between them."""
-    return not recipe.signature.theta and all(q.axes in (("nq",), ("nv",)) for q in recipe.signature.outputs)
-
-
-def _states(model: DynamicsModel, robot: OnCoordinates) -> dict[str, Array]:
-    """(STATES, ...) of everything that functions read."""
-    rng, sizes = (
-        np.random.default_rng(SEED),
-        Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames)),
-    )
-    read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs}
-    given = {
-        q.name: q.largest * rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes))) for q in read.values()
-    }
-    given |= {q.name: on_joints(model.mechanism, given[q.name]) for q in read.values() if q.axes == Q.axes}
-    return given | {TAU.name: robot.inverse_dynamics(given["q"], given["qd"], given["qdd"])}
 
 
 def _error(

@@ -11,9 +11,17 @@ from nearly_parallel import tilted_chain
 from random_chains import Oracle, random_chain, relative_error
 
 from psdmc.derivation import derive
-from psdmc.derivation.certify import DOUBTFUL, PROMISED, Measured, judged, measured
+from psdmc.derivation.certify import (
+    DOUBTFUL,
+    LAST,
+    PROMISED,
+    Measured,
+    extended_torques,
+    judged,
+    last_digit_effect,
+    measured,
+)
 from psdmc.derivation.derive import derive_model
-from psdmc.derivation.last_digit import LAST, extended_torques, last_digit_effect
 from psdmc.errors import DerivationError
 from psdmc.model.random_states import RANGES
 from psdmc.robot.mechanism import Mechanism, Placement

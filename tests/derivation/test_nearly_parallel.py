@@ -14,9 +14,9 @@ from random_chains import Oracle, random_chain, relative_error, states
 from psdmc.derivation.derive import derive_model
 from psdmc.derivation.expand import EXTENDED, IN_DOUBLE, precision_for
 from psdmc.derivation.extended import extended, has_small_entries, orthonormal
+from psdmc.derivation.followers import reduction_of, sampled_reduction
 from psdmc.derivation.interpolate import DOUBLE, interpolation, nodes, quadratic_basis
 from psdmc.derivation.reduce import reduced
-from psdmc.derivation.sampled import reduction_of, sampled_reduction
 from psdmc.derivation.units import scaled
 from psdmc.robot.joints import PRISMATIC, REVOLUTE, JointType
 

@@ -21,6 +21,14 @@ def test_every_document_is_in_the_menu(tmp_path: Path):
     assert {page for page in pages - listed if not page.startswith("decisions/")} == {"index"}
 
 
+def test_decision_records_alone_are_out_of_the_search(tmp_path: Path):
+    site_pages.gather(tmp_path / "source")
+    pages = sorted((tmp_path / "source").rglob("*.md"))
+    unsearched = {page.parent.name for page in pages if "nosearch: true" in page.read_text(encoding="utf-8")}
+
+    assert unsearched == {"decisions"}
+
+
 def test_links_out_of_the_site_are_names():
     text = site_pages.linked(
         "[the consumers](../examples/consumers), [pass](passes.md#x), [h](../README.md)",
@@ -38,6 +46,9 @@ def test_the_site_builds_without_a_warning(tmp_path: Path):
 
     assert site_pages.render(tmp_path / "source", tmp_path / "site") == 0
     assert (tmp_path / "site/reference/cli.html").exists()
+    searched = (tmp_path / "site/searchindex.js").read_text(encoding="utf-8")
+    assert "Compute a batch of states" in searched
+    assert "matrices come with their patterns" not in searched  # a decision record's title
 
 
 @pytest.mark.slow

@@ -12,10 +12,9 @@ from random_trees import TREES, RandomTree
 
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.composite_body import mass_matrix
-from psdmc.dynamics.coordinates import gathered_torques, joint_positions, joint_rates
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.errors import InputError
-from psdmc.robot.coordinates import Coordinate, leaders
+from psdmc.robot.coordinates import Coordinate, Following, leaders
 from psdmc.robot.mechanism import Placement
 
 FINGERS = (Coordinate(0), Coordinate(1), Coordinate(1, -0.7, 0.2), Coordinate(3), Coordinate(1, 1.3, -0.4))
@@ -33,16 +32,16 @@ def test_followers_are_pinocchios_mimic_joints(kinds: str) -> None:
     assert (model.nq, model.nv) == (3, 3)
     order = [model.joints[model.getJointId(f"joint{i}")].idx_v for i in leaders(FINGERS)]
     still = [0.0] * tree.n
+    following = Following.of(FINGERS, tree.mechanism().types)
     for q, qd, qdd in np.random.default_rng(0).uniform(-2.0, 2.0, (20, 3, 3)):
-        states = (joint_positions(FINGERS, q), joint_rates(FINGERS, qd), joint_rates(FINGERS, qdd))
+        states = (following.positions(q), following.rates(qd), following.rates(qdd))
         theirs = np.zeros((3, 3))
         theirs[:, order] = q, qd, qdd
         tau = inverse_dynamics(tree.frames, tree.bodies, still, *states, tree.up)
         expected = pin.rnea(model, data, *theirs)[order]
-        np.testing.assert_allclose(gathered_torques(FINGERS, tau), expected, rtol=1e-11)
+        np.testing.assert_allclose(following.summed(np.array(tau)), expected, rtol=1e-11)
         of_joints = mass_matrix(tree.frames, tree.bodies, still, states[0])
-        rows = np.array([gathered_torques(FINGERS, row) for row in of_joints])
-        M = np.array([gathered_torques(FINGERS, column) for column in rows.T])
+        M = following.summed(following.summed(np.array(of_joints)), axis=0)
         upper = np.triu(pin.crba(model, data, theirs[0]))
         whole = upper + np.triu(upper, 1).T
         np.testing.assert_allclose(M, whole[np.ix_(order, order)], rtol=1e-11, atol=1e-12)
@@ -57,12 +56,13 @@ def test_held_joints_stand_still() -> None:
     free = list(leaders(coordinates))
     assert free == [0, 1, 3, 5]
     q, qd, qdd = np.random.default_rng(1).uniform(-2.0, 2.0, (3, len(free)))
-    states = (joint_positions(coordinates, q), joint_rates(coordinates, qd), joint_rates(coordinates, qdd))
+    following = Following.of(coordinates, tree.mechanism().types)
+    states = (following.positions(q), following.rates(qd), following.rates(qdd))
     tau = inverse_dynamics(tree.frames, tree.bodies, tree.drives, *states, tree.up)
     whole = np.array([[held.get(i, 0.0) for i in range(tree.n)], np.zeros(tree.n), np.zeros(tree.n)])
     whole[:, free] = q, qd, qdd
     (expected,) = tree.each(pin.rnea, *whole[:, None])
-    np.testing.assert_allclose(gathered_torques(coordinates, tau), expected[free], rtol=1e-11)
+    np.testing.assert_allclose(following.summed(np.array(tau)), expected[free], rtol=1e-11)
 
 
 @pytest.mark.parametrize("kinds", ["RRRRR", "RPPRP", "PRRPR"])

@@ -15,7 +15,7 @@ from bundled import robot_path
 from command_line import files_in, started, status
 from slow_cases import slow_but_for
 
-from psdmc.toolchain.cache_entry import is_sound
+from psdmc.toolchain.cache_room import is_sound
 
 PSDMC = [sys.executable, "-m", "psdmc"]
 SCARA = str(robot_path("scara"))

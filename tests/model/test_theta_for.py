@@ -26,8 +26,7 @@ from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.load import LoadedRobot, load_robot_text
-from psdmc.robot.reference import reference
-from psdmc.robot.reference_followers import OnCoordinates
+from psdmc.robot.reference import OnCoordinates, reference
 
 Bodies = tuple[np.ndarray, np.ndarray, np.ndarray]
 

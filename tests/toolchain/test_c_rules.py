@@ -20,7 +20,7 @@ from psdmc.backends.options import EmitOptions
 from psdmc.functions import RECIPES
 from psdmc.lower.kernels import lower, wanted
 from psdmc.program.kernel import Kernel
-from psdmc.toolchain.kept_kernels import lowered_once
+from psdmc.toolchain.compile import lowered_once
 
 COMPILERS = ["gcc", "clang"]
 NAMES = ["inverse_dynamics", "forward_dynamics", "mass_matrix", "jacobian"]

@@ -17,9 +17,9 @@ from traced import arm_package
 from unoptimised import without_optimisation
 
 from psdmc.errors import ToolchainError
-from psdmc.toolchain import cache_turns
+from psdmc.toolchain import cache
 from psdmc.toolchain.cache import cache_key, cached
-from psdmc.toolchain.cache_place import cache_directory
+from psdmc.toolchain.cache_room import cache_directory
 from psdmc.toolchain.call import CompiledRobot
 from psdmc.toolchain.compile import compile_library
 from psdmc.toolchain.compiler_command import find_compiler
@@ -111,15 +111,15 @@ def test_threads_that_race_build_once(fresh_cache: Path) -> None:
 def test_a_turn_is_of_the_file_that_others_find(fresh_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A lock file that is removed as a leftover before it is locked keeps nobody out: another one is taken."""
     fresh_cache.mkdir(exist_ok=True)
-    path, locks = fresh_cache / f".turn-{'u' * 16}", cache_turns.lock
+    path, locks = fresh_cache / f".turn-{'u' * 16}", cache.lock
 
     def swept(handle: int, wait: bool = True) -> bool:
-        monkeypatch.setattr(cache_turns, "lock", locks)
+        monkeypatch.setattr(cache, "lock", locks)
         path.unlink()
         return locks(handle, wait)
 
-    monkeypatch.setattr(cache_turns, "lock", swept)
-    with cache_turns.turn(fresh_cache, "u" * 64):
+    monkeypatch.setattr(cache, "lock", swept)
+    with cache.turn(fresh_cache, "u" * 64):
         other = os.open(path, os.O_RDWR)
         assert not locks(other, wait=False)
         os.close(other)

@@ -16,8 +16,7 @@ import pytest
 from psdmc.errors import InputError
 from psdmc.toolchain import cache_room
 from psdmc.toolchain.cache import cached
-from psdmc.toolchain.cache_place import cache_limit
-from psdmc.toolchain.cache_room import cache_contents, clear_cache
+from psdmc.toolchain.cache_room import cache_contents, cache_limit, clear_cache
 
 
 @pytest.fixture

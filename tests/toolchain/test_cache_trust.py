@@ -11,7 +11,7 @@ import pytest
 
 from psdmc.errors import ToolchainError
 from psdmc.toolchain.cache import cached
-from psdmc.toolchain.cache_place import cache_directory
+from psdmc.toolchain.cache_room import cache_directory
 
 KEY = "a" * 64
 NOBODY = 65534

@@ -12,8 +12,8 @@ from psdmc.errors import InputError
 from psdmc.functions import SIGNATURES
 from psdmc.program.kernel import Kernel
 from psdmc.program.text import parse
-from psdmc.toolchain import kept_kernels
-from psdmc.toolchain.kept_kernels import KERNELS, lowered_once
+from psdmc.toolchain import compile
+from psdmc.toolchain.compile import KERNELS, lowered_once
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_another_model_or_option_is_lowered_anew(own_cache: Path, parts: tuple[s
 
 def test_edited_sources_lower_anew(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def edit() -> None:
-        monkeypatch.setattr(kept_kernels, "sources_digests", lambda: ("edited",))
+        monkeypatch.setattr(compile, "sources_digests", lambda: ("edited",))
 
     assert calls(("hash", "auto"), edit) == 2
 

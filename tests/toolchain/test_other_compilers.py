@@ -12,7 +12,7 @@ from bundled import bundled_model
 import psdmc
 from psdmc.progress import Step
 from psdmc.target.target import Real
-from psdmc.toolchain import build_progress
+from psdmc.toolchain import build_package as building
 from psdmc.toolchain.build_package import build_package
 
 TOOLS = ("arm-none-eabi-gcc", "arm-none-eabi-ar", "arm-none-eabi-readelf")
@@ -98,7 +98,7 @@ def test_a_build_says_how_far_it_is(tmp_path: Path, tool: str, monkeypatch: pyte
     need(tool)
     if tool == "make":
         monkeypatch.setattr(shutil, "which", lambda name: None if name == "cmake" else f"/usr/bin/{name}")
-    monkeypatch.setattr(build_progress, "TICK", 0.01)
+    monkeypatch.setattr(building, "TICK", 0.01)
     said: list[str] = []
 
     build_package(emitted(tmp_path / "arm", "scalar"), progress=said.append)

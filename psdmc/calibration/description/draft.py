@@ -34,7 +34,7 @@ HEAD = (
 )
 KEYS = (
     "# per joint, instead of a column alone: { column = ..., unit = ..., sign = -1, gear_ratio = 100, offset = 0,",
-    "#   torque_constant = 0.1 (N m/A of the motor), delay = 0.004 (s by which the column lags) }",
+    "#   torque_constant = 0.1 (N m/A of the motor, before the gear), delay = 0.004 (s by which the column lags) }",
 )
 
 

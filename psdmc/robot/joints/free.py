@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
+from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector, WideJoint
 from psdmc.robot.joints.quaternion import (
     angles_between,
     inverse,
@@ -16,7 +16,6 @@ from psdmc.robot.joints.quaternion import (
     turning,
 )
 from psdmc.robot.joints.scalars import TINY, sign, square_of, unit
-from psdmc.robot.joints.wide_joint import WideJoint
 
 
 class Free(WideJoint):

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from psdmc.reproducible import cosine, sine
-from psdmc.robot.joints.basis import Basis
+from psdmc.robot.joints.basis import NO_BASIS, Basis
 from psdmc.robot.joints.scalars import Scalar as Scalar
 from psdmc.robot.joints.scalars import unit
 from psdmc.robot.placement import Array, Placement
@@ -196,3 +196,18 @@ def _generator(twist: Twist) -> Array:
     matrix[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
     matrix[:3, 3] = linear
     return matrix
+
+
+class WideJoint(JointType):
+    """A joint of several coordinates, most of them lengths: no drive turns it, and its torques are not expanded."""
+
+    __slots__ = ()
+
+    about_z: ClassVar[bool] = False
+    follows_axis: ClassVar[bool] = False
+    basis: ClassVar[Basis] = NO_BASIS
+    length_order: ClassVar[int] = 1
+    position_unit: ClassVar[str] = "m"
+    effort_unit: ClassVar[str] = "N"
+    free_range: ClassVar[float] = 1.0
+    ordinary: ClassVar[tuple[float, float, float]] = (1.0, 1.0, 10.0)

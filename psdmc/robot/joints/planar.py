@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
-from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector
+from psdmc.robot.joints.joint_type import SLIDES, TURNS, Rows, Scalar, Twist, Vector, WideJoint
 from psdmc.robot.joints.quaternion import arc
 from psdmc.robot.joints.scalars import TINY, root, sign, sincos, square_of, unit
-from psdmc.robot.joints.wide_joint import WideJoint
 
 
 class Planar(WideJoint):
@@ -57,7 +56,13 @@ class Planar(WideJoint):
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
         (x, y, c, s), (x1, y1, c1, s1) = q, other
         sine = c * (s1 - s) - s * (c1 - c)  # not c s1 - s c1, which loses the digits of a small angle
-        angle = _angle(c * c1 + s * s1, sine)
+        # The angle from -pi to pi, rad. By the cosine's and the sine's sizes it is at most a quarter turn, which `arc`
+        # finds exactly.
+        cosine = c * c1 + s * s1
+        length = 1.0 / root(cosine * cosine + sine * sine)
+        ahead = sign(cosine)
+        near = ahead * length * sine * arc(sine * sine * length * length, ahead * length * cosine)
+        angle = near + (0.5 * math.pi) * (1.0 - ahead) * sign(sine)
         half_s, half_c, share = _half(angle)
         dx, dy = (c * (x1 - x) + s * (y1 - y)) / share, (c * (y1 - y) - s * (x1 - x)) / share
         return (half_c * dx + half_s * dy, half_c * dy - half_s * dx, angle)
@@ -84,14 +89,6 @@ def _half(angle: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     half = 0.5 * angle
     sine, cosine = sincos(half)
     return sine, cosine, (sine * half + TINY) / (half * half + TINY)
-
-
-def _angle(cosine: Scalar, sine: Scalar) -> Scalar:
-    """rad, from -pi to pi. By the cosine's and the sine's sizes it is at most a quarter turn, which `arc` finds exactly."""
-    length = 1.0 / root(cosine * cosine + sine * sine)
-    ahead = sign(cosine)
-    near = ahead * length * sine * arc(sine * sine * length * length, ahead * length * cosine)
-    return near + (0.5 * math.pi) * (1.0 - ahead) * sign(sine)
 
 
 PLANAR = Planar()

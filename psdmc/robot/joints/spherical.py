@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
-from psdmc.robot.joints.joint_type import TURNS, Rows, Scalar, Twist
+from psdmc.robot.joints.joint_type import TURNS, Rows, Scalar, Twist, WideJoint
 from psdmc.robot.joints.quaternion import (
     angles_between,
     rates_bent,
@@ -16,7 +16,6 @@ from psdmc.robot.joints.quaternion import (
     turning,
 )
 from psdmc.robot.joints.scalars import unit
-from psdmc.robot.joints.wide_joint import WideJoint
 
 
 class Spherical(WideJoint):

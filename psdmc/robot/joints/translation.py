@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from psdmc.robot.joints.joint_type import SLIDES, Scalar, Twist, Vector
-from psdmc.robot.joints.wide_joint import WideJoint
+from psdmc.robot.joints.joint_type import SLIDES, Scalar, Twist, Vector, WideJoint
 
 
 class Translation(WideJoint):

@@ -13,7 +13,7 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.verdict.record import Calibration
-from psdmc.cli.show_calibration import print_calibration
+from psdmc.cli.show import print_calibration
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.report.calibrate_report import report_html
 
