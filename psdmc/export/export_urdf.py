@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.atomic import check_place, refuse_foreign_file, write_together, write_whole
-from psdmc.calibration.identify.physical_links import PhysicalLinks, physical_links
 from psdmc.errors import InputError, InternalError
 from psdmc.export.bodies import Written, written
 from psdmc.export.elements import as_text
@@ -18,6 +17,7 @@ from psdmc.export.from_source import urdf_with
 from psdmc.export.mjcf import MARK, mjcf_of
 from psdmc.export.numbers import exact
 from psdmc.export.read_back import LIMIT, Reading, read_mjcf_back, read_urdf_back
+from psdmc.links.physical_links import PhysicalLinks, physical_links
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_axes

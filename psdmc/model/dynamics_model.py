@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.model import bodies, equations, evaluate, glance, payload, recursive, store, symbolic
 from psdmc.model.answers import Answers
+from psdmc.model.calibrated import Calibrated
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
@@ -50,6 +51,7 @@ class DynamicsModel(Answers):
     certificate  (nv,) largest difference between the torques of the model and of the Newton-Euler algorithm at random
                  states, divided by the largest torque; one number per entry of tau
     provenance   plain JSON values: text, hash and format of the robot file, options, snapped angles, tolerances
+    calibrated   what a calibration found, with the covariance of theta_b and the verdict; None if not calibrated
     """
 
     expansion: Expansion | None
@@ -58,6 +60,7 @@ class DynamicsModel(Answers):
     mechanism: Mechanism
     certificate: Array
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    calibrated: Calibrated | None = None
 
     __reduce__ = made_again
 
