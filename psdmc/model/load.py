@@ -64,7 +64,7 @@ def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
 def load(path: str | Path) -> DynamicsModel:
     """Read a model from a file that `save` or `psdmc derive` wrote.
 
-    Raises InputError if the file is missing, damaged or edited, or if a newer psdmc wrote it.
+    Raises InputError if the file is missing, damaged or edited, or if a newer version of psdmc wrote it.
     """
     source = Path(path)
     return load_bytes(_bytes_of(source), source)

@@ -53,9 +53,9 @@ class Model(ModelParts, Protocol):
 
 
 def save(model: Model, path: str | Path) -> None:
-    """Write a model to a file that `load` reads; after a failure the old file is unchanged.
+    """Write a model to a file, which `load` reads. If writing fails, an existing file at the path stays unchanged.
 
-    Raises InputError if the path cannot be written, and ToolchainError if the disk fails.
+    Raises InputError if psdmc may not write at the path, and ToolchainError if the disk is full or fails.
     """
     n = len(model.mechanism)
     if n > MOST_JOINTS:
