@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: 0BSD */
-/* coriolis_matrix: C(q, qd) with dM/dt - 2 C skew-symmetric */
+/* coriolis_matrix: Coriolis matrix C(q, qd), for which dM/dt - 2 C is skew-symmetric */
 #include "internal.h"
 #include "rows.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: 0BSD */
-/* forward_dynamics: qdd = M(q)^-1 (tau - h(q, qd)) */
+/* forward_dynamics: joint accelerations that torques cause, qdd = M(q)^-1 (tau - h(q, qd)) */
 #include "internal.h"
 #include "rows.h"
 #include "pivots.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: 0BSD */
-/* gravity: g(q) */
+/* gravity: gravity torques g(q), which hold the robot still */
 #include "internal.h"
 #include "rows.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: 0BSD */
-/* inverse_dynamics: tau = M(q) qdd + h(q, qd) */
+/* inverse_dynamics: joint torques of a motion, tau = M(q) qdd + h(q, qd) */
 #include "internal.h"
 #include "rows.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: 0BSD */
-/* mass_matrix: M(q), both triangles */
+/* mass_matrix: mass matrix M(q), both triangles */
 #include "internal.h"
 #include "rows.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: 0BSD */
-/* nonlinear_effects: h(q, qd) = C(q, qd) qd + g(q) */
+/* nonlinear_effects: Coriolis, centrifugal and gravity torques, h(q, qd) = C(q, qd) qd + g(q) */
 #include "internal.h"
 #include "rows.h"
 

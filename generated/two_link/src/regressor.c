@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: 0BSD */
-/* regressor: Y with tau = Y theta_b */
+/* regressor: regressor Y(q, qd, qdd): tau = Y theta_b */
 #include "internal.h"
 #include "rows.h"
 

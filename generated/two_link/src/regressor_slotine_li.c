@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: 0BSD */
-/* regressor_slotine_li: Y with M(q) qdd_r + C(q, qd) qd_r + g(q) = Y theta_b */
+/* regressor_slotine_li: regressor Y of adaptive control (Slotine and Li): Y theta_b = M(q) qdd_r + C(q, qd) qd_r + g(q) */
 #include "internal.h"
 #include "rows.h"
 

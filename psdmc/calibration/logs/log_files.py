@@ -45,7 +45,7 @@ _EFFORT_COLUMNS: dict[Quantity, tuple[str, str]] = {
 
 
 def read_log(path: str | Path) -> Log:
-    """Return a log in memory from a table (.csv, .parquet, .npz, .mat) or a ROS 2 bag (.db3, .mcap or its folder).
+    """Return a log in memory from a table (.csv, .parquet, .npz) or a ROS bag (.bag, .db3, .mcap or its folder).
 
     InputError if the file is missing, no log, damaged, or lacks a column.
     """

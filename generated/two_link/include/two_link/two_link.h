@@ -25,8 +25,8 @@
  *   _batch      one state per row
  *   _batch_soa  blocks of LANES states, [block][variable][lane]; the last block is whole, too
  *   _theta      with the base parameters theta_b given at run time (_theta_batch: one theta_b for all rows)
- * forward_dynamics returns 0, or 1 + the joint whose pivot is not positive, or (batch) 1 + the first
- * row that has one; the accelerations of such a state are NaN.
+ * forward_dynamics returns 0, or 1 + the number of the joint, from 0, at which the mass matrix is not positive definite.
+ * A batch returns 0, or 1 + the first row that fails. The accelerations of such a state are NaN.
  */
 #ifndef two_link_H
 #define two_link_H
@@ -56,7 +56,7 @@ extern const double two_link_theta_b[two_link_BASE_PARAMETERS];
 extern const char *const two_link_base_parameter_equations[two_link_BASE_PARAMETERS];
 extern const char *const two_link_base_parameter_units[two_link_BASE_PARAMETERS];
 
-/* tau = M(q) qdd + h(q, qd); tau is 2 */
+/* joint torques of a motion, tau = M(q) qdd + h(q, qd); tau is 2 */
 /* inverse_dynamics: 13 mul + 10 add + 2 sincos, factored */
 void two_link_inverse_dynamics(const double *q, const double *qd, const double *qdd, double *tau);
 void two_link_inverse_dynamics_batch(size_t count, const double *q, const double *qd, const double *qdd, double *tau);
@@ -65,7 +65,7 @@ void two_link_inverse_dynamics_batch_soa(size_t count, const double *q, const do
 void two_link_inverse_dynamics_theta(const double *q, const double *qd, const double *qdd, const double *theta_b, double *tau);
 void two_link_inverse_dynamics_theta_batch(size_t count, const double *q, const double *qd, const double *qdd, const double *theta_b, double *tau);
 
-/* qdd = M(q)^-1 (tau - h(q, qd)); qdd is 2 */
+/* joint accelerations that torques cause, qdd = M(q)^-1 (tau - h(q, qd)); qdd is 2 */
 /* forward_dynamics: 17 mul + 13 add + 1 div + 2 sincos, factored */
 int two_link_forward_dynamics(const double *q, const double *qd, const double *tau, double *qdd);
 size_t two_link_forward_dynamics_batch(size_t count, const double *q, const double *qd, const double *tau, double *qdd);
@@ -74,7 +74,7 @@ size_t two_link_forward_dynamics_batch_soa(size_t count, const double *q, const 
 int two_link_forward_dynamics_theta(const double *q, const double *qd, const double *tau, const double *theta_b, double *qdd);
 size_t two_link_forward_dynamics_theta_batch(size_t count, const double *q, const double *qd, const double *tau, const double *theta_b, double *qdd);
 
-/* M(q), both triangles; M is 2 x 2, row-major */
+/* mass matrix M(q), both triangles; M is 2 x 2, row-major */
 /* mass_matrix: 2 mul + 2 add + 1 sincos, expanded */
 void two_link_mass_matrix(const double *q, double *M);
 void two_link_mass_matrix_batch(size_t count, const double *q, double *M);
@@ -83,7 +83,7 @@ void two_link_mass_matrix_batch_soa(size_t count, const double *q, double *M);
 void two_link_mass_matrix_theta(const double *q, const double *theta_b, double *M);
 void two_link_mass_matrix_theta_batch(size_t count, const double *q, const double *theta_b, double *M);
 
-/* h(q, qd) = C(q, qd) qd + g(q); h is 2 */
+/* Coriolis, centrifugal and gravity torques, h(q, qd) = C(q, qd) qd + g(q); h is 2 */
 /* nonlinear_effects: 10 mul + 5 add + 2 sincos, factored */
 void two_link_nonlinear_effects(const double *q, const double *qd, double *h);
 void two_link_nonlinear_effects_batch(size_t count, const double *q, const double *qd, double *h);
@@ -92,7 +92,7 @@ void two_link_nonlinear_effects_batch_soa(size_t count, const double *q, const d
 void two_link_nonlinear_effects_theta(const double *q, const double *qd, const double *theta_b, double *h);
 void two_link_nonlinear_effects_theta_batch(size_t count, const double *q, const double *qd, const double *theta_b, double *h);
 
-/* C(q, qd) with dM/dt - 2 C skew-symmetric; C is 2 x 2, row-major */
+/* Coriolis matrix C(q, qd), for which dM/dt - 2 C is skew-symmetric; C is 2 x 2, row-major */
 /* coriolis_matrix: 3 mul + 2 add + 1 sincos, factored */
 void two_link_coriolis_matrix(const double *q, const double *qd, double *C);
 void two_link_coriolis_matrix_batch(size_t count, const double *q, const double *qd, double *C);
@@ -101,7 +101,7 @@ void two_link_coriolis_matrix_batch_soa(size_t count, const double *q, const dou
 void two_link_coriolis_matrix_theta(const double *q, const double *qd, const double *theta_b, double *C);
 void two_link_coriolis_matrix_theta_batch(size_t count, const double *q, const double *qd, const double *theta_b, double *C);
 
-/* g(q); g is 2 */
+/* gravity torques g(q), which hold the robot still; g is 2 */
 /* gravity: 5 mul + 2 add + 2 sincos, factored */
 void two_link_gravity(const double *q, double *g);
 void two_link_gravity_batch(size_t count, const double *q, double *g);
@@ -110,13 +110,13 @@ void two_link_gravity_batch_soa(size_t count, const double *q, double *g);
 void two_link_gravity_theta(const double *q, const double *theta_b, double *g);
 void two_link_gravity_theta_batch(size_t count, const double *q, const double *theta_b, double *g);
 
-/* Y with tau = Y theta_b; Y is 2 x 4, row-major */
+/* regressor Y(q, qd, qdd): tau = Y theta_b; Y is 2 x 4, row-major */
 /* regressor: 19 mul + 13 add + 2 sincos, expanded */
 void two_link_regressor(const double *q, const double *qd, const double *qdd, double *Y);
 void two_link_regressor_batch(size_t count, const double *q, const double *qd, const double *qdd, double *Y);
 void two_link_regressor_batch_soa(size_t count, const double *q, const double *qd, const double *qdd, double *Y);
 
-/* Y with M(q) qdd_r + C(q, qd) qd_r + g(q) = Y theta_b; Y is 2 x 4, row-major */
+/* regressor Y of adaptive control (Slotine and Li): Y theta_b = M(q) qdd_r + C(q, qd) qd_r + g(q); Y is 2 x 4, row-major */
 /* regressor_slotine_li: 20 mul + 13 add + 2 sincos, factored */
 void two_link_regressor_slotine_li(const double *q, const double *qd, const double *qd_r, const double *qdd_r, double *Y);
 void two_link_regressor_slotine_li_batch(size_t count, const double *q, const double *qd, const double *qd_r, const double *qdd_r, double *Y);
