@@ -41,7 +41,7 @@ ROBOT_FILES = (
     ),
     Entry(
         "the root element is",
-        "The file is XML, but no URDF or MJCF.",
+        "The file is XML, but it is neither a URDF nor an MJCF.",
         "Give a URDF, MJCF, xacro or DH file.",
         "derive other.urdf",
     ),
@@ -59,8 +59,8 @@ ROBOT_FILES = (
     ),
     Entry(
         "a model, which is derived already",
-        "`derive` takes robot files.",
-        "Use `show`, `check` or `emit-c` for models.",
+        "The input of `derive` is a model file, not a robot file.",
+        "Give a robot file to `derive`, or give the model to `show`, `check` or `emit-c`.",
         "derive arm.npz",
     ),
     Entry(
@@ -77,8 +77,8 @@ ROBOT_FILES = (
     ),
     Entry(
         "not physical",
-        "No rigid body has such an inertia: check the axes and units.",
-        "Correct the inertia, or ignore the note if only torques matter.",
+        "No rigid body can have the inertia in the file, often because of wrong axes or units.",
+        "Correct the inertia. You may ignore the note if you need only torques.",
         "derive unphysical.urdf -o unphysical.npz",
         0,
     ),
@@ -102,20 +102,20 @@ ROBOT_FILES = (
     ),
     Entry(
         "expected 0 to 0.1",
-        "`--snap` is an angle in rad.",
-        "Leave it out, or give a small angle.",
+        "The angle of `--snap` is negative or over 0.1 rad.",
+        "Leave out `--snap`, or give an angle from 0 to 0.1 rad.",
         "derive arm.urdf --snap 2",
     ),
     Entry(
         "has no <inertial>: treated as massless",
         "A moving link has no inertia.",
-        "Add `<inertial>`, or use `--unknown LINK`.",
+        "Add `<inertial>` to the link, or keep its inertia as an unknown with `--unknown LINK`.",
         "derive bare.urdf -o bare.npz",
         0,
     ),
     Entry(
         "is no link",
-        "A frame in `--frames` is not in the file.",
+        "A name in `--frames` is not a link of the robot file.",
         "Choose one of the links that the hint lists.",
         "derive arm.urdf --frames hand",
     ),
@@ -139,25 +139,25 @@ ROBOT_FILES = (
     ),
     Entry(
         "is not three finite numbers",
-        "Gravity needs three numbers.",
+        "The value of `--gravity` is not three numbers in m/s².",
         "Write `--gravity 0,0,-9.81`.",
         "derive arm.urdf --gravity 9.81",
     ),
     Entry(
         "cut a chain out of it",
-        "`--floating` needs the whole robot.",
+        "`--floating` works only for the whole robot, not for a chain.",
         "Leave out `--base` and `--tip`.",
         "derive arm.urdf --floating --tip fore",
     ),
     Entry(
         "--floating frees the root link of a URDF",
-        "A DH table describes a fixed base.",
+        "The file is a DH table, which has a fixed base.",
         "Give a URDF or an MJCF.",
         "derive examples/robots/kr6.toml --floating",
     ),
     Entry(
         "--base and --tip name links of a URDF",
-        "A DH table has one chain.",
+        "The file is a DH table, which has only one chain.",
         "Leave out `--base` and `--tip`.",
         "derive examples/robots/kr6.toml --tip link3",
     ),
@@ -172,25 +172,25 @@ ROBOT_FILES = (
 MODELS = (
     Entry(
         "model file",
-        "The command needs a model, not a robot file.",
+        "You gave a robot file to a command that needs a model file.",
         "Run `psdmc derive` first.",
         "check arm.urdf",
     ),
     Entry(
         "no such file",
-        "The model was not derived, or lies elsewhere.",
+        "The model file is not at this path.",
         "Run `psdmc derive`, or correct the path.",
         "show arm9.npz",
     ),
     Entry(
         "are several questions",
-        "`show` answers one question per call.",
-        "Give one of `--terms`, `--cost` and `--latex`.",
+        "`show` accepts only one of `--terms`, `--cost` and `--latex` per call.",
+        "Call `show` once for each option.",
         "show arm.npz --cost --terms",
     ),
     Entry(
         "is of models",
-        "`--cost` and `--terms` need a model.",
+        "You gave a robot file, but `--cost` and `--terms` need a model file.",
         "Run `psdmc derive` first.",
         "show arm.urdf --cost",
     ),
@@ -205,37 +205,37 @@ PACKAGES = (
     ),
     Entry(
         "no function is named",
-        "`--functions` is empty.",
-        "Write `default`, `all` or names.",
+        "The option `--functions` has no value.",
+        "Write `--functions default`, `--functions all`, or names of functions.",
         "emit-c arm.npz --functions ,",
     ),
     Entry(
         "moves no inertia",
-        "Forward dynamics needs an inertia at each joint.",
-        "Add `<inertial>`, or leave out `forward_dynamics`.",
+        "A joint moves only links without inertia, so forward dynamics does not exist.",
+        "Add `<inertial>` to a link that the joint moves, or leave out `forward_dynamics`.",
         "emit-c bare.npz -o bare",
     ),
     Entry(
         "did not write the files in this folder",
-        "The output folder contains other files.",
+        "The output folder contains files that psdmc did not write.",
         "Choose another folder, or add `--force`.",
         "emit-c arm.npz -o mine",
     ),
     Entry(
         "real is 'float16'",
-        "The precision is unknown.",
+        "psdmc does not know the value of `--real`.",
         "Choose `float64` or `float32`.",
         "emit-c arm.npz --real float16",
     ),
     Entry(
         "target is 'riscv'",
-        "The target is unknown.",
-        "Choose a target that the hint lists; `scalar` suits any compiler.",
+        "psdmc does not know the value of `--target`.",
+        "Choose a target that the hint lists. The target `scalar` works with any C99 compiler.",
         "emit-c arm.npz --target riscv",
     ),
     Entry(
         "there is no adapter",
-        "`--with` knows CasADi only.",
+        "The only adapter of `--with` is for CasADi.",
         "Write `--with casadi`.",
         "emit-c arm.npz --with acados",
     ),
@@ -247,7 +247,7 @@ PACKAGES = (
     ),
     Entry(
         "no emitted package",
-        "`build` needs a folder that `emit-c` wrote.",
+        "The folder that you gave to `build` is not a C package.",
         "Run `psdmc emit-c` first.",
         "build mine",
     ),
@@ -268,7 +268,7 @@ LOGS = (
     ),
     Entry(
         "write JOINT=NUMBER",
-        "A torque constant has no joint's name.",
+        "A value of `--torque-constants` does not name a joint.",
         "Write `--torque-constants shoulder=0.1`, in N m/A at the joint, gear included.",
         "calibrate arm.npz words.csv -o found.npz --torque-constants 3",
     ),
@@ -289,61 +289,61 @@ LOGS = (
 ARRAYS = (
     Entry(
         "expected (..., 2)",
-        "The last axis must be the number of joints.",
-        "Put joints along the last axis.",
+        "The last axis of the array does not have one entry per joint.",
+        "Give an array of shape (..., n) for n joints.",
         "robot.gravity([0, 0, 0])",
     ),
     Entry(
         "shapes do not broadcast",
         "q, qd and qdd have different numbers of states.",
-        "Give arrays of one shape.",
+        "Give q, qd and qdd the same number of states.",
         "robot.inverse_dynamics(np.zeros((3, 2)), np.zeros((4, 2)), np.zeros(2))",
     ),
     Entry(
         "expected real numbers",
-        "The array is complex, or holds texts.",
-        "Give floats.",
+        "The array contains complex numbers or strings.",
+        "Give an array of floats.",
         "robot.gravity(['a', 'b'])",
     ),
     Entry(
         "theta_b has shape",
-        "theta_b needs one value per base parameter.",
-        "Use `model.theta_for`, or the model's own theta_b.",
+        "theta_b does not have one value per base parameter.",
+        "Compute theta_b with `model.theta_for`, or pass `model.theta_b`.",
         "robot.gravity([0, 0], theta_b=[1.0])",
     ),
     Entry(
         "out for g has shape",
-        "The output array does not fit.",
-        "Use the shape of the hint.",
+        "The array that you passed as `out` has the wrong shape.",
+        "Pass an array with the shape in the hint.",
         "robot.gravity(np.zeros((2, 2)), out=np.zeros(2))",
     ),
     Entry(
         "is a masked array",
-        "Some states are masked.",
-        "Leave them out, or fill them.",
+        "The array is a NumPy masked array.",
+        "Remove the masked states, or fill them with numbers.",
         "robot.gravity(np.ma.masked_array([0.0, 1.0], [True, False]))",
     ),
     Entry(
         "q has columns",
-        "Columns of a data frame are not the robot's joints.",
+        "The column names of the data frame are not the robot's joint names.",
         "Rename the columns, or pass `.to_numpy()`.",
         "robot.gravity(pd.DataFrame({'a': [0.0], 'b': [0.0]}))",
     ),
     Entry(
         "was given where a model is expected",
-        "`compile` takes a model.",
-        "Call `psdmc.derive` first.",
+        "You passed something other than a model, such as the path of a robot file.",
+        "Call `psdmc.derive` first, and pass its result.",
         "psdmc.compile('examples/robots/two_link.toml')",
     ),
     Entry(
         "payload mass is -1.0",
-        "A mass is negative.",
-        "Give the mass in kg.",
+        "The mass of the load is negative.",
+        "Give a positive mass in kg.",
         "model.with_payload(-1, [0, 0, 0])",
     ),
     Entry(
         "masses has shape",
-        "`theta_for` needs a body for each joint.",
+        "The arrays for `theta_for` do not have one row per body.",
         "Give one row per link of `model.link_names`.",
         "model.theta_for([1.0], [[0, 0, 0]], [np.eye(3)])",
     ),
@@ -363,9 +363,11 @@ def page() -> str:
     """The page's text."""
     parts = [
         "# Troubleshooting by message",
-        "On this page you find a message that psdmc printed, its cause and what to do. Search for a part of the message.",
-        "An error of psdmc is one line and a hint. The exit status is 2 for wrong input ([all exit statuses](../files.md)). "
-        "In Python the same errors are `psdmc.InputError`, `psdmc.DerivationError` and `psdmc.ToolchainError`.",
+        "If psdmc printed an error or a warning, search this page for a part of the message. "
+        "The tables give the cause, and what to do.",
+        "psdmc prints each error as one line and a hint. "
+        "After wrong input, a command ends with exit status 2 ([all exit statuses](../files.md)). "
+        "In Python, psdmc raises `psdmc.InputError`, `psdmc.DerivationError` or `psdmc.ToolchainError` with the message.",
     ]
     for title, entries in GROUPS.items():
         rows = ["| message contains | cause | what to do |", "|---|---|---|"]
@@ -376,10 +378,10 @@ def page() -> str:
 
 AFTER = """## When nothing here fits
 
-- `psdmc doctor` prints which compilers and optional packages it found.
-- The option `--help` of each command lists all options with units and defaults.
-- `psdmc show FILE` prints what psdmc read: joints, limits, gravity and base parameters.
-- A message that begins with "internal error" is a fault of psdmc. Please report it with the file.
+- Run `psdmc doctor` to see which compilers and optional packages psdmc finds.
+- Run `psdmc COMMAND --help` to see all options of a command, with units and defaults.
+- Run `psdmc show FILE` to see the joints, limits, gravity and base parameters of a robot file or model.
+- If a message begins with "internal error", psdmc has a bug. Report the message, with the robot file or log.
 """
 
 if __name__ == "__main__":
