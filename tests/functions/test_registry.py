@@ -28,6 +28,8 @@ NAMES_SEVERAL = {
     "bench/rivals/cppadcg_c.py": "what this rival has, and under which names",
     "bench/rivals/mujoco_c.py": "what this rival has",
     "bench/rivals/pinocchio_cpp.py": "what this rival has, and under which names",
+    "calibration/verdict/judge.py": "steps of a calibration, and what the verdict compares",
+    "calibration/verdict/record.py": "steps of a calibration, and what the verdict compares",
     "model/dynamics_model.py": "methods with documentation of their own: what E and P are defined by",
     "model_functions.py": "what is computed from E and P where a model has them",
     "report/bench_markdown.py": "the columns of README's table",
