@@ -76,6 +76,9 @@ _MOVED = {
     "psdmc.derivation.functions": "psdmc.derivation.monomials",
     "psdmc.emit": "psdmc.backends.c",
     "psdmc.model.check": "psdmc.verification.check",
+    "psdmc.calibration.identify.physical_links": "psdmc.links.physical_links",
+    "psdmc.calibration.identify.prediction": "psdmc.model.calibrated",
+    "psdmc.calibration.verdict.verdict": "psdmc.model.calibrated",
     "psdmc.program.functions": "psdmc.program.signature",
     "psdmc.robot.chain": "psdmc.robot.mechanism",
 }

@@ -64,30 +64,36 @@ def derive(
     packages: Mapping[str, str | Path] | None = None,
     unknown: Sequence[str] | str = (),
 ) -> DynamicsModel:
-    """Derive the model (E, P, theta_b) of a robot file (URDF, xacro, MJCF or DH table) and check it.
+    """Derive the model (E, P, theta_b) of a robot file (URDF, xacro, MJCF or DH table), and return it.
 
-    Returns a DynamicsModel. Before, psdmc compares the torques of the model with Newton-Euler recursions.
+    The result is a DynamicsModel. psdmc has checked the torques of the model against the Newton-Euler algorithm.
 
     robot          path of the robot file
-    base, tip      first and last link of a chain; None: the whole robot
-    gravity        m/s^2 in the file's root frame; None: the file's own, or (0, 0, -9.81)
-    drive_inertia  True: the joints' drive inertias are parameters; or one value per joint, kg m^2 (kg if sliding)
-    assume_zero    parameters to be taken as zero, such as "link5:mx" or "link5:Ixz@com"; a list or a single name
-    snap           largest difference (rad) from a right angle at which psdmc makes a constant rotation exact; 0: never
+    base, tip      names of the first and last link, to model only the chain between them; None: the whole robot
+    gravity        (3,) m/s^2 along the axes of the file's root frame; None: the gravity in the file, or (0, 0, -9.81)
+    drive_inertia  True: the drive inertias of the joints are parameters of the model; or the values of these
+                   parameters, one per joint, kg m^2 (kg for a sliding joint)
+    assume_zero    parameters that psdmc assumes to be zero, such as "link5:mx" or "link5:Ixz@com": a list or one name
+    snap           rad. If a rounded angle of the file, such as 1.5708, differs from the exact right angle by at most this
+                   number, psdmc replaces the rounded angle; 0: never
     expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
     progress       function that psdmc calls with the name of each stage, such as print
-    frames         names of links for poses, Jacobians, wrenches and loads; none: the tip, or the end of each branch
-    tool           x, y, z (m), roll, pitch, yaw (rad) of one more frame, 'tool', relative to the tip
-    lock           positions (rad or m) of joints that stay fixed, by name
-    floating       True: a floating base. q is position (m), quaternion (x, y, z, w), then the joints. Rates are the
-                   base's linear and angular velocity along the base's axes, then the joints'
-    root           first body of the robot, if several bodies of an MJCF move
-    xacro_args     values of a xacro file's arguments, by name
-    packages       folders of the ROS packages that a xacro file names; ROS_PACKAGE_PATH and AMENT_PREFIX_PATH add more
-    unknown        links whose inertia is unknown: a list, a single name, or "all". "missing" means all links without an
-                   inertia in the file. Otherwise such links are massless
+    frames         links for whose frames psdmc computes poses, Jacobians, wrenches and loads; if empty: the tip, or the
+                   end of each branch
+    tool           x, y, z (m) and roll, pitch, yaw (rad), relative to the tip, of a frame that psdmc adds as 'tool'
+    lock           joints that stay at a fixed position: a dictionary of positions (rad or m) by joint name
+    floating       True: the root link moves freely. The first entries of q are the link's position (m) and quaternion
+                   (x, y, z, w). The first entries of qd are the link's linear and angular velocity along the link's axes
+    root           name of the robot's first body, if several bodies move in the world of an MJCF; psdmc leaves out the
+                   other bodies
+    xacro_args     values of the arguments of a xacro file, by name
+    packages       folders of ROS packages that a xacro file uses, by package name; psdmc also looks for packages in
+                   ROS_PACKAGE_PATH and AMENT_PREFIX_PATH
+    unknown        links whose masses and inertias are unknown: a list, one name, or "all". "missing" means all
+                   links without an inertia in the file. Without this option, such links are massless
 
-    Raises InputError if the file or an option is wrong. Raises DerivationError if the model needs too much memory or time.
+    Raises InputError if the file or an option is wrong. Raises DerivationError if the file has no mistake but the model
+    needs other options, for example `expand=False` because E and P need too much memory.
 
     Source: Lloyd, Irani and Ahmadi, Mech. Mach. Theory 156 (2021) 104149.
 
@@ -141,27 +147,28 @@ def emit_c(
     friction: bool = False,
     bodies: bool = False,
 ) -> Changes:
-    """Write the C package of a model into a folder. Returns the names of the files that were written or removed.
+    """Write the C package of a model into a folder. Returns the names of the files that psdmc wrote or removed.
 
     model      a model, or the path of a model file
-    directory  folder to write: missing, empty, or written by psdmc before
-    lowering   how psdmc makes the arithmetic: "expanded" from E and P, "factored" by a recursion, "auto": the cheaper
+    directory  folder for the package; it must be missing, empty, or already hold a package that psdmc wrote
+    lowering   method that generates the arithmetic: "expanded" from E and P, "factored" from a recursion over the links;
+               "auto": the method that needs fewer operations
     functions  names of functions, or one name; None: the default functions
-    real       precision, "float64" or "float32"; None: the target's
-    trig       sine and cosine: "inline", "freestanding" (without libm) or "libm"; None: the target's
-    name       name of the robot in C, the prefix of all symbols; None: the model's
-    force      True: write into a folder with other files, and replace edited files of the package. psdmc deletes no
-               foreign file, and keeps one of the same name as NAME.orig
+    real       precision, "float64" or "float32"; None: the precision of the target
+    trig       how the code computes sines: "inline", "freestanding" (without libm) or "libm"; None: as the target does
+    name       name of the robot in C, with which all symbols begin; None: the name of the model
+    force      True: also write into a folder with files that psdmc did not write, and over edited package files. psdmc
+               deletes no file that it did not write. A file with the same name as a package file becomes NAME.orig
     progress   function that psdmc calls with the name of each stage, such as print
-    payload    True: add functions that add a load to theta_b
-    adapters   programs for which psdmc adds code, such as "casadi"
-    target     processor to generate for: "native", "x86-64-v3", "neon", "cortex-m4f" and others
-    friction   True: add the friction torques of a model that was calibrated from logs
-    bodies     True: add a function that computes theta_b from the masses and inertias of all links
+    payload    True: add the functions that change theta_b for a load
+    adapters   programs for which psdmc adds code to the package, such as "casadi"
+    target     processor for which psdmc generates code, such as "native", "x86-64-v3", "neon" or "cortex-m4f"
+    friction   True: add the function that computes friction torques, for a model that was calibrated from logs
+    bodies     True: add the function that computes theta_b from the masses and inertias of all links
 
-    Raises InputError if an option is wrong, or if the mass matrix is not positive definite within the joint limits: leave
-    out forward_dynamics then. Raises InputError also if `payload` or `bodies` contradicts an assumption of the model, or
-    if `friction` is true and the model has none.
+    Raises InputError if an option is wrong, or if `friction` is true and the model has no friction. Raises it also if the
+    assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`, or if the mass matrix is not positive
+    definite within the joint limits. In this last case, generate only functions that do not solve for accelerations.
     """
     own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)
@@ -259,14 +266,14 @@ def compile(
 ) -> CompiledRobot[Any]:
     """Compile the functions of a model for this machine. Returns a CompiledRobot, whose methods take NumPy arrays.
 
-    psdmc keeps the library in a cache, so a second call for the same model and options is fast.
+    psdmc keeps the compiled library in a cache, so a second call for the same model and options is fast.
 
     model      a model, or the path of a model file
-    functions  names of functions, or one name: psdmc compiles only these. None: psdmc compiles the default functions at
-               once, and each other function at its first call
+    functions  names of functions, or one name, to compile only these functions. None: psdmc compiles the default functions
+               at once, and each other function at its first call
 
-    The other options are those of `emit_c`. Raises InputError if the target has no functions for many states. Raises
-    ToolchainError if the compiler or the CPU does not support the target.
+    `emit_c` explains the other options. Raises InputError if the target is a microcontroller, because Python needs the
+    functions for many states. Raises ToolchainError if the compiler or the CPU does not support the target.
 
     >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP
     >>> robot.gravity([0.0, 0.0, 0.0, 0.0]).dtype  # doctest: +SKIP

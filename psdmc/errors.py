@@ -19,9 +19,9 @@ is incomplete."""
 
 
 class PsdmcError(Exception):
-    """Base class of the errors that a user can cause. The attribute `message` names what is wrong, `hint` the remedy.
+    """Base class of the errors that a user can cause.
 
-    Tracebacks print the hint below the message.
+    The attribute `message` says what is wrong, and the attribute `hint` says what to do. A traceback prints both.
     """
 
     exit_status = 1
@@ -35,25 +35,38 @@ class PsdmcError(Exception):
 
 
 class InputError(PsdmcError):
-    """psdmc raises this error if a file, an option or an argument is wrong: change the input. Exit status 2."""
+    """psdmc raises this error if an input file, an option or an argument is wrong.
+
+    A psdmc command then ends with exit status 2.
+    """
 
     exit_status = 2
 
 
 class DerivationError(PsdmcError):
-    """psdmc raises this error if the robot file is right but the model needs other options. Exit status 3."""
+    """psdmc raises this error if a robot file has no mistake, but psdmc cannot derive a model with the given options.
+
+    For example, E and P of a robot with many joints can need too much memory; the option `expand=False` leaves them out.
+    A psdmc command then ends with exit status 3.
+    """
 
     exit_status = 3
 
 
 class ToolchainError(PsdmcError):
-    """psdmc raises this error if a compiler, a program or a folder of this machine fails. Exit status 4."""
+    """psdmc raises this error if a compiler, another program, a disk or a folder of this machine fails.
+
+    A psdmc command then ends with exit status 4.
+    """
 
     exit_status = 4
 
 
 class InternalError(Exception):
-    """psdmc raises this error if psdmc itself has a fault: please report the message and your input."""
+    """psdmc raises this error if psdmc itself has a bug. Please report the error message and your input.
+
+    A psdmc command then ends with exit status 70.
+    """
 
 
 def exit_status_of(action: Callable[[], int | None]) -> int:

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.identify.steps import JointQuality, StepQuality
 from psdmc.calibration.plant.virtual_robot import VirtualRobot, load_virtual_robot
-from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
+from psdmc.calibration.verdict.record import Calibration
 from psdmc.compiler import derive
+from psdmc.model.calibrated import JointQuality, NumberRow, ParameterRow, Quality, StepQuality
 from psdmc.model.dynamics_model import DynamicsModel
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

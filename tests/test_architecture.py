@@ -17,6 +17,7 @@ MAY_IMPORT = {
     "robot": set(),
     "dynamics": {"robot"},
     "model": {"robot", "dynamics", "friction"},
+    "links": {"robot", "dynamics", "model"},
     "derivation": {"robot", "dynamics", "model"},
     "target": set(),
     "program": {"target"},
@@ -28,12 +29,12 @@ MAY_IMPORT = {
     "backends": {"robot", "program", "friction", "model", "recipes", "functions", "target"},
     "toolchain": {"robot", "backends", "program", "functions", "target"},
 }
-MAY_IMPORT["model_functions"] = set(MAY_IMPORT) - {"derivation", "verification"}
+MAY_IMPORT["model_functions"] = set(MAY_IMPORT) - {"links", "derivation", "verification"}
 LEFT_OF_TOOLS = set(MAY_IMPORT) | {"compiler"}
 MAY_IMPORT |= {
     "bench": LEFT_OF_TOOLS | {"lower"},
     "calibration": LEFT_OF_TOOLS,
-    "export": {"robot", "dynamics", "model", "friction", "calibration"},
+    "export": {"robot", "dynamics", "friction", "model", "links"},
     "report": LEFT_OF_TOOLS | {"bench", "calibration"},
     "compiler": set(MAY_IMPORT),
     "cli": LEFT_OF_TOOLS | {"bench", "calibration", "export", "report"},
@@ -46,6 +47,7 @@ OUTSIDE = {
     "robot": {"numpy", "pinocchio", "defusedxml", "mujoco", "xacro"},
     "dynamics": {"numpy"},
     "model": {"numpy", "scipy", "pandas", "sympy"},
+    "links": {"numpy"},
     "derivation": {"numpy", "scipy"},
     "verification": {"numpy"},
     "program": {"numpy"},
@@ -249,6 +251,57 @@ def test_every_room_is_in_the_table(stage: str):
 def test_every_folder_is_a_stage_of_the_table():
     folders = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"}
     assert folders <= set(MAY_IMPORT)
+
+
+def test_the_compiler_never_imports_calibration():
+    assert {stage for stage, others in MAY_IMPORT.items() if "calibration" in others} == {"report", "cli"}
+
+
+PICKING = {
+    "load.py",
+    "from_parts.py",
+    "store.py",
+    "calibrated_json.py",
+    "show_json.py",
+    "urdf_words.py",
+    "from_source.py",
+}
+"""Files that may name the key `calibration`: model files are read and written there, the others mean another thing."""
+SENTENCES = {"words", "reasons", "doubts", "suspects", "warnings", "notes", "visibility"}
+"""Attributes that hold sentences for people."""
+
+
+def test_a_calibration_is_read_as_calibrated_only():
+    """No module picks a calibration out of plain values by its key."""
+    keys = {
+        path.name
+        for _, path in modules()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and node.value == "calibration"
+    }
+    assert keys <= PICKING | {"calibrate.py"}  # of which joints it is, in words
+    assert "load.py" in keys
+
+
+def test_nothing_is_decided_by_a_sentence():
+    """No comparison with, or search in, an attribute that holds sentences: their codes are for that."""
+    found = [
+        f"{path.relative_to(PACKAGE)}:{node.lineno}"
+        for _, path in modules()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for part in searched(node)
+        if isinstance(part, ast.Attribute) and part.attr in SENTENCES
+    ]
+    assert found == []
+
+
+def searched(node: ast.AST) -> list[ast.expr]:
+    """What an expression compares or searches in."""
+    if isinstance(node, ast.Compare):
+        return [node.left, *node.comparators]
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        return [node.func.value] if node.func.attr in ("startswith", "endswith", "find", "index") else []
+    return []
 
 
 def test_no_vague_module_names():

@@ -245,4 +245,4 @@ def test_editors_see_them() -> None:
     model = bundled_model("scara")
     assert set(SIGNATURES) <= set(dir(model))
     assert str(inspect.signature(model.forward_dynamics)) == "(q, qd, tau, theta_b=None, *, out=None)"
-    assert "Returns qdd (..., nv)" in model.forward_dynamics.__doc__
+    assert "qdd  (..., nv) joint accelerations" in model.forward_dynamics.__doc__

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from psdmc.calibration.identify.state_friction import PARAMETERS, StateLawView
 from psdmc.calibration.logs.log import Array
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
+from psdmc.model.calibrated import Calibrated, by_joint
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,17 +72,17 @@ def actuator_files(view: ActuatorView) -> dict[str, str]:
 
 
 def calibrated_actuators(
-    robot: str, joint_names: Sequence[str], calibration: Mapping[str, Any], real: str = "double"
+    robot: str, joint_names: Sequence[str], found: Calibrated, real: str = "double"
 ) -> ActuatorView:
-    """From the `calibration` that a calibrated model's provenance holds; InputError where it has no such friction."""
-    values = {(row["joint"], row["name"]): row["value"] for row in calibration["friction"]}
+    """From what a calibration found; InputError where it has no friction with a state."""
+    values = by_joint(found.friction)
     missing = [joint for joint in joint_names if any((joint, name) not in values for name in PARAMETERS)]
     if missing:
         raise InputError(
             f"{robot}: no friction with a state was identified for joint(s) {', '.join(missing)}",
             "calibrate with friction runs of every joint; friction of one log's fit is in `psdmc emit-c --friction`",
         )
-    constants = {row["joint"]: row["value"] for row in calibration["motors"]}
+    constants = {row.joint: row.value for row in found.motors}
     return ActuatorView(
         real=real,
         robot=robot,

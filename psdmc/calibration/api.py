@@ -25,17 +25,19 @@ def calibrate(
 ) -> Calibration:
     """Fit a model to logs of the robot. Returns the calibrated model, the identified values and the verdict.
 
-    The result's `verdict.word` is "usable", "usable, with doubts" or "not usable". `verdict.reasons`, `.suspects` and
-    `verdict.doubts` explain the word. The result's `model` is the calibrated model, for every verdict.
+    The attribute `verdict.word` of the result is "usable", "usable, with doubts" or "not usable". The lists
+    `verdict.reasons`, `verdict.suspects` and `verdict.doubts` explain the verdict. The attribute `model` is the calibrated
+    model, even if the verdict is "not usable".
 
     model              a model, or the path of a model file
     logs               paths of the logs, or the path of a log description (TOML)
     options            filter and friction law of the fit; None: those of the log description, or the defaults
-    torque_constants   N m/A at the joint (gear included) by joint name, for logs of currents; with `loaded`, only for
-                       joints that do not feel the load
-    validation         logs that only test the fit; psdmc then fits to all other logs, and tests with none of them
-    loaded             more logs of currents, recorded with a known load on the robot, to find torque constants
-    load               the known load: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load file
+    torque_constants   N m/A at the joint (after the gear) by joint name, for logs of motor currents. With `loaded`, give
+                       only the joints whose current does not depend on the load
+    validation         logs that psdmc uses only to test the fit. psdmc then fits the model to all of `logs`. Without
+                       validation logs, psdmc tests the fit with the last part of each log
+    loaded             more logs of motor currents, recorded with a known load, from which psdmc finds torque constants
+    load               the known load: mass (kg) and centre of mass (m, in the tip frame) as four numbers, or a load file
 
     Raises InputError if a file is missing or a log cannot be used.
     """

@@ -16,11 +16,7 @@ from psdmc.calibration.identify.known_load import KnownLoad
 from psdmc.calibration.identify.linear_fit import calibrate_linear
 from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.motor_constants import motors_of_logs
-from psdmc.calibration.identify.physical import (
-    NotPhysical,
-    PhysicalOptions,
-    require_cvxpy,
-)
+from psdmc.calibration.identify.physical import NotPhysical
 from psdmc.calibration.identify.physical_steps import physical_steps
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.steps import CalibrationOptions
@@ -28,13 +24,11 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.motors_of_loads import LoadedLogs, motors_with_load, with_loaded_logs
 from psdmc.calibration.sources import LogNaming, campaign_of, log_sources
-from psdmc.calibration.verdict.four_step_record import four_step_record
-from psdmc.calibration.verdict.judged_record import judged_record
-from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
-from psdmc.calibration.verdict.record import Calibration, with_data
+from psdmc.calibration.verdict.judge import NOT_PHYSICAL, with_verdict_on_campaign, with_verdict_on_logs
+from psdmc.calibration.verdict.record import Calibration, four_step_record, judged_record, with_data
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
-from psdmc.calibration.verdict.verdict_on import with_verdict_on_campaign, with_verdict_on_logs
 from psdmc.errors import InputError
+from psdmc.links.link_terms import PhysicalOptions, require_cvxpy
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 from psdmc.robot.derivable import require_axes

@@ -9,15 +9,14 @@ from psdmc.calibration.identify.essential import Essential, EssentialOptions, es
 from psdmc.calibration.identify.knowledge import Knowledge
 from psdmc.calibration.identify.linear_fit import LinearResult
 from psdmc.calibration.identify.linear_options import LinearOptions
-from psdmc.calibration.identify.physical import NotPhysical, Physical, PhysicalOptions, nearest_physical
+from psdmc.calibration.identify.physical import NotPhysical, Physical, nearest_physical
 from psdmc.calibration.identify.stated_prior import theta_covariance, with_prior
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.verdict.judged_record import judged_record
-from psdmc.calibration.verdict.linear_record import linear_record
-from psdmc.calibration.verdict.reasons import NOT_PHYSICAL
-from psdmc.calibration.verdict.record import Calibration, with_data, with_model
+from psdmc.calibration.verdict.judge import NOT_PHYSICAL
+from psdmc.calibration.verdict.record import Calibration, judged_record, linear_record, with_data, with_model
 from psdmc.errors import InputError, InternalError
+from psdmc.links.link_terms import PhysicalOptions
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 

@@ -15,12 +15,13 @@ from psdmc.calibration.identify.motor_constants import one_quantity, require_con
 from psdmc.calibration.identify.motor_logs import motors_by_load
 from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
-from psdmc.calibration.identify.steps import StepQuality, judged
+from psdmc.calibration.identify.steps import judged
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.verdict.delivered import log_parts, reread
-from psdmc.calibration.verdict.record import Calibration, data_of, with_model
+from psdmc.calibration.verdict.record import Calibration, logs_used, with_model
 from psdmc.errors import InputError
+from psdmc.model.calibrated import LoadUsed, StepQuality, code_of
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress
 
@@ -84,7 +85,7 @@ def _together(names: Sequence[str], found: MotorResult, given: Mapping[str, floa
     missing = [k for k, value in enumerate(constants) if np.isnan(value)]
     if missing:
         seen = ",".join(f"{names[k]}={constants[k]:.6g}" for k in range(len(names)) if found.identified[k])
-        reasons = [text for text in found.warnings if "not found" in text]
+        reasons = [text for text in found.warnings if code_of(text) == "constant_not_found"]
         raise InputError(
             f"{'; '.join(reasons)} (found: {seen})",
             "or give --torque-constants for " + ", ".join(names[k] for k in missing),
@@ -98,15 +99,12 @@ def with_loaded_logs(
 ) -> Calibration:
     """The record with what its model's file, read back, says of the known load's torque: table 3's motor column."""
     load = loaded.load
-    facts = {
-        "with_load": data_of(loaded.logs),
-        "load": {
-            "mass_kg": float(load.mass),
-            "com_m": [float(value) for value in load.com],
-            "inertia_kg_m2": [float(value) for value in load.inertia],
-            "frame": load.frame or record.model.mechanism.tip_name,
-        },
-    }
+    used = LoadUsed(
+        float(load.mass),
+        tuple(float(value) for value in load.com),
+        tuple(float(value) for value in load.inertia),
+        load.frame or record.model.mechanism.tip_name,
+    )
     notes = (
         ()
         if not load.is_point
@@ -117,7 +115,8 @@ def with_loaded_logs(
         replace(
             record,
             steps=(step, *record.steps) if step.joints else record.steps,
-            facts={**record.facts, **facts},
+            logs=(*record.logs, *logs_used(loaded.logs, "with_load")),
+            load=used,
             warnings=(*found.warnings, *record.warnings),
             notes=(*record.notes, *notes),
         )

@@ -14,11 +14,11 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import names_of
 from psdmc.calibration.identify.load_fit import LOAD, LOAD_NAMES, LoadFit, fit_load
 from psdmc.calibration.identify.motor_constants import motors_of_logs, one_quantity
-from psdmc.calibration.identify.physical import require_cvxpy
 from psdmc.calibration.identify.physical_load import about_centre, nearest_load
 from psdmc.calibration.identify.predictor import ChainRegressor, Regressor
 from psdmc.calibration.identify.quality import qualities
-from psdmc.calibration.identify.visibility import IDENTIFIED, WEAK, Visibility, visibility
+from psdmc.calibration.identify.steps import step_of
+from psdmc.calibration.identify.visibility import Visibility, visibility
 from psdmc.calibration.logs.filter import States
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
@@ -26,10 +26,12 @@ from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.payload_found import PayloadFound, load_numbers
 from psdmc.calibration.sources import plain_sources
 from psdmc.calibration.verdict.delivered import beside, delivered
-from psdmc.calibration.verdict.verdict import JointFigures, Verdict
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
 from psdmc.errors import InputError
+from psdmc.links.link_terms import require_cvxpy
+from psdmc.model.calibrated import SHOWN, JointFigures, Verdict, code_of
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.grounds import Ground
 from psdmc.model.payload import carrying_frame, load_map
 from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_axes
@@ -48,14 +50,15 @@ def identify_payload(
     regressor: Regressor | None = None,
     progress: Progress = silent,
 ) -> PayloadFound:
-    """Find the mass, centre of mass and inertia of a rigid load from logs. Returns these values with the verdict.
+    """Find the mass, centre of mass and inertia of a rigid load from logs. Returns these values and a verdict.
 
-    model             model of the robot without the load: calibrated, or with all inertias and unknown friction
-    frame             name of the model's frame for the results; None: the tip
-    logs              logs that were recorded with the load, or a log description
+    model             model of the robot without the load. If the model is not calibrated, psdmc takes theta_b as exact and
+                      the friction as unknown
+    logs              paths of logs that were recorded with the load, or the path of a log description (TOML)
+    frame             named frame of the model in which psdmc gives the results; None: the tip frame
     options           filter and friction law of the fit; None: those of the log description, or of the model's calibration
-    torque_constants  N m/A at the joint (gear included) by joint name, for logs of currents; None: the model's
-    regressor         function that computes the regressor; None: psdmc's own in NumPy
+    torque_constants  N m/A at the joint (after the gear) by joint name, for logs of motor currents; None: those of the model
+    regressor         function that computes the regressor of the robot; None: psdmc computes it in NumPy
     progress          function that psdmc calls with the name of each stage, such as print
 
     Raises InputError if a log cannot be used, if no joint moves in the logs, or if the model's theta_b is unknown.
@@ -101,20 +104,17 @@ def _of_calibration(
     model: DynamicsModel,
 ) -> tuple[Array, LinearOptions, Array | None, Mapping[str, float] | None]:
     """Of the model's calibration: theta_b's standard deviations, the fit's options, friction (n, f), torque constants."""
-    kept = model.provenance.get("calibration")
-    if not isinstance(kept, Mapping):
+    kept = model.calibrated
+    if kept is None:
         return np.zeros(model.l), LinearOptions(), None, None
     found = delivered(model)
-    rows = kept.get("base_parameters", [])
-    std = np.zeros(model.l)
-    if len(rows) == model.l:
-        std = np.array([0.0 if row["std"] is None else float(row["std"]) for row in rows])
+    std = np.where(np.isfinite(kept.std), kept.std, 0.0)
     law = found.prediction
     if not law.is_linear:
-        step = law.steps["inertial"]
+        step = step_of(law.steps["inertial"])
         return std, replace(LinearOptions(), filter=step.filter), None, found.constants or None
     options = LinearOptions(
-        filter=law.steps["all"].filter,
+        filter=step_of(law.steps["all"]).filter,
         exponents=law.exponents,
         sign_speed=law.sign_speed,
         offset=law.offset,
@@ -127,7 +127,7 @@ def _of_calibration(
 
 def _beside(model: DynamicsModel) -> Callable[[States, NDArray[np.intp]], Array] | None:
     """The torque of what the model's calibration found beside rigid bodies and plain friction."""
-    if not isinstance(model.provenance.get("calibration"), Mapping):
+    if model.calibrated is None:
         return None
     found = delivered(model)
     if found.columns.by_load:
@@ -221,31 +221,23 @@ def _verdict(found: LoadFit, vector: Array, words: Mapping[str, str], model: Dyn
     samples = int((~out).sum()) * len(model.mechanism) / max(solved.rank, 1)
     reasons, doubts = [], []
     if samples < limits.fewest_samples:
-        reasons.append(
-            f"{samples:.3g} independent samples per unknown, expected at least {limits.fewest_samples:g}"
-        )
+        reasons.append(Ground("load_starved", {"samples": samples, "limit": limits.fewest_samples}))
     elif samples < limits.few_samples:
-        doubts.append(f"{samples:.3g} independent samples per unknown")
-    std = float(solved.std[0])
-    if words["mass"] not in (IDENTIFIED, WEAK):
-        reasons.append(f"the log does not show the load's mass: {words['mass']}")
-    elif solved.values[0] < -SURE * std:
-        reasons.append(
-            f"the mass is {solved.values[0]:.3g} +- {std:.2g} kg: is the model that of the robot without "
-            "its load, and has the log's torque the same sign?"
-        )
-    elif solved.values[0] < SURE * std:
-        doubts.append(
-            f"no mass is seen: {solved.values[0]:.3g} +- {std:.2g} kg; centre and inertia mean nothing"
-        )
+        doubts.append(Ground("load_few_samples", {"samples": samples}))
+    mass, std = float(solved.values[0]), float(solved.std[0])
+    if code_of(words["mass"]) not in SHOWN:
+        reasons.append(Ground("mass_hidden", {"seen": words["mass"]}))
+    elif mass < -SURE * std:
+        reasons.append(Ground("mass_negative", {"mass": mass, "std": std}))
+    elif mass < SURE * std:
+        doubts.append(Ground("no_mass", {"mass": mass, "std": std}))
     for joint, both in zip(model.joint_names, held, strict=True):
-        if both.r2 < limits.poor_r2:
-            reasons.append(f"joint {joint}: held-out R^2 {both.r2:.3f} of the whole torque")
-        elif both.r2 < limits.fair_r2:
-            doubts.append(f"joint {joint}: held-out R^2 {both.r2:.3f} of the whole torque")
-    hidden = [name for name in LOAD_NAMES[1:] if words[name] not in (IDENTIFIED, WEAK)]
+        if both.r2 < limits.fair_r2:
+            low = Ground("load_low_r2", {"joint": joint, "r2": both.r2})
+            (reasons if both.r2 < limits.poor_r2 else doubts).append(low)
+    hidden = [name for name in LOAD_NAMES[1:] if code_of(words[name]) not in SHOWN]
     if hidden:
-        doubts.append(f"not shown by the log: {', '.join(hidden)} about the frame's origin")
+        doubts.append(Ground("load_hidden", {"names": hidden}))
     nothing = float("nan")
     joints = tuple(
         JointFigures(joint, both.r2, both.rmse, nothing, nothing, False, nothing, nothing, nothing, nothing)
@@ -258,7 +250,7 @@ def _notes(
     model: DynamicsModel, words: Mapping[str, str], logs: Sequence[AnyLog], known: Array, moved: Array
 ) -> tuple[str, ...]:
     notes = [note for log in logs for note in log.notes]
-    if "calibration" not in model.provenance:
+    if model.calibrated is None:
         notes.append(
             "the model is not calibrated: standard deviations take its theta_b as exact, and its friction as unknown"
         )
@@ -267,7 +259,7 @@ def _notes(
             f"{int((known == 0.0).sum())} of {model.l} base parameters of the model are not fixed by its own "
             "calibration: what is wrong with them is not in the standard deviations"
         )
-    kept = {name: word for name, word in words.items() if word not in (IDENTIFIED, WEAK)}
+    kept = {name: word for name, word in words.items() if code_of(word) not in SHOWN}
     notes += [f"{name} about the frame's origin: {word}" for name, word in kept.items()]
     if moved.max(initial=0.0) > 1.0:
         notes.append(f"to be a body the load was moved by up to {moved.max():.2g} standard deviations")

@@ -13,8 +13,8 @@ import numpy as np
 from psdmc.atomic import write_whole
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.toml_tables import read_toml
-from psdmc.calibration.verdict.verdict import Verdict
 from psdmc.errors import InputError
+from psdmc.model.calibrated import Verdict
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.inertia import INERTIA_NAMES, inertia_matrix, six_of
 

@@ -10,8 +10,8 @@ import numpy as np
 from psdmc.calibration.identify.state_friction import PARAMETERS
 from psdmc.calibration.logs.wording import listed
 from psdmc.calibration.plant.virtual_robot import VirtualRobot
-from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
+from psdmc.model.calibrated import Calibrated
 from psdmc.model.dynamics_model import DynamicsModel
 
 
@@ -50,7 +50,7 @@ class Comparison:
         }
 
 
-def compare(record: Calibration, true_model: DynamicsModel, robot: VirtualRobot) -> Comparison:
+def compare(record: Calibrated, true_model: DynamicsModel, robot: VirtualRobot) -> Comparison:
     """Errors of a campaign's record; the model of the truth has the same base parameters as the record's."""
     assert true_model.theta_b is not None
     truth = true_model.theta_b

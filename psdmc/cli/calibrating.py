@@ -137,10 +137,9 @@ def calibrate(
     from psdmc.calibration.calibrate import CalibrateOptions
     from psdmc.calibration.identify.essential import EssentialOptions
     from psdmc.calibration.sources import LogNaming
-    from psdmc.calibration.verdict.record import verdict_of
-    from psdmc.calibration.verdict.record_rows import dropped_links
-    from psdmc.calibration.verdict.said_once import unsaid_warnings
+    from psdmc.calibration.verdict.record import DROPPED_LINKS, dropped_links, verdict_of
     from psdmc.cli.show_checks import print_accuracy, print_torque_constants, print_verdict
+    from psdmc.model.calibrated import code_of
     from psdmc.model.load import load as load_model
     from psdmc.report.calibrate_commands import calibrate_command
 
@@ -148,8 +147,7 @@ def calibrate(
     check_output(output, *read)
     check_report(report, output, *read)
     known = load_model(model)
-    dropped = dropped_links(known)
-    for warning in dropped:
+    for warning in dropped_links(known):
         print(f"warning: {one_line(warning)}", flush=True)
     with steps() as progress:
         record = calibrate_command(
@@ -184,8 +182,8 @@ def calibrate(
         print("note: --physical is the default; you can leave it out")
     for note in record.notes:
         print(f"note: {one_line(note)}")
-    for warning in unsaid_warnings(record):
-        if warning not in dropped:
+    for warning in record.unsaid:
+        if code_of(warning) != DROPPED_LINKS:
             print(f"warning: {one_line(warning)}")
     numbers = None if report is None else report.with_suffix(".json")
     for written, what in (

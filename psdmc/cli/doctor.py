@@ -60,7 +60,7 @@ PROGRAMS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Ground:
     """One part.
 
     found    its version or place; '' where it is missing
@@ -76,11 +76,11 @@ class Finding:
     remedy: str
 
 
-def findings() -> tuple[Finding, ...]:
+def findings() -> tuple[Ground, ...]:
     """All parts, what psdmc cannot do without first."""
     return (
-        Finding("psdmc", psdmc_version(), True, "", ""),
-        Finding(
+        Ground("psdmc", psdmc_version(), True, "", ""),
+        Ground(
             "python", f"{platform.python_version()}, {platform.system()} {platform.machine()}", True, "", ""
         ),
         _compiler(),
@@ -92,25 +92,25 @@ def findings() -> tuple[Finding, ...]:
     )
 
 
-def missing(parts: Sequence[Finding]) -> tuple[Finding, ...]:
+def missing(parts: Sequence[Ground]) -> tuple[Ground, ...]:
     """The parts that psdmc cannot do without and that are not there."""
     return tuple(part for part in parts if part.needed and not part.found)
 
 
-def _package(name: str, extra: str, purpose: str) -> Finding:
+def _package(name: str, extra: str, purpose: str) -> Ground:
     try:
         found = importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
         found = ""
     remedy = f"pip install 'psdmc[{extra}]'" if extra else f"pip install {name}"
-    return Finding(name, found, not extra, purpose, remedy)
+    return Ground(name, found, not extra, purpose, remedy)
 
 
-def _program(name: str, purpose: str, remedy: str) -> Finding:
-    return Finding(name, shutil.which(name) or "", False, purpose, remedy)
+def _program(name: str, purpose: str, remedy: str) -> Ground:
+    return Ground(name, shutil.which(name) or "", False, purpose, remedy)
 
 
-def _compiler() -> Finding:
+def _compiler() -> Ground:
     """The C compiler that psdmc takes, tried on a file, or why it takes none."""
     from psdmc.toolchain.compiler_command import find_compiler
 
@@ -118,24 +118,22 @@ def _compiler() -> Finding:
     try:
         compiler = find_compiler()
     except PsdmcError as error:
-        return Finding("C compiler", "", True, f"{purpose}: {error.message}", error.hint or "install gcc")
+        return Ground("C compiler", "", True, f"{purpose}: {error.message}", error.hint or "install gcc")
     number = re.search(r"\d+(\.\d+)+", compiler.version)
-    return Finding(
-        "C compiler", " ".join([*compiler.command, number[0] if number else ""]), True, purpose, ""
-    )
+    return Ground("C compiler", " ".join([*compiler.command, number[0] if number else ""]), True, purpose, "")
 
 
-def _direct_calls() -> Finding:
+def _direct_calls() -> Ground:
     """Whether compiled robots are called without a detour through Python, or why not."""
     from psdmc.toolchain.direct_calls import direct_calls
 
     found, purpose = direct_calls(), "one state from Python in less than a microsecond"
     if found.make is None:
-        return Finding("direct calls", "", False, f"{purpose}: {found.reason}", found.remedy)
-    return Finding("direct calls", "yes", False, purpose, "")
+        return Ground("direct calls", "", False, f"{purpose}: {found.reason}", found.remedy)
+    return Ground("direct calls", "yes", False, purpose, "")
 
 
-def _cache() -> Finding:
+def _cache() -> Ground:
     """The folder of the compile cache, or why it cannot be used."""
     from psdmc.toolchain.cache_room import cache_contents
 
@@ -143,5 +141,5 @@ def _cache() -> Finding:
     try:
         kept = cache_contents()
     except PsdmcError as error:
-        return Finding("cache", "", True, f"{purpose}: {error.message}", error.hint or "set PSDMC_CACHE_DIR")
-    return Finding("cache", f"{kept.place}", True, purpose, "")
+        return Ground("cache", "", True, f"{purpose}: {error.message}", error.hint or "set PSDMC_CACHE_DIR")
+    return Ground("cache", f"{kept.place}", True, purpose, "")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from psdmc.cli.next_step import one_line
 from psdmc.cli.tables import TERMS, Table, print_line, print_note, print_table
 from psdmc.lower.admitted import admitted
 from psdmc.lower.kernels import Lowering, lower
+from psdmc.model.calibrated import WHOLE, Calibrated, NumberRow, Quality, Verdict
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.joined_units import joined_units
 from psdmc.model.summary import Summary, summary, term_texts
@@ -21,7 +22,7 @@ from psdmc.robot.mechanism import Mechanism
 def print_model(model: DynamicsModel) -> None:
     """The model at a glance: robot, joints, sizes, base parameters, certificate, notes."""
     found = summary(model)
-    calibrated = model.provenance.get("calibration")
+    calibrated = model.calibrated
     if calibrated is not None:
         print_calibration(calibrated)
     print_line(f"{found.name}: {found.base} to {found.ends}, {found.convention} frames")
@@ -30,7 +31,7 @@ def print_model(model: DynamicsModel) -> None:
     print()
     print_table(_joints(model.mechanism, joint_errors(model.mechanism, found.certificate)))
     print()
-    print_table(_parameters(found, calibrated or {}))
+    print_table(_parameters(found, calibrated))
     for line in _unknowns(model):
         print_line(line)
     print()
@@ -95,7 +96,7 @@ def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
     return Table(heads, rows)
 
 
-def _parameters(found: Summary, calibrated: Mapping[str, Any]) -> Table:
+def _parameters(found: Summary, calibrated: Calibrated | None) -> Table:
     """theta_b, numbered from 0 as in the generated header and in Python."""
     stds = standard_deviations(calibrated, len(found.base_parameters))
     heads = ("theta_b", "value", *(["+-"] if calibrated else []), "unit", "equation, about the link frames")
@@ -202,71 +203,68 @@ MOST_LOGS = 8
 """Logs that are listed; a campaign has thirty."""
 
 
-def print_calibration(kept: Mapping[str, Any]) -> None:
-    """Verdict, logs and their dates, held-out R^2 and residual of every joint, and its friction.
-
-    kept  the `calibration` of a model's provenance; what an older psdmc did not write is left out
-    """
-    for line in _verdict(kept.get("verdict")):
+def print_calibration(found: Calibrated) -> None:
+    """Print verdict, logs and their dates, held-out R^2 and residual of every joint, and its friction; what an older psdmc
+    did not write is left out."""
+    for line in _verdict(found.verdict):
         print(line)
-    print(f"method: {one_line(str(kept.get('method', 'unknown')))}")
-    facts = kept.get("facts", {})
-    logs = [("log", row) for row in facts.get("data", [])]
-    logs += [("log with a known load", row) for row in facts.get("with_load", [])]
-    for what, row in logs[:MOST_LOGS]:
-        date = f", {row['date']}" if row.get("date") else ""
-        held = ", held out whole" if row.get("use") == "validate" else ""
-        print(f"{what}: {one_line(row['log'])}, {row['rows']:,} rows, {row['seconds']:.4g} s{date}{held}")
-    if len(logs) > MOST_LOGS:
-        print(f"and {len(logs) - MOST_LOGS} more logs")
-    if kept.get("prediction", {}).get("coupling"):
+    print(f"method: {one_line(found.method)}")
+    for log in found.logs[:MOST_LOGS]:
+        what = "log with a known load" if log.use == "with_load" else "log"
+        date = f", {log.date}" if log.date else ""
+        held = ", held out whole" if log.use == "validate" else ""
+        print(f"{what}: {one_line(log.log)}, {log.rows:,} rows, {log.seconds:.4g} s{date}{held}")
+    if len(found.logs) > MOST_LOGS:
+        print(f"and {len(found.logs) - MOST_LOGS} more logs")
+    if found.prediction is not None and found.prediction.coupling:
         print("friction: of the motors, some of which drive several joints together")
-    print_table(_calibrated_joints(kept))
-    if kept.get("springs"):
-        each = [(one_line(row["spring"]), row["name"], _row(row), row["unit"]) for row in kept["springs"]]
-        print_table(Table(("spring", "value", "found", "unit"), each))
+    print_table(_calibrated_joints(found))
+    if found.springs:
+        print_table(_springs(found.springs))
     print()
 
 
-def _verdict(verdict: Mapping[str, Any] | None) -> list[str]:
-    if not verdict:
+def _verdict(verdict: Verdict | None) -> list[str]:
+    if verdict is None:
         return ["verdict: none, this model was calibrated by an older psdmc"]
-    kinds = (("not usable", "reasons"), ("likely", "suspects"), ("doubt", "doubts"))
-    lines = [f"  {word}: {one_line(text)}" for word, kind in kinds for text in verdict.get(kind, [])]
-    return [f"verdict: {verdict.get('verdict', 'unknown')}", *lines]
+    return [one_line(line) for line in verdict.lines()]
 
 
-def _calibrated_joints(kept: Mapping[str, Any]) -> Table:
+def _calibrated_joints(found: Calibrated) -> Table:
     """R^2 and RMSE of the whole torque, torque constant and friction, joint by joint."""
-    constants = [*kept.get("motors", []), *kept.get("friction", [])]
-    units = joined_units((row["name"], row["unit"]) for row in constants)
-    by_joint = {(row["joint"], row["name"]): row for row in constants}
-    quality = kept.get("quality", {}).get("All", {})
+    constants = [*found.motors, *found.friction]
+    units = joined_units((row.name, row.unit) for row in constants)
+    by_joint = {(row.joint, row.name): row for row in constants}
+    quality = {step.step: step.joints for step in found.steps}.get(WHOLE, {})
     heads = [f"{name.replace('_', ' ')} [{unit}]" for name, unit in units.items()]
     rows = []
-    for joint in kept.get("joints", []):
-        held_out = quality.get(joint, {}).get("held_out", {})
-        figures = [_number(held_out.get("r2"), ".4f"), _number(held_out.get("rmse"), ".3g")]
+    for joint in found.joint_names:
+        held_out = quality[joint].held_out if joint in quality else Quality(math.nan, math.nan)
+        figures = [_number(held_out.r2, ".4f"), _number(held_out.rmse, ".3g")]
         rows.append((joint, *figures, *(_row(by_joint.get((joint, name))) for name in units)))
     return Table(("joint", "R^2 held out", "RMSE held out", *heads), rows)
 
 
-def _row(row: Mapping[str, Any] | None) -> str:
+def _springs(rows: Sequence[NumberRow]) -> Table:
+    """A line for each value of a spring."""
+    each = [(one_line(row.joint), row.name, _row(row), row.unit) for row in rows]
+    return Table(("spring", "value", "found", "unit"), each)
+
+
+def _row(row: NumberRow | None) -> str:
     """Value and standard deviation; in brackets what the data do not show by itself."""
-    if row is None or row.get("value") is None:
+    if row is None or not math.isfinite(row.value):
         return ""
-    std = row.get("std")
-    text = f"{row['value']:.4g}" if std is None else f"{row['value']:.4g} +- {std:.1g}"
-    return text if row.get("seen", True) else f"({text})"
+    text = f"{row.value:.4g} +- {row.std:.1g}" if math.isfinite(row.std) else f"{row.value:.4g}"
+    return text if row.seen else f"({text})"
 
 
-def _number(value: float | None, form: str) -> str:
-    return "" if value is None else format(value, form)
+def _number(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else ""
 
 
-def standard_deviations(kept: Mapping[str, Any], count: int) -> Sequence[str]:
+def standard_deviations(found: Calibrated | None, count: int) -> Sequence[str]:
     """Describe the standard deviations of the base parameters; empty if the model was not calibrated."""
-    rows = kept.get("base_parameters", [])
-    if len(rows) != count:
+    if found is None or len(found.parameters) != count:
         return [""] * count
-    return ["" if row["std"] is None else f"{row['std']:.2g}" for row in rows]
+    return [f"{std:.2g}" if math.isfinite(std) else "" for std in found.std]

@@ -10,8 +10,7 @@ from psdmc.cli.next_step import one_line
 from psdmc.cli.tables import Table, print_line, print_table
 
 if TYPE_CHECKING:
-    from psdmc.calibration.verdict.record import Calibration
-    from psdmc.calibration.verdict.verdict import Verdict
+    from psdmc.model.calibrated import Calibrated, Verdict
     from psdmc.model.mass_check import MassCheck
     from psdmc.verification.check import CheckRow
 
@@ -52,7 +51,7 @@ def print_verdict(verdict: Verdict) -> None:
         print(one_line(line))
 
 
-def print_accuracy(record: Calibration) -> None:
+def print_accuracy(record: Calibrated) -> None:
     """R^2 on held-out data per joint and step."""
     rows = []
     for joint in record.joint_names:
@@ -61,7 +60,7 @@ def print_accuracy(record: Calibration) -> None:
     print_table(Table(("joint", *(f"{step.step} R^2" for step in record.steps)), rows))
 
 
-def print_torque_constants(record: Calibration) -> None:
+def print_torque_constants(record: Calibrated) -> None:
     """Torque constants that were found, with standard deviations; nothing where none was."""
     found = [row for row in record.motors if row.seen]
     rows = [

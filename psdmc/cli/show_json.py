@@ -12,6 +12,7 @@ from psdmc.cli.show import cost_rows, followed, joint_errors, position_range
 from psdmc.cli.tables import Table, print_line, print_note, print_table
 from psdmc.errors import InputError
 from psdmc.lower.kernels import Lowering
+from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.summary import summary, term_texts
 from psdmc.robot.coordinates import leaders
@@ -50,7 +51,7 @@ def model_json(model: DynamicsModel) -> dict[str, Any]:
         "largest_torque_error": max(found.certificate),
         "snap_torque_change": None if values is None else [_finite(float(value)) for value in values],
         "notes": list(found.notes),
-        "calibration": _plain(model.provenance.get("calibration")),
+        "calibration": None if model.calibrated is None else document(model.calibrated),
         "source": {"name": found.source_name, "sha256": found.source_sha256},
         "options": _plain(model.provenance.get("options")),
         "model_hash": found.content_hash,

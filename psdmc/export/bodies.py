@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psdmc.calibration.identify.physical_links import PhysicalLinks
 from psdmc.dynamics.parameters import moved
 from psdmc.errors import InputError
 from psdmc.export.friction import JointFriction, joint_friction
+from psdmc.links.physical_links import PhysicalLinks
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.inertia import about_com, without_noise

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.atomic import check_place, refuse_foreign_file, write_together, write_whole
-from psdmc.calibration.identify.physical_links import PhysicalLinks, physical_links
 from psdmc.errors import InputError, InternalError
 from psdmc.export.bodies import Written, written
 from psdmc.export.elements import as_text
@@ -18,6 +17,7 @@ from psdmc.export.from_source import urdf_with
 from psdmc.export.mjcf import MARK, mjcf_of
 from psdmc.export.numbers import exact
 from psdmc.export.read_back import LIMIT, Reading, read_mjcf_back, read_urdf_back
+from psdmc.links.physical_links import PhysicalLinks, physical_links
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.progress import Progress, silent
 from psdmc.robot.derivable import require_axes
@@ -53,18 +53,20 @@ class Exported:
 def export_urdf(
     model: DynamicsModel, path: str | Path, mjcf: bool | None = None, progress: Progress = silent
 ) -> Exported:
-    """Write the model as a URDF. Its links have the model's theta_b and physical inertias, nearest to those of the file.
+    """Write a model as a URDF, with masses and inertias that are physically possible and give the model's theta_b.
 
-    If the model comes from a URDF, names, limits and shapes are from that file. Otherwise links, joints and limits are
-    from the model. Friction of a calibrated model is in <dynamics>. Returns the paths, the links' parameters, and the
-    largest torque differences when Pinocchio and MuJoCo read the written files.
+    Many masses and inertias give the same theta_b. psdmc chooses those that are nearest to the ones in the robot file. If
+    the model comes from a URDF, psdmc copies names, limits and shapes from that file. The element <dynamics> has the
+    friction of a calibrated model. psdmc then reads the written files with Pinocchio (MJCF: MuJoCo), and compares the
+    torques with the model. Returns the paths, the parameters of the links and the largest torque differences.
 
-    path      file to write
-    mjcf      True: also write an MJCF with the suffix .xml, which replaces only a file that psdmc wrote; None: only if the
-              model has drive inertias
+    path      URDF file to write
+    mjcf      True: also write an MJCF with the suffix .xml; None: do so only if the model has drive inertias. psdmc
+              replaces an existing .xml file only if psdmc wrote it
     progress  function that psdmc calls with the name of each stage, such as print
 
-    Raises InputError if theta_b is unknown, if no physical links have it (NoSuchLinks), or if a file cannot be written.
+    Raises InputError if theta_b is unknown, or if a file cannot be written. Raises NoSuchLinks, a kind of InputError, if
+    no physically possible masses and inertias give theta_b.
     """
     target = Path(path)
     beside = target.with_suffix(MJCF_SUFFIX)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from psdmc.friction.joints import rows_of
+from psdmc.friction.law import Row
+from psdmc.friction.laws import LAWS
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.limits import shown
 from psdmc.robot.mechanism import Joint
@@ -33,19 +34,21 @@ def joint_friction(model: DynamicsModel) -> dict[str, JointFriction]:
 
     Each law says which constant and which line are nearest to it, if any.
     """
-    kept = model.provenance.get("calibration")
-    if not isinstance(kept, Mapping):
+    calibrated = model.calibrated
+    if calibrated is None:
         return {}
     joints = {joint.name: joint for joint in model.mechanism.joints}
     found: dict[str, dict[str, float]] = {}
-    for row in kept.get("friction", []):
-        value = row.get("value")
-        if row.get("joint") in joints and isinstance(value, float | int) and math.isfinite(value):
-            found.setdefault(row["joint"], {})[row["name"]] = float(value)
-    options = kept.get("prediction", {})
-    coupled = _coupled(options.get("coupling", ()), list(model.joint_names))
+    for row in calibrated.friction:
+        if row.joint in joints and math.isfinite(row.value):
+            found.setdefault(row.joint, {})[row.name] = row.value
+    law = calibrated.prediction
+    word, laws, matrix = ("", LAWS, ()) if law is None else (law.law, law.laws, law.coupling)
+    coupled = _coupled(matrix, model.joint_names)
     return {
-        name: JointFriction(0.0, 0.0, (COUPLED,)) if name in coupled else _of(values, joints[name], options)
+        name: JointFriction(0.0, 0.0, (COUPLED,))
+        if name in coupled
+        else _of(rows_of(values, word, laws), joints[name])
         for name, values in found.items()
     }
 
@@ -64,10 +67,10 @@ def _coupled(matrix: Sequence[Sequence[float]], names: Sequence[str]) -> set[str
     }
 
 
-def _of(values: Mapping[str, float], joint: Joint, options: Mapping[str, Any]) -> JointFriction:
+def _of(rows: Sequence[Row], joint: Joint) -> JointFriction:
     constant, damping, lost = 0.0, 0.0, []
     top = joint.limits.speed if math.isfinite(joint.limits.speed) else ORDINARY_SPEED
-    for term, p in rows_of(values, options):
+    for term, p in rows:
         if term.law.line is None:
             lost += [f"{term.law.about.rstrip('.')} ({term.law.name})"] if any(p) else []
             continue

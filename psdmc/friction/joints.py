@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from psdmc.friction.law import Array, At, Law, Row, Term, total
-from psdmc.friction.laws import LAWS
-from psdmc.friction.own import laws_of
 from psdmc.friction.scalars import tanh
-from psdmc.friction.terms import WITH_STATE, every_joint_s, named
+from psdmc.friction.terms import WITH_STATE, named
 from psdmc.program.program import Program, Slot
 from psdmc.program.trace import Tracer
 
@@ -76,21 +74,28 @@ def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
     return tuple(sorted(terms, key=lambda term: (not term.law.against, not term.reads)))
 
 
-def found_friction(kept: Mapping[str, Any], joints: Sequence[str]) -> Friction:
-    """The friction of a calibration from plain logs without what depends on the load, as model files hold it; KeyError,
-    TypeError or ValueError where it is damaged."""
-    values = {(row["joint"], row["name"]): _finite(row["value"], row["name"]) for row in kept["friction"]}
-    options = kept["prediction"]
-    speed = _finite(options["sign_speed"], "sign_speed")
-    if not speed > 0.0:
-        raise ValueError(f"sign_speed {speed:g}")
-    laws = found_laws(options)
-    everyone_s = every_joint_s([_finite(d, "an exponent") for d in options["exponents"]], False)
+def found_friction(
+    values: Mapping[tuple[str, str], float],
+    joints: Sequence[str],
+    everyone_s: Sequence[Term],
+    laws: Mapping[str, Law],
+    sign_speed: float,
+) -> Friction:
+    """The friction of values by joint and name, without what depends on the load; KeyError or ValueError where these are
+    damaged.
+
+    everyone_s  terms that each joint must have
+    laws        that values may be of, by name
+    """
+    if not sign_speed > 0.0:
+        raise ValueError(f"sign_speed {sign_speed:g}")
     terms = dict.fromkeys(everyone_s)
-    for name in dict.fromkeys(name for _, name in values):
+    for (_, name), value in values.items():
         found = named(name, laws)
         if found is None:
             raise ValueError(f"{name!r} is a value of no friction law")
+        if not math.isfinite(value):
+            raise ValueError(f"{name} is {value}")
         if "load" not in found[0].reads:
             terms.setdefault(found[0])
     if len(terms) > MOST_TERMS:
@@ -101,26 +106,17 @@ def found_friction(kept: Mapping[str, Any], joints: Sequence[str]) -> Friction:
         raise KeyError(*missing[:1])
     chosen = ordered(list(terms))
     rows = [[values.get((joint, name), 0.0) for term in chosen for name in term.names] for joint in joints]
-    return Friction(chosen, np.array(rows, dtype=np.float64).reshape(len(joints), -1), speed)
+    return Friction(chosen, np.array(rows, dtype=np.float64).reshape(len(joints), -1), sign_speed)
 
 
-def rows_of(values: Mapping[str, float], prediction: Mapping[str, Any]) -> list[Row]:
-    """Terms of one joint with its values by name, of a calibration as model files hold it; names of no law are left out."""
-    whole = WITH_STATE.get(str(prediction.get("law")))
+def rows_of(values: Mapping[str, float], law: str, laws: Mapping[str, Law]) -> list[Row]:
+    """Terms of one joint with its values by name; names of no law are left out.
+
+    law   the name of a law with a state, if the values are of one
+    laws  that values may be of, by name
+    """
+    whole = WITH_STATE.get(law)
     if whole is not None and set(whole.parameters) <= set(values):
         return [(Term(whole), [values[name] for name in whole.parameters])]
-    laws = found_laws(prediction)
     pairs = [found[0] for name in values if (found := named(name, laws)) is not None]
     return [(term, [values.get(name, 0.0) for name in term.names]) for term in dict.fromkeys(pairs)]
-
-
-def found_laws(prediction: Mapping[str, Any]) -> dict[str, Law]:
-    """The laws that values of a calibration may be of: psdmc's, and the user's own that the file holds."""
-    table = prediction.get("columns", {}).get("friction", {})
-    return LAWS | laws_of(table.get("laws", ()))
-
-
-def _finite(value: object, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{what} is {value!r:.40}")
-    return float(value)

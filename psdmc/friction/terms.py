@@ -78,22 +78,22 @@ def named(name: str, laws: Mapping[str, Law]) -> tuple[Term, int] | None:
     return None
 
 
-def with_present_names(calibration: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A calibration as model files hold it, with terms called by their exponents. psdmc 0.1 called the first one by the name
-    without an exponent, whatever its exponent."""
-    exponents, rows = calibration["prediction"].get("exponents", ()), calibration["friction"]
+def with_present_names(
+    rows: Sequence[dict[str, Any]], exponents: Sequence[float]
+) -> Sequence[dict[str, Any]]:
+    """Rows of friction as older model files hold them, with terms called by their exponents. psdmc 0.1 called the first one
+    by the name without an exponent, whatever its exponent."""
     first = Term(_GROWING, float(exponents[0])) if exponents else None
-    if first is None or first.names[0] in {row["name"] for row in rows}:
-        return calibration
+    if first is None or first.names[0] in [row.get("name") for row in rows]:
+        return rows
     number = _GROWING.number
     assert number is not None
     usual = Term(_GROWING, number.usual)
     units = {usual.units(effort)[0]: first.units(effort)[0] for effort in ("N m", "N")}
     renamed = {usual.names[0]: first.names[0], f"{usual.names[0]}^{number.usual:g}": usual.names[0]}
-    found = [
-        row | {"name": renamed[row["name"]], "unit": units.get(row["unit"], row["unit"])}
-        if row["name"] in renamed
+    return [
+        row | {"name": renamed[row["name"]], "unit": units.get(str(row.get("unit", "")), row.get("unit", ""))}
+        if str(row.get("name")) in renamed
         else row
         for row in rows
     ]
-    return {**calibration, "friction": found}

@@ -69,8 +69,8 @@ RECIPE = Recipe(
             Quantity(
                 "A",
                 ("6", "nv"),
-                means="rows: linear momentum (kg m/s), then angular momentum (kg m^2/s) per unit rate, "
-                "along the axes of the base frame",
+                means="three rows for the linear momentum (kg m/s), three for the angular momentum "
+                "(kg m^2/s), along the axes of the base frame",
             ),
         ),
         theta=False,

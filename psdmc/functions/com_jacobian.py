@@ -50,7 +50,9 @@ RECIPE = Recipe(
         (Q,),
         (
             Quantity(
-                "J", ("3", "nv"), means="velocity of the centre of mass (m/s) per unit rate of each joint"
+                "J",
+                ("3", "nv"),
+                means="column j is the velocity (m/s) if qd[j] is 1 and all other rates are 0",
             ),
         ),
         theta=False,

@@ -23,8 +23,8 @@ FROM, TO = (
 WAY = Quantity(
     "v",
     ("nv",),
-    means="displacement: q1 - q0 for joints with one coordinate; for quaternions the shorter rotation "
-    "vector, along the axes of q0",
+    means="displacement: q1 - q0 for joints with one coordinate; for quaternions the rotation vector (rad) "
+    "of the shorter rotation, along the axes of q0",
 )
 
 

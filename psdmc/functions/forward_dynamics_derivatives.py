@@ -90,13 +90,13 @@ RECIPE = Recipe(
                 Quantity(
                     f"dqdd_d{x}",
                     ("nv", "nv"),
-                    means=f"derivatives of qdd by {x}: row i belongs to qdd[i], each column to a rate",
+                    means=f"derivatives of qdd by {x}: row i for qdd[i], column j for {entry}",
                 )
-                for x in ("q", "qd", "tau")
+                for x, entry in (("q", "joint rate j"), ("qd", "qd[j]"), ("tau", "tau[j]"))
             ),
         ),
         theta=True,
-        summary="Compute the forward-dynamics accelerations qdd and their Jacobians by q, qd and tau.",
+        summary="Compute the accelerations qdd of forward dynamics, and their derivatives by q, qd and tau.",
         positive=PIVOTS,
         products=(Product("dqdd_dq", "dqdd_dtau", "dtau_dq"), Product("dqdd_dqd", "dqdd_dtau", "dtau_dqd")),
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from psdmc.dynamics.solve import solve
@@ -42,9 +43,10 @@ RECIPE = Recipe(
         190,
         "qdd, and its derivative along (dq, dqd, dtau)",
         (Q, QD, TAU, DQ, DQD, DTAU),
-        (QDD, DQDD),
+        (QDD, replace(DQDD, means="derivative of qdd along the direction")),
         theta=True,
-        summary="Compute the forward-dynamics accelerations qdd, and their derivative along the direction (dq, dqd, dtau).",
+        summary="Compute the accelerations qdd of forward dynamics, and their derivative dqdd along the direction "
+        "(dq, dqd, dtau).",
         positive=PIVOTS,
     ),
     "forward dynamics along a direction",

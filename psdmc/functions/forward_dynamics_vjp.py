@@ -65,8 +65,8 @@ RECIPE = Recipe(
         (Q, QD, TAU, COTANGENT),
         (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
         theta=True,
-        summary="Compute the forward-dynamics accelerations qdd, and the gradients of the weighted sum "
-        "cotangent . qdd by q, qd and tau.",
+        summary="Compute the accelerations qdd of forward dynamics, and the gradients by q, qd and tau "
+        "of the sum of cotangent[i] * qdd[i].",
         positive=PIVOTS,
     ),
     "gradient of forward dynamics",

@@ -43,8 +43,8 @@ RECIPE = with_parameter_gradient(
     STATE,
     186,
     "qdd, and the gradient of cotangent . qdd by q, qd, tau and theta_b",
-    "Compute the forward-dynamics accelerations qdd, and the gradients of the weighted sum cotangent . "
-    "qdd by q, qd, tau and theta_b.",
+    "Compute the accelerations qdd of forward dynamics, and the gradients by q, qd, tau and theta_b "
+    "of the sum of cotangent[i] * qdd[i].",
     trace,
     reference,
     pinocchio,

@@ -51,7 +51,7 @@ RECIPE = Recipe(
             Quantity(
                 "rotation",
                 ("frames", "3", "3"),
-                means="rotation matrices; their columns are the axes of the named frame",
+                means="rotation matrices; column j is the axis j of the named frame",
             ),
         ),
         theta=False,

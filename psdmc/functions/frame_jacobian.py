@@ -47,7 +47,8 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("frames", "6", "nv"),
-                means="rows: linear velocity (m/s), then angular velocity (rad/s) per unit rate of each joint",
+                means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
+                "column j for qd[j]",
             ),
         ),
         theta=False,

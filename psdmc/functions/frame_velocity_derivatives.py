@@ -56,11 +56,12 @@ RECIPE = Recipe(
             Quantity(
                 "dv_dq",
                 ("frames", "6", "nv"),
-                means="derivatives of the linear (m/s), then angular velocity (rad/s), one column per rate",
+                means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
+                "column j for joint rate j",
             ),
         ),
         theta=False,
-        summary="Compute the Jacobian by q of each named frame's velocity along the axes of the base frame.",
+        summary="Compute the derivatives by q of the velocity of each named frame, along the axes of the base frame.",
     ),
     "derivatives of frame velocities",
     trace,

@@ -39,7 +39,7 @@ RECIPE = Recipe(
         (Q,),
         (Quantity("g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints"),),
         theta=True,
-        summary="Compute the gravity torques g(q), which hold the robot still.",
+        summary="Compute the gravity torques g(q): the torques that keep the robot at rest.",
     ),
     "gravity",
     trace,

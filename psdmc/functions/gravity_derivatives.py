@@ -55,11 +55,11 @@ RECIPE = Recipe(
             Quantity(
                 "dg_dq",
                 ("nv", "nv"),
-                means="derivatives of g by q: row i belongs to g[i], each column to a rate",
+                means="derivatives of g by q: row i for g[i], column j for joint rate j",
             ),
         ),
         theta=True,
-        summary="Compute the gravity torques g(q), which hold the robot still, and their Jacobian by q.",
+        summary="Compute the gravity torques g(q) and their derivatives by q.",
     ),
     "derivatives of gravity",
     trace,

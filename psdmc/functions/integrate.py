@@ -19,7 +19,7 @@ WAY = Quantity(
     "v",
     ("nv",),
     3.0,
-    means="displacement: rates times a time, rad or m; rotation vectors, along the axes of q, for quaternions",
+    means="displacement, a rate times a time: rad or m; for quaternions a rotation vector along the axes of q",
 )
 """Rates times seconds: rad or m."""
 
@@ -45,7 +45,7 @@ RECIPE = Recipe(
         (Q, WAY),
         (Q_NEXT,),
         theta=False,
-        summary="Compute the configuration that q reaches after the displacement v.",
+        summary="Compute the joint positions q_next that the robot reaches from q by the displacement v.",
         normalizes=True,
     ),
     "position after constant rates",

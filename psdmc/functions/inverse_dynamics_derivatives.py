@@ -49,12 +49,12 @@ RECIPE = Recipe(
             Quantity(
                 f"dtau_d{x}",
                 ("nv", "nv"),
-                means=f"derivatives of tau by {x}: row i belongs to tau[i], each column to a rate",
+                means=f"derivatives of tau by {x}: row i for tau[i], column j for {entry}",
             )
-            for x in ("q", "qd", "qdd")
+            for x, entry in (("q", "joint rate j"), ("qd", "qd[j]"), ("qdd", "qdd[j]"))
         ),
         theta=True,
-        summary="Compute the Jacobians of the inverse-dynamics torques tau by q, qd and qdd.",
+        summary="Compute the derivatives of the torques tau of inverse dynamics by q, qd and qdd.",
     ),
     "derivatives of inverse dynamics",
     trace,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from psdmc.dynamics.manifold import coordinate_rates
@@ -53,9 +54,10 @@ RECIPE = Recipe(
         188,
         "tau, and its derivative along (dq, dqd, dqdd)",
         (Q, QD, QDD, *DIRECTIONS),
-        (TAU, DTAU),
+        (TAU, replace(DTAU, means="derivative of tau along the direction")),
         theta=True,
-        summary="Compute the inverse-dynamics torques tau, and their derivative along the direction (dq, dqd, dqdd).",
+        summary="Compute the torques tau of inverse dynamics, and their derivative dtau along the direction "
+        "(dq, dqd, dqdd).",
     ),
     "inverse dynamics along a direction",
     trace,

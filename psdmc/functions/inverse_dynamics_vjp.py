@@ -53,8 +53,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, COTANGENT),
         (TAU, GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD),
         theta=True,
-        summary="Compute the inverse-dynamics torques tau, and the gradients of the weighted sum "
-        "cotangent . tau by q, qd and qdd.",
+        summary="Compute the torques tau of inverse dynamics, and the gradients by q, qd and qdd "
+        "of the sum of cotangent[i] * tau[i].",
     ),
     "gradient of inverse dynamics",
     trace,

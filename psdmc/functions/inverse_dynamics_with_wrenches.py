@@ -21,7 +21,8 @@ WRENCHES = Quantity(
     "wrenches",
     ("frames", "6"),
     largest=20.0,
-    means="on each named frame, from the world: force (N), then moment (N m) about the frame's origin, along its axes",
+    means="what the world exerts on each named frame: force (N), then moment (N m) about the frame's origin, "
+    "along the axes of the frame",
 )
 
 
@@ -67,8 +68,8 @@ RECIPE = Recipe(
         (Q, QD, QDD, WRENCHES),
         (TAU,),
         theta=True,
-        summary="Compute joint torques under external wrenches on the named frames: tau = M(q) qdd + h(q, "
-        "qd) - sum of J^T wrench.",
+        summary="Compute the joint torques of a motion under external wrenches: M(q) qdd + h(q, qd), minus J^T wrench "
+        "for each named frame.",
     ),
     "inverse dynamics with wrenches",
     trace,

@@ -45,10 +45,16 @@ RECIPE = Recipe(
         120,
         "linear then angular acceleration of every named frame at constant qd (dJ/dt qd), base frame",
         (Q, QD),
-        (Quantity("drift", ("frames", "6"), means="linear (m/s^2), then angular acceleration (rad/s^2)"),),
+        (
+            Quantity(
+                "drift",
+                ("frames", "6"),
+                means="linear acceleration (m/s^2), then angular acceleration (rad/s^2)",
+            ),
+        ),
         theta=False,
-        summary="Compute the acceleration of each named frame at qdd = 0, which is (dJ/dt) qd, along the "
-        "axes of the base frame.",
+        summary="Compute (dJ/dt) qd of each named frame, the frame's acceleration if qdd = 0, along the axes of "
+        "the base frame.",
     ),
     "frame drift",
     trace,

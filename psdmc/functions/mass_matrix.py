@@ -33,9 +33,15 @@ RECIPE = Recipe(
         30,
         "mass matrix M(q), both triangles",
         (Q,),
-        (Quantity("M", ("nv", "nv"), means="symmetric matrix, both triangles filled; kg m^2, kg m or kg"),),
+        (
+            Quantity(
+                "M",
+                ("nv", "nv"),
+                means="symmetric matrix, both triangles filled; kg m^2, kg m or kg",
+            ),
+        ),
         theta=True,
-        summary="Compute the joint-space mass matrix M(q), drive inertias included.",
+        summary="Compute the joint-space mass matrix M(q), which includes the drive inertias.",
     ),
     "mass matrix",
     trace,

@@ -58,11 +58,12 @@ RECIPE = Recipe(
             Quantity(
                 "h",
                 ("6",),
-                means="linear momentum (kg m/s), then angular momentum (kg m^2/s), along the axes of the base frame",
+                means="linear momentum (kg m/s), then angular momentum (kg m^2/s), along the axes of the base frame, "
+                "without drive inertias",
             ),
         ),
         theta=False,
-        summary="Compute the momentum of all links about the origin of the base frame, without drive inertias.",
+        summary="Compute the linear momentum of all links, and their angular momentum about the origin of the base frame.",
     ),
     "momentum",
     trace,

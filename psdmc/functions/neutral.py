@@ -38,7 +38,12 @@ RECIPE = Recipe(
         220,
         "q at which no joint has moved: zeros, and unit quaternions (cosines) of no turn",
         (),
-        (replace(Q, means="zeros, and unit quaternions without rotation"),),
+        (
+            replace(
+                Q,
+                means="joint positions, rad or m: zero, and for quaternions (0, 0, 0, 1), which is no rotation",
+            ),
+        ),
         theta=False,
         summary="Return the configuration in which no joint has moved.",
     ),

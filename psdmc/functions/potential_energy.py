@@ -47,7 +47,7 @@ RECIPE = Recipe(
         (Q,),
         (Quantity("U", means="potential energy, J; zero at q = 0"),),
         theta=True,
-        summary="Compute the potential energy U of the links; its derivative by q is g(q), the gravity torques.",
+        summary="Compute the potential energy U(q) of the links, whose derivative by q is the gravity torques g(q).",
     ),
     "potential energy",
     trace,

@@ -11,6 +11,6 @@ RECIPE = packed(
     regressor.RECIPE,
     71,
     "entries of the regressor Y that can differ from zero, row by row",
-    "Compute the entries of the regressor Y that can differ from zero, row by row; Y theta_b are the torques.",
+    "Compute the entries of the regressor Y that can differ from zero, row by row. The torques are tau = Y theta_b.",
     Packing(regressor.RECIPE.name, regressor_places),
 )

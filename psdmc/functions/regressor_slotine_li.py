@@ -40,17 +40,19 @@ RECIPE = Recipe(
         (
             Q,
             QD,
-            Quantity("qd_r", ("nv",), 3.0, means="reference rates, rad/s or m/s"),
-            Quantity("qdd_r", ("nv",), 5.0, means="reference accelerations, rad/s^2 or m/s^2"),
+            Quantity("qd_r", ("nv",), 3.0, means="reference rates of the controller, rad/s or m/s"),
+            Quantity(
+                "qdd_r", ("nv",), 5.0, means="reference accelerations of the controller, rad/s^2 or m/s^2"
+            ),
         ),
         (
             Quantity(
-                "Y", ("nv", "l"), means="regressor: row i belongs to joint torque i, column j to theta_b[j]"
+                "Y", ("nv", "l"), means="regressor: row i is for joint torque i, column j for theta_b[j]"
             ),
         ),
         theta=False,
-        summary="Compute the regressor of adaptive control (Slotine and Li, 1987): Y theta_b = M(q) qdd_r "
-        "+ C(q, qd) qd_r + g(q).",
+        summary="Compute the regressor Y of adaptive control (Slotine and Li, 1987), with Y theta_b = M(q) qdd_r + "
+        "C(q, qd) qd_r + g(q).",
     ),
     "Slotine-Li regressor",
     trace,

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from psdmc.errors import InputError
 from psdmc.model import bodies, equations, evaluate, glance, payload, recursive, store, symbolic
 from psdmc.model.answers import Answers
+from psdmc.model.calibrated import Calibrated
 from psdmc.model.expansion import Expansion
 from psdmc.model.parameter_table import BaseParameters
 from psdmc.real_arrays import real_array
@@ -35,19 +36,22 @@ RENAMED = (
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, eq=False)
 class DynamicsModel(Answers):
-    """A model holds a robot's inverse dynamics as monomials times constants: tau[i] = y(state) @ P[i] @ theta_b.
+    """A model contains a robot's inverse dynamics as data: the torque of joint i is tau[i] = y(state) @ P[i] @ theta_b.
 
-    `psdmc.derive` makes models. A model has all functions of a compiled robot as methods, which psdmc computes in NumPy.
-    Their arrays are (..., nq) for q and (..., nv) for rates and torques, in SI units; the leading axes (...) count states.
-    A model has n joints, p monomials y and l base parameters theta_b.
+    `psdmc.derive` makes models. y(state) are the values of p monomials, which are products of powers of q, sin q, cos q, qd
+    and qdd. The columns of the matrix E are the exponents of the monomials. A model has n joints and l base parameters
+    theta_b. A model has the same methods as a compiled robot, such as `forward_dynamics`, and computes them in NumPy. In
+    arguments and results, q has the shape (..., nq), and rates and torques have the shape (..., nv), in SI units. The axes
+    (...) count states.
 
-    expansion    the matrices E and P; None if the model was derived with --no-expand
+    expansion    the matrices E and P; None if the model was derived with `expand=False`
     theta_b      (l,) base parameters, SI units as in `base_parameters`; None if unknown
-    B            (l, 11n) matrix: theta_b = B @ x for standard parameters x, 11 per link, that the assumptions allow
-    mechanism    the robot: joints, link frames, gravity, limits, standard parameters
-    certificate  (nv,) per joint rate: the largest difference from Newton-Euler torques at random states, divided by the
-                 largest torque of that rate
+    B            (l, 11n) matrix that computes base parameters from the links' standard parameters x: theta_b = B @ x
+    mechanism    the robot: joints, link frames, gravity, limits, and standard parameters (11 per link)
+    certificate  (nv,) largest difference between the torques of the model and of the Newton-Euler algorithm at random
+                 states, divided by the largest torque; one number per entry of tau
     provenance   plain JSON values: text, hash and format of the robot file, options, snapped angles, tolerances
+    calibrated   what a calibration found, with the covariance of theta_b and the verdict; None if not calibrated
     """
 
     expansion: Expansion | None
@@ -56,6 +60,7 @@ class DynamicsModel(Answers):
     mechanism: Mechanism
     certificate: Array
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    calibrated: Calibrated | None = None
 
     __reduce__ = made_again
 
@@ -82,7 +87,7 @@ class DynamicsModel(Answers):
 
     @property
     def chain(self) -> Mechanism:
-        """Return `mechanism`, which psdmc 0.1 called `chain`."""
+        """Return the attribute `mechanism`, which psdmc 0.1 called `chain`."""
         return self.mechanism
 
     @property
@@ -107,12 +112,12 @@ class DynamicsModel(Answers):
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Return the names of the frames for poses, Jacobians, wrenches and loads, in the order of the results."""
+        """Return the names of the named frames, in the order in which `forward_kinematics` returns their positions."""
         return tuple(frame.name for frame in self.mechanism.frames)
 
     @property
     def n(self) -> int:
-        """Return the number of joints, including mimic joints, which follow another joint."""
+        """Return the number of joints, with mimic joints, which follow another joint."""
         return len(self.mechanism)
 
     @property
@@ -132,36 +137,41 @@ class DynamicsModel(Answers):
 
     @property
     def E(self) -> NDArray[np.uint8] | None:
-        """Return the exponents of the p monomials, (5n, p) uint8; None if the model was derived without them.
+        """Return the matrix E, (5n, p) uint8, whose columns are the exponents of the p monomials.
 
-        The rows are the exponents of q, sin q, cos q, qd and qdd, n rows each.
+        The rows are the exponents of q, sin q, cos q, qd and qdd, n rows each. E is None if the model was derived with
+        `expand=False`.
         """
         return None if self.expansion is None else self.expansion.E
 
     @property
     def P(self) -> tuple[sparse.csr_array, ...] | None:
-        """Return the sparse matrices P[i], (p, l), one per joint torque; None if the model was derived without them."""
+        """Return the sparse matrices P[i], (p, l), one per joint torque i: tau[i] = y(state) @ P[i] @ theta_b.
+
+        y(state) are the values of the p monomials. P is None if the model was derived with `expand=False`.
+        """
         return None if self.expansion is None else self.expansion.P
 
     @property
     def p(self) -> int | None:
-        """Return the number of monomials, products of powers of q, sin q, cos q, qd and qdd; None if there are none."""
+        """Return the number of monomials, which are products of powers of q, sin q, cos q, qd and qdd.
+
+        p is None if the model was derived with `expand=False`.
+        """
         return None if self.expansion is None else self.expansion.p
 
     @property
     def pivots(self) -> tuple[int, ...]:
-        """Return, per base parameter, the index of its pivot among the 11n standard parameters.
+        """Return the l indices of the base parameters' pivots among the 11n standard parameters.
 
-        The pivot is the first standard parameter that this base parameter contains with factor one, and no other contains.
+        The pivot of a base parameter is the first standard parameter that this base parameter contains with factor one and
+        that no other base parameter contains.
         """
         return tuple(int(np.flatnonzero(row)[0]) for row in self._leads)
 
     @property
     def is_reduced(self) -> bool:
-        """True if each base parameter contains, with factor one, a standard parameter that no other contains.
-
-        This is true for every model that psdmc derives.
-        """
+        """True if every base parameter has a pivot (see `pivots`), as in every model that psdmc derives."""
         return bool(self._leads.any(axis=1).all())
 
     @property
@@ -172,10 +182,11 @@ class DynamicsModel(Answers):
 
     @property
     def representative(self) -> Array:
-        """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b with these base parameters.
+        """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b from base parameters theta_b.
 
-        Many standard parameters have the same theta_b. This choice puts each base parameter on its pivot. The others are
-        zero, unless the model's assumptions couple them to a pivot. B @ R is the identity matrix.
+        Many vectors of standard parameters have the same theta_b, and R gives one of them. In x, the pivot of each base
+        parameter (see `pivots`) has the value of the base parameter. All other standard parameters are zero, except those
+        that an assumption such as `assume_zero` makes proportional to a pivot. B @ x is theta_b again.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -186,7 +197,7 @@ class DynamicsModel(Answers):
         )
 
     def expanded(self) -> Expansion:
-        """Return the matrices E and P as one object. Raises InputError if the model was derived without them."""
+        """Return an object with the matrices E and P. Raises InputError if the model was derived with `expand=False`."""
         if self.expansion is None:
             raise InputError("this model was derived without E and P", "derive it again without --no-expand")
         return self.expansion
@@ -202,7 +213,7 @@ class DynamicsModel(Answers):
 
     @property
     def unknown_base_parameters(self) -> tuple[int, ...]:
-        """Return the indices of the base parameters that depend on an unknown inertia; empty if theta_b is known."""
+        """Return the indices of the base parameters that depend on an unknown mass or inertia; empty if all are known."""
         if self.theta_b is not None:
             return ()
         is_unknown = np.isnan(self.mechanism.parameters.reshape(-1))
@@ -210,7 +221,10 @@ class DynamicsModel(Answers):
 
     @property
     def file_theta_b(self) -> Array | None:
-        """Return theta_b, (l,), with unknown parameters of links counted as zero; None if no inertia is known."""
+        """Return the base parameters theta_b, (l,), computed with zero for each unknown mass and inertia.
+
+        The result is None if no mass and no inertia is known.
+        """
         if self.theta_b is not None:
             return self.theta_b
         known = self.mechanism.known_parameters
@@ -221,14 +235,14 @@ class DynamicsModel(Answers):
     def equivalent_parameters(self) -> Array:
         """Return standard parameters, (11n,), that give the same torques as the model: `representative @ theta_b`.
 
-        Many standard parameters give these torques. The returned ones are not the links' real parameters, and may have
-        negative masses. Raises InputError if theta_b is unknown.
+        Many vectors of standard parameters give the same torques. The returned vector is not the one of the real links,
+        and can contain negative masses. Raises InputError if theta_b is unknown.
         """
         found: Array = times(self.representative, self.known_theta_b())
         return found
 
     def standard_parameters(self) -> Array:
-        """Return `equivalent_parameters()`, which psdmc 0.1 called `standard_parameters()`, with a DeprecationWarning."""
+        """Return `equivalent_parameters()`. This name is from psdmc 0.1, and its use gives a DeprecationWarning."""
         warnings.warn(RENAMED, DeprecationWarning, stacklevel=2)
         return self.equivalent_parameters()
 
@@ -241,14 +255,15 @@ class DynamicsModel(Answers):
     ) -> Array:
         """Compute the base parameters theta_b, (l,), of this robot with other masses and inertias.
 
-            masses          (n,) kg, one per link of `link_names`, with all that is fixed to the link
+            masses          (n,) kg, one per link of `link_names`; each includes everything that is fixed to the link
             coms            (n, 3) m, centres of mass in the link frames
-            inertias        (n, 3, 3) kg m^2 about the centres of mass, along the link frames' axes
-            drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the model's
+            inertias        (n, 3, 3) kg m^2 about the centres of mass, along the axes of the link frames
+            drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the drive inertias of the model
 
-        Pass the result to a function's argument `theta_b`. Raises InputError if a number is not finite, a mass is negative,
-        or an inertia is not symmetric or has no mass. Raises InputError also if a number is too large for a robot file, or
-        if the model's assumptions exclude a body. Warns if an inertia belongs to no rigid body.
+        Pass the result to a function's argument `theta_b`. Raises InputError if a number is not finite or too large for a
+        robot file, or if a mass is negative. Raises InputError also if an inertia is not symmetric or belongs to a link
+        without mass, or if a link contradicts an assumption of the model, such as `assume_zero`. Warns if no rigid body can
+        have one of the inertias.
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
@@ -264,21 +279,22 @@ class DynamicsModel(Answers):
     ) -> Array:
         """Compute the joint torques tau, (..., nv), of a motion: N m, or N for sliding joints.
 
-            q          (..., nq) joint positions, rad or m; the leading axes (...) count states
-            qd, qdd    (..., nv) joint rates and accelerations
-            theta_b    (l,) base parameters in place of the model's; optional
-            out        array that takes the result; optional
+            q          (..., nq) joint positions, rad or m; the axes (...) count states
+            qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
+            theta_b    (l,) base parameters that replace the model's; optional
+            out        array into which psdmc writes the result; optional
 
-        psdmc evaluates tau[i] = y(state) @ P[i] @ theta_b in NumPy, or Newton-Euler recursions if the model has no E and P.
-        A robot from `psdmc.compile` is hundreds of times faster.
+        psdmc computes tau[i] = y(state) @ P[i] @ theta_b in NumPy, or uses the Newton-Euler algorithm if the model has no E
+        and P. A robot from `psdmc.compile` is hundreds of times faster.
         """
         return self._answer("inverse_dynamics", q, qd, qdd, theta_b, out=out)
 
     def torques_for(self, theta_b: ArrayLike, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """Compute the joint torques tau, (..., nv), of a motion, for a robot with the base parameters theta_b, (l,).
+        """Compute the joint torques tau, (..., nv), of a motion: N m, or N for sliding joints.
 
-        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
-        qd, qdd    (..., nv) joint rates and accelerations
+        theta_b    (l,) base parameters of the robot, SI units
+        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
         """
         theta = real_array("theta_b", theta_b)
         if theta.shape != (self.l,):
@@ -293,51 +309,51 @@ class DynamicsModel(Answers):
         return found.reshape(*shape, self.nv)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Array | None = None) -> Array:
-        """Compute the regressor Y, (..., nv, l): the torques of inverse dynamics are tau = Y theta_b.
+        """Compute the regressor Y, (..., nv, l), with which the torques of inverse dynamics are tau = Y theta_b.
 
-        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
-        qd, qdd    (..., nv) joint rates and accelerations
-        out        array that takes the result; optional
+        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        qd, qdd    (..., nv) joint rates and accelerations, rad/s and rad/s^2, or m/s and m/s^2
+        out        array into which psdmc writes the result; optional
         """
         return self._answer("regressor", q, qd, qdd, out=out)
 
     def mass_matrix(
         self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
     ) -> Array:
-        """Compute the joint-space mass matrix M(q), (..., nv, nv), with both triangles filled; kg m^2, kg m or kg.
+        """Compute the joint-space mass matrix M(q), (..., nv, nv), with both triangles filled. Units are kg m^2, kg m or kg.
 
-        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
-        theta_b    (l,) base parameters in place of the model's; optional
-        out        array that takes the result; optional
+        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        theta_b    (l,) base parameters that replace the model's; optional
+        out        array into which psdmc writes the result; optional
         """
         return self._answer("mass_matrix", q, theta_b, out=out)
 
     def nonlinear_effects(
         self, q: ArrayLike, qd: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None
     ) -> Array:
-        """Compute the Coriolis, centrifugal and gravity torques h(q, qd), (..., nv): N m, or N for sliding joints.
+        """Compute the sum h(q, qd), (..., nv), of the Coriolis, centrifugal and gravity torques, in N m or N.
 
-        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
-        qd         (..., nv) joint rates
-        theta_b    (l,) base parameters in place of the model's; optional
-        out        array that takes the result; optional
+        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        qd         (..., nv) joint rates, rad/s or m/s
+        theta_b    (l,) base parameters that replace the model's; optional
+        out        array into which psdmc writes the result; optional
         """
         return self._answer("nonlinear_effects", q, qd, theta_b, out=out)
 
     def gravity(self, q: ArrayLike, theta_b: ArrayLike | None = None, *, out: Array | None = None) -> Array:
-        """Compute the gravity torques g(q), (..., nv), which hold the robot still: N m, or N for sliding joints.
+        """Compute the gravity torques g(q), (..., nv), which keep the robot at rest: N m, or N for sliding joints.
 
-        q          (..., nq) joint positions, rad or m; the leading axes (...) count states
-        theta_b    (l,) base parameters in place of the model's; optional
-        out        array that takes the result; optional
+        q          (..., nq) joint positions, rad or m; the axes (...) count states
+        theta_b    (l,) base parameters that replace the model's; optional
+        out        array into which psdmc writes the result; optional
         """
         return self._answer("gravity", q, theta_b, out=out)
 
     @property
     def base_parameters(self) -> BaseParameters:
-        """Return the base parameters: a tuple with the equation, unit and value of each. An unknown value is None.
+        """Return a tuple with one entry per base parameter: the equation, unit and value. An unknown value is None.
 
-        The tuple's method `to_frame()` returns a pandas data frame, and `to_latex()` returns LaTeX.
+        The tuple has two methods: `to_frame()` returns a pandas data frame, and `to_latex()` returns LaTeX.
         """
         unknown, known = self.unknown_base_parameters, self.file_theta_b
         values = [None] * self.l if known is None else known.tolist()
@@ -345,34 +361,34 @@ class DynamicsModel(Answers):
         return BaseParameters(equations.base_parameters(self.mechanism, self.B, self.pivots, shown))
 
     def to_latex(self) -> str:
-        """Return the base parameters' equations, values and units as an `aligned` environment of amsmath.
+        """Return the equations, values and units of the base parameters as LaTeX, in amsmath's environment `aligned`.
 
-        The equations number the entries of theta_b from 0 and the joints from 1.
+        In the equations, the first entry of theta_b has the number 0, and the first joint has the number 1.
         """
         return self.base_parameters.to_latex()
 
     def torque_expression(self, joint: int | str, numbers: bool = False) -> sympy.Expr:
-        """Return the torque of one joint as a SymPy sum, whose `args` are the terms; meant for small robots.
+        """Return the torque of one joint as a SymPy sum. The attribute `args` of the sum is the tuple of its terms.
 
-            joint    name of the joint, or its number from 0
-            numbers  True: use the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
+            joint    name of the joint, or its number: 0 is the first joint
+            numbers  True: the sum contains the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        The symbols q1, qd1 and qdd1 belong to the first joint. Raises InputError for an unknown joint, a model without E and
-        P, or a torque of more than 2,000 monomials. Raises ToolchainError if SymPy is missing.
+        The symbols q1, qd1 and qdd1 are for the first joint. Raises InputError if the robot has no such joint, if the model
+        has no E and P, or if the torque has more than 2,000 monomials. Raises ToolchainError if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
         return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)
 
     @property
     def content_hash(self) -> str:
-        """Return the SHA-256 of the model as 64 hexadecimal digits; equal models have equal sums.
+        """Return the SHA-256 hash of the model as 64 hexadecimal digits. Equal models have equal hashes.
 
-        The sum covers the arrays and the manifest that `save` writes into the model file.
+        psdmc computes the hash from the arrays and the manifest that `save` writes into the model file.
         """
         return store.content_hash(self)
 
     def save(self, path: str | Path) -> None:
-        """Write the model to a file that `psdmc.load` reads, as `psdmc.save(model, path)` does."""
+        """Write the model to a file, as `psdmc.save(model, path)` does. `psdmc.load` reads the file."""
         store.save(self, path)
 
     def with_payload(
@@ -382,15 +398,15 @@ class DynamicsModel(Answers):
         inertia: ArrayLike | None = None,
         frame: Placement | str | None = None,
     ) -> DynamicsModel:
-        """Return a new model with a rigid load fixed to the tip, or to another named frame.
+        """Return a new model of the robot with a rigid load that is fixed to a named frame.
 
-            mass      kg
-            com       (3,) m, centre of mass in `frame`
-            inertia   (3, 3) kg m^2 about the load's centre of mass along the frame's axes; None: a point mass
-            frame     frame of `com` and `inertia`: a name of `frame_names`, or a Placement in the tip frame; None: the tip
+            mass      mass of the load, kg
+            com       (3,) m, centre of mass of the load in the frame
+            inertia   (3, 3) kg m^2 about the load's centre of mass, along the axes of the frame; None: a point mass
+            frame     the frame: a name from `frame_names`, or a Placement relative to the tip frame; None: the tip frame
 
-        Raises InputError if no rigid body has these numbers, if they are outside the ranges of robot files, or if the
-        model's assumptions exclude the load.
+        Raises InputError if no rigid body has such a mass and inertia, or if a number is too large for a robot file. Raises
+        InputError also if the load contradicts an assumption of the model, such as `assume_zero`.
         """
         load = payload.load_parameters(self.mechanism, mass, com, inertia, frame)
         body = payload.carrying_frame(self.mechanism, frame).joint

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.model import json_values as json
+from psdmc.model.calibrated import Calibrated
+from psdmc.model.calibrated_json import from_json
 from psdmc.model.chain_json import chain_from_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.expansion import BLOCKS, Entries, Expansion
@@ -35,7 +37,7 @@ KINDS = {
 """Type and axes of each array."""
 
 MOST_ROWS = 1_000_000
-"""Largest number of rows of a table in the provenance; a campaign's friction has seven per joint."""
+"""Largest number of rows of a table in the provenance."""
 
 
 HIGHEST_POWER = 2
@@ -62,7 +64,20 @@ def model_from(arrays: Arrays, manifest: Mapping[str, Any]) -> DynamicsModel:
         mechanism=chain,
         certificate=json.numbers(certificate, "the certificate", chain.nv),
         provenance=_provenance(json.part(manifest, "provenance", "the manifest"), chain),
+        calibrated=_calibrated(manifest, chain),
     )
+
+
+def _calibrated(manifest: Mapping[str, Any], chain: Mechanism) -> Calibrated | None:
+    """What a calibration found; ValueError unless its joints are the chain's."""
+    if "calibration" not in manifest:
+        return None
+    found = from_json(manifest["calibration"])
+    joints = {joint.name for joint in chain.joints}
+    foreign = [row.joint for row in (*found.motors, *found.friction) if row.joint not in joints]
+    if foreign:
+        raise ValueError(f"the calibration has joint {foreign[0]!r}, which the chain has not")
+    return found
 
 
 def _check_kinds(arrays: Arrays) -> None:
@@ -129,8 +144,6 @@ def _provenance(value: object, chain: Mechanism) -> dict[str, Any]:
         json.number(json.part(snap, "angle_rad", "a snapped rotation"), "a snapped rotation's angle")
     if found.get("snap_torque_change") is not None:
         json.numbers(found["snap_torque_change"], "the provenance's snap_torque_change", chain.nv)
-    if "calibration" in found:
-        _check_calibration(json.record(found["calibration"], "the calibration"))
     return found
 
 
@@ -159,12 +172,3 @@ def _check_options(options: dict[str, Any], chain: Mechanism) -> None:
     json.flag(options.get("floating", False), "the option floating")
     if options.get("tool") is not None:
         json.numbers(options["tool"], "the option tool", 6)
-
-
-def _check_calibration(calibration: dict[str, Any]) -> None:
-    for table in ("friction", "motors"):
-        for row in json.entries(calibration.get(table, []), f"the calibration's {table}", MOST_ROWS):
-            json.text(json.part(row, "joint", table), f"a joint of the calibration's {table}")
-            json.text(json.part(row, "name", table), f"a name of the calibration's {table}")
-            if json.part(row, "value", table) is not None:
-                json.number(row["value"], f"a value of the calibration's {table}")

@@ -12,15 +12,25 @@ from typing import Any
 from numpy.typing import NDArray
 
 from psdmc.errors import InputError
-from psdmc.friction.terms import with_present_names
+from psdmc.model import json_values
 from psdmc.model.archive import BEGINS, LARGEST, BrokenArchiveError, opened, read_arrays
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.from_parts import model_from
 from psdmc.model.store import ARRAYS, FORMAT, SCHEMA, hash_of
 from psdmc.reading import read_file
 
+
+def _with_calibration(manifest: dict[str, Any]) -> dict[str, Any]:
+    """The manifest with the calibration beside the provenance, which psdmc 0.2 kept it in."""
+    provenance = json_values.record(manifest.get("provenance", {}), "the provenance")
+    rest = {name: value for name, value in provenance.items() if name != "calibration"}
+    found = {"calibration": provenance["calibration"]} if "calibration" in provenance else {}
+    return {**manifest, "provenance": rest, **found, "schema": 3}
+
+
 _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
-    1: lambda manifest: manifest | {"schema": 2}
+    1: lambda manifest: manifest | {"schema": 2},
+    2: _with_calibration,
 }
 """By schema: what makes its manifest one of the next schema. A chain of schema 1 is read as it is."""
 
@@ -54,7 +64,7 @@ def model_of(given: DynamicsModel | str | Path) -> DynamicsModel:
 def load(path: str | Path) -> DynamicsModel:
     """Read a model from a file that `save` or `psdmc derive` wrote.
 
-    Raises InputError if the file is missing, damaged or edited, or if a newer psdmc wrote it.
+    Raises InputError if the file is missing, damaged or edited, or if a newer version of psdmc wrote it.
     """
     source = Path(path)
     return load_bytes(_bytes_of(source), source)
@@ -66,7 +76,7 @@ def load_bytes(data: bytes, source: Path) -> DynamicsModel:
         arrays, manifest = _read(data, source)
         if manifest.get("content_hash") != hash_of(arrays, manifest):
             raise BrokenArchiveError("its content does not match its hash")
-        return model_from(arrays, _with_names(_migrated(manifest)))
+        return model_from(arrays, _migrated(manifest))
     except BrokenArchiveError as error:
         raise _damaged(source, str(error)) from error
     except (ValueError, RecursionError) as error:
@@ -128,16 +138,6 @@ def _migrated(manifest: dict[str, Any]) -> dict[str, Any]:
     while manifest["schema"] < SCHEMA:
         manifest = _MIGRATIONS[manifest["schema"]](manifest)
     return manifest
-
-
-def _with_names(manifest: dict[str, Any]) -> dict[str, Any]:
-    """The manifest with the present names of a calibration's friction; what is damaged stays for its readers."""
-    try:
-        provenance = manifest["provenance"]
-        kept = with_present_names(provenance["calibration"])
-        return manifest | {"provenance": {**provenance, "calibration": kept}}
-    except (AttributeError, KeyError, TypeError, ValueError):
-        return manifest
 
 
 def _damaged(source: Path, why: str) -> InputError:

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from psdmc.model.calibrated import Calibrated
 from psdmc.robot.mechanism import Mechanism
 
 
@@ -25,3 +26,6 @@ class ModelParts(Protocol):
 
     @property
     def provenance(self) -> Mapping[str, Any]: ...
+
+    @property
+    def calibrated(self) -> Calibrated | None: ...

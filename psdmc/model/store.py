@@ -3,7 +3,7 @@ compressed, because compressed bytes differ between versions of zlib.
 
 Arrays: E (5n, p); theta_b (l,), all NaN while unknown; P as P_joint, P_row, P_col, P_value, one entry each,
 joint by joint and row by row; B (l, 11n); manifest, JSON text: format, schema, what the arrays hold, chain,
-certificate, provenance, psdmc version, and the SHA-256 of all of that.
+certificate, provenance, calibration where there is one (calibrated_json), psdmc version, and the SHA-256 of all of that.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from psdmc.atomic import write_whole
 from psdmc.errors import InputError
+from psdmc.model.calibrated_json import as_json
 from psdmc.model.chain_json import MOST_JOINTS, chain_to_json, is_plain_chain
 from psdmc.model.expansion import BLOCKS, Entries, Expansion
 from psdmc.model.model_parts import ModelParts
@@ -28,8 +29,10 @@ from psdmc.version import psdmc_version
 
 CHAIN_SCHEMA = 1
 """Of files with serial chains, which every psdmc reads."""
-SCHEMA = 2
-"""Of files with trees, or with joints that follow others: the newest."""
+TREE_SCHEMA = 2
+"""Of files with trees, or with joints that follow others."""
+SCHEMA = 3
+"""Of files with a calibration: the newest."""
 FORMAT = "psdmc model"
 ARRAYS = ("E", "theta_b", "P_joint", "P_row", "P_col", "P_value", "B")
 
@@ -50,9 +53,9 @@ class Model(ModelParts, Protocol):
 
 
 def save(model: Model, path: str | Path) -> None:
-    """Write a model to a file that `load` reads; after a failure the old file is unchanged.
+    """Write a model to a file, which `load` reads. If writing fails, an existing file at the path stays unchanged.
 
-    Raises InputError if the path cannot be written, and ToolchainError if the disk fails.
+    Raises InputError if psdmc may not write at the path, and ToolchainError if the disk is full or fails.
     """
     n = len(model.mechanism)
     if n > MOST_JOINTS:
@@ -105,15 +108,18 @@ def _nothing(n: int, l: int) -> Expansion:
 
 
 def _manifest(model: Model) -> dict[str, Any]:
+    schema = CHAIN_SCHEMA if is_plain_chain(model.mechanism) else TREE_SCHEMA
+    calibrated = model.calibrated
     return {
         "format": FORMAT,
-        "schema": CHAIN_SCHEMA if is_plain_chain(model.mechanism) else SCHEMA,
+        "schema": schema if calibrated is None else SCHEMA,
         "psdmc": psdmc_version(),
         "expanded": model.expansion is not None,
         "theta_b_known": model.theta_b is not None,
         "certificate": model.certificate.tolist(),
         "chain": chain_to_json(model.mechanism),
         "provenance": dict(model.provenance),
+        **({} if calibrated is None else {"calibration": as_json(calibrated)}),
     }
 
 

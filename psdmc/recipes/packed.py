@@ -16,7 +16,7 @@ from psdmc.robot.mechanism import Array
 VALUES = Quantity(
     "values",
     ("nonzeros",),
-    means="the entries; `CompiledRobot.pattern` gives their rows and columns, and nonzeros is their number",
+    means="the entries; `CompiledRobot.pattern` returns their rows and columns",
 )
 
 

@@ -18,14 +18,14 @@ from psdmc.recipes.on_arrays import columns, matrix
 from psdmc.reproducible import times
 from psdmc.robot.mechanism import Array
 
-DT = Quantity("dt", (), 0.01, "length of the step, s: one number, or one per state")
+DT = Quantity("dt", (), 0.01, "length of the step, s: one number for all states, or one per state")
 
 Q_NEXT = Quantity(
     "q_next", ("nq",), means="joint positions after the step, rad or m, with quaternions of unit length"
 )
 QD_NEXT = Quantity("qd_next", ("nv",), means="joint rates after the step, rad/s or m/s")
-A = Quantity("A", ("nx", "nx"), means="derivatives of (q_next, qd_next) by (q, qd), with nx = 2 nv")
-B = Quantity("B", ("nx", "nv"), means="derivatives of (q_next, qd_next) by tau")
+A = Quantity("A", ("nx", "nx"), means="derivatives of the state (q_next, qd_next) by the state (q, qd)")
+B = Quantity("B", ("nx", "nv"), means="derivatives of the state (q_next, qd_next) by tau")
 
 Rows = Sequence[Sequence[Scalar]]
 

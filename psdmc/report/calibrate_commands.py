@@ -128,7 +128,7 @@ def calibrate_command(
 
 def write_actuators(model: DynamicsModel, folder: str | Path) -> list[Path]:
     """C for a calibrated model's friction and motors; InputError where it was not calibrated."""
-    found = model.provenance.get("calibration")
+    found = model.calibrated
     if found is None:
         raise InputError(f"{model.mechanism.name}: not calibrated", "run `psdmc calibrate` first")
     require_actuators_folder(model, folder)

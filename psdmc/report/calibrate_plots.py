@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from psdmc.calibration.identify.steps import Sample, StepQuality
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.motions.excite import Excitation
+from psdmc.model.calibrated import Sample, StepQuality
 from psdmc.report.drawing import Axes, Figure, legend_below, svg
 from psdmc.robot.mechanism import Limits
 

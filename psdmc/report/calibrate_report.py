@@ -8,11 +8,9 @@ from pathlib import Path
 
 from psdmc.atomic import refuse_foreign_file, write_together
 from psdmc.backends.c.render import environment
-from psdmc.calibration.identify.visibility import WEAK
 from psdmc.calibration.motions.excite import Excitation
-from psdmc.calibration.verdict.record import Calibration
-from psdmc.calibration.verdict.said_once import unsaid_warnings
-from psdmc.calibration.verdict.verdict import Verdict
+from psdmc.model.calibrated import WEAK, Calibrated, Verdict, code_of
+from psdmc.model.calibrated_json import document
 from psdmc.report.calibrate_plots import excitation_panels, step_panels
 from psdmc.report.calibrate_tables import (
     accuracy_table,
@@ -84,12 +82,12 @@ class ReportView:
 
 
 def write_report(
-    record: Calibration, path: str | Path, found: Excitation | None = None, truth: TruthView | None = None
+    record: Calibrated, path: str | Path, found: Excitation | None = None, truth: TruthView | None = None
 ) -> tuple[Path, Path]:
     """Write the page and, beside it, its numbers as JSON; returns both paths."""
     page = Path(path)
     numbers = page.with_suffix(".json")
-    text = json.dumps(record.as_json(), indent=1) + "\n"
+    text = json.dumps(document(record), indent=1) + "\n"
     write_together(page.parent, {page.name: report_html(record, found, truth), numbers.name: text})
     return page, numbers
 
@@ -101,14 +99,14 @@ def require_free_numbers(page: str | Path) -> None:
     refuse_foreign_file(numbers, NUMBERS_MARK, remedy)
 
 
-def report_html(record: Calibration, found: Excitation | None = None, truth: TruthView | None = None) -> str:
+def report_html(record: Calibrated, found: Excitation | None = None, truth: TruthView | None = None) -> str:
     """The page as text."""
     view = ReportView(
         robot=record.robot,
         summary=_summary(record),
         truth=truth,
         verdict=None if record.verdict is None else verdict_view(record.verdict),
-        warnings=unsaid_warnings(record),
+        warnings=record.unsaid,
         notes=record.notes,
         accuracy_table=accuracy_table(record),
         parameter_table=parameter_table(record),
@@ -116,7 +114,7 @@ def report_html(record: Calibration, found: Excitation | None = None, truth: Tru
         spring_table=spring_table(record),
         log_table=log_table(record),
         step_table=step_table(record),
-        versions=tuple(f"{name} {value}" for name, value in record.facts.get("versions", {}).items()),
+        versions=tuple(f"{name} {value}" for name, value in record.versions.items()),
         fact_table=fact_table(record),
         figures=_figures(record, found),
     )
@@ -124,7 +122,7 @@ def report_html(record: Calibration, found: Excitation | None = None, truth: Tru
     return template.render(view=view)
 
 
-def _figures(record: Calibration, found: Excitation | None) -> tuple[FigureView, ...]:
+def _figures(record: Calibrated, found: Excitation | None) -> tuple[FigureView, ...]:
     figures = [
         FigureView(step.step, step_panels(step), CAPTIONS.get(step.step, ""))
         for step in record.steps
@@ -141,20 +139,14 @@ def _figures(record: Calibration, found: Excitation | None) -> tuple[FigureView,
 
 def verdict_view(verdict: Verdict) -> VerdictView:
     """The first part of the page."""
-    kinds = (
-        ("not usable", verdict.reasons),
-        ("likely", verdict.suspects),
-        ("doubt", verdict.doubts),
-    )
-    lines = tuple((kind, text) for kind, texts in kinds for text in texts)
-    return VerdictView(verdict.word, verdict.usable, lines, verdict_table(verdict))
+    return VerdictView(verdict.word, verdict.usable, verdict.grounds, verdict_table(verdict))
 
 
-def _summary(record: Calibration) -> str:
+def _summary(record: Calibrated) -> str:
     seen = sum(row.identifiable for row in record.parameters)
-    weak = sum(row.visibility == WEAK for row in record.parameters)
-    logs = [row for name in ("data", "with_load") for row in record.facts.get(name, [])]
-    length = f"{sum(row['seconds'] for row in logs):.4g} s in {len(logs)} log(s). " if logs else ""
+    weak = sum(code_of(row.visibility) == WEAK.code for row in record.parameters)
+    logs = record.logs
+    length = f"{sum(log.seconds for log in logs):.4g} s in {len(logs)} log(s). " if logs else ""
     return (
         f"Method: {record.method}. {length}{seen} of {len(record.parameters)} base parameters identified, {weak} weakly "
         f"visible, {len(record.joint_names)} joints."

@@ -7,17 +7,13 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.verdict.record import Calibration, NumberRow
-from psdmc.calibration.verdict.verdict import Verdict
+from psdmc.model.calibrated import Calibrated, NumberRow, Quality, Verdict
 from psdmc.model.joined_units import joined_units
 
 NOTHING = "–"
 """A cell without a number."""
-USES = {"validate": "held out whole"}
+USES = {"validate": "held out whole", "with_load": "with the known load"}
 """How a log is used that is not fitted."""
-ELSEWHERE = ("data", "with_load", "load", "versions")
-"""Facts that have a place of their own on the page."""
 
 
 def verdict_table(verdict: Verdict) -> str:
@@ -47,7 +43,7 @@ def verdict_table(verdict: Verdict) -> str:
     return table(head, rows)
 
 
-def accuracy_table(record: Calibration) -> str:
+def accuracy_table(record: Calibrated) -> str:
     """Table 3: RMSE and R^2 per joint and step, of held-out data and in brackets of fitted data."""
     head = [
         "Joint",
@@ -74,7 +70,7 @@ def _both(held_out: Quality, fit: Quality) -> list[str]:
     ]
 
 
-def parameter_table(record: Calibration) -> str:
+def parameter_table(record: Calibrated) -> str:
     """Table 4: base parameter, the file's value, the one found, its standard deviation, unit, equation."""
     head = ["Parameter", "In the file", "Found", "±", "Relative", "Unit", "Equation", "In the data", "Group"]
     rows = []
@@ -87,7 +83,7 @@ def parameter_table(record: Calibration) -> str:
     return table(head, rows, text_columns=(6, 7))
 
 
-def joint_table(record: Calibration) -> str:
+def joint_table(record: Calibrated) -> str:
     """Table 2: torque constants and friction, joint by joint."""
     own = (*record.motors, *record.friction)
     units = joined_units((row.name, row.unit) for row in own)
@@ -99,7 +95,7 @@ def joint_table(record: Calibration) -> str:
     return table(head, rows)
 
 
-def spring_table(record: Calibration) -> str:
+def spring_table(record: Calibrated) -> str:
     """Values of springs; empty where the fit has none."""
     if not record.springs:
         return ""
@@ -117,50 +113,35 @@ def joint_number(row: NumberRow | None) -> str:
     return f"{row.value:.4g} ± {row.std:.1g}"
 
 
-def log_table(record: Calibration) -> str:
+def log_table(record: Calibrated) -> str:
     """Names, lengths and dates of the logs; empty text where they are unknown."""
     steps = {} if record.prediction is None else record.prediction.steps
-    is_split = not steps or any(step.split.held_out for step in steps.values())
-    uses = (
-        ("data", "fitted and held out" if is_split else "fitted"),
-        ("with_load", "with the known load"),
-    )
+    is_split = not steps or any(step.held_out for step in steps.values())
+    uses = USES | {"fit": "fitted and held out" if is_split else "fitted"}
     rows = [
-        [
-            row["log"],
-            f"{row['rows']:,}",
-            f"{row['seconds']:.4g}",
-            row["date"] or NOTHING,
-            USES.get(row.get("use"), use),
-        ]
-        for name, use in uses
-        for row in record.facts.get(name, [])
+        [log.log, f"{log.rows:,}", f"{log.seconds:.4g}", log.date or NOTHING, uses.get(log.use, log.use)]
+        for log in record.logs
     ]
     return table(["Log", "Rows", "Duration [s]", "Date", "Used"], rows) if rows else ""
 
 
-def step_table(record: Calibration) -> str:
+def step_table(record: Calibrated) -> str:
     """Cut-off and split of each step; empty text where they are unknown."""
     if record.prediction is None:
         return ""
     rows = []
     for name, step in record.prediction.steps.items():
-        split = step.split
-        share = f"{split.held_out:.0%}"
-        where = f"{share}, the end" if split.blocks == 0 else f"{share}, spread over {split.blocks} blocks"
-        where = where if split.held_out else NOTHING
+        share = f"{step.held_out:.0%}"
+        where = f"{share}, the end" if step.blocks == 0 else f"{share}, spread over {step.blocks} blocks"
+        where = where if step.held_out else NOTHING
         title = "whole log" if name == "all" else name
-        rows.append([title, f"{step.filter.cutoff:g}", f"{step.filter.order}, both ways", where])
+        rows.append([title, f"{step.cutoff:g}", f"{step.order}, both ways", where])
     return table(["Step", "Cut-off [Hz]", "Butterworth order", "Held out"], rows)
 
 
-def fact_table(record: Calibration) -> str:
+def fact_table(record: Calibrated) -> str:
     """Ranks, condition numbers and the like."""
-    rows = [
-        [name.replace("_", " "), _plain(value)]
-        for name, value in record.facts.items()
-        if name not in ELSEWHERE
-    ]
+    rows = [[name.replace("_", " "), _plain(value)] for name, value in record.facts.items()]
     return table(["Quantity", "Value"], rows, text_columns=(1,))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.plant.virtual_robot import VirtualRobot
-from psdmc.calibration.verdict.record import Calibration
+from psdmc.model.calibrated import Calibrated
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.joined_units import joined_units
 from psdmc.report import published_denso as published
@@ -42,7 +42,7 @@ class TruthView:
     why: str
 
 
-def truth_view(record: Calibration, true_model: DynamicsModel, robot: VirtualRobot) -> TruthView:
+def truth_view(record: Calibrated, true_model: DynamicsModel, robot: VirtualRobot) -> TruthView:
     """The sections for a calibration of the virtual Denso; `true_model` holds its theta_b in the record's order."""
     sensors, harness = robot.sensors, robot.harness
     noisy = sensors.current_noise or sensors.position_step
@@ -64,7 +64,7 @@ def truth_view(record: Calibration, true_model: DynamicsModel, robot: VirtualRob
     )
 
 
-def _parameters(record: Calibration, truth: np.ndarray) -> str:
+def _parameters(record: Calibrated, truth: np.ndarray) -> str:
     head = ["Parameter", "Truth", "Found", "±", "Error / ±", "Unit", "Equation"]
     rows = [
         [
@@ -87,7 +87,7 @@ def _error(value: float, std: float, true: float) -> list[str]:
     return [f"{std:.2g}", f"{(value - true) / std:+.1f}"]
 
 
-def _joints(record: Calibration, robot: VirtualRobot) -> str:
+def _joints(record: Calibrated, robot: VirtualRobot) -> str:
     """Table 2: three lines a joint."""
     rows = [*record.motors, *record.friction]
     found = {(row.joint, row.name): row for row in rows}
@@ -103,7 +103,7 @@ def _joints(record: Calibration, robot: VirtualRobot) -> str:
     return table(head, lines)
 
 
-def _accuracy(record: Calibration) -> str:
+def _accuracy(record: Calibrated) -> str:
     """Table 3: RMSE and R^2 of held-out data, two lines a joint."""
     steps = [step for step in record.steps if step.step in published.ACCURACY]
     head = ["Joint", "", *(f"{step.step}: {what} held out" for step in steps for what in ("RMSE", "R²"))]
@@ -121,7 +121,7 @@ def _accuracy(record: Calibration) -> str:
     return table(head, lines)
 
 
-def _published(record: Calibration, true_model: DynamicsModel) -> str:
+def _published(record: Calibrated, true_model: DynamicsModel) -> str:
     """Table 4: the paper's parameters as combinations of theta_b."""
     values = np.array([row.value for row in record.parameters])
     truth = true_model.known_theta_b()
@@ -153,7 +153,7 @@ def _published(record: Calibration, true_model: DynamicsModel) -> str:
     return table(head, rows, text_columns=(6,))
 
 
-def _std_of(record: Calibration, by_ours: Sequence[float] | np.ndarray) -> str:
+def _std_of(record: Calibrated, by_ours: Sequence[float] | np.ndarray) -> str:
     """Standard deviation of a combination of base parameters; none where one of them has none."""
     used = np.flatnonzero(np.asarray(by_ours))
     stds = np.array([record.parameters[k].std for k in used])

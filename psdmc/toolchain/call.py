@@ -20,19 +20,20 @@ from psdmc.toolchain.stubs import documentation
 
 
 class CompiledRobot(CompiledFunctions):
-    """A compiled robot has a method for each generated function, which computes it for NumPy arrays of states.
+    """A compiled robot has one method for each generated function. The methods take and return NumPy arrays.
 
-    `psdmc.compile` makes compiled robots. q is (..., nq), rates and torques are (..., nv), in SI units. The leading axes
-    (...) count states and broadcast. Results are float64 or float32, as compiled. A function with several results returns
-    a named tuple. Calls for many states release the GIL, so threads run in parallel.
+    `psdmc.compile` makes compiled robots. One call computes one state or many: q has the shape (..., nq), rates and torques
+    have the shape (..., nv), in SI units. The axes (...) count states and broadcast as in NumPy. All results have the type
+    `dtype`. A function with several results returns a named tuple. During a call for many states, other Python threads can
+    run.
 
     theta_b  (l,) base parameters that replace those in the code; optional
-    out      array, or tuple of arrays, that takes the result; optional. The array needs the result's shape and dtype, and
-             may be an input array
+    out      array into which psdmc writes the result, or a tuple of arrays for several results; optional. Each array needs
+             the shape and dtype of the result, and may be an input array
 
-    The base frame of a floating base is the world. A call takes about 0.3 us more than the arithmetic if its arrays are
-    contiguous, of the robot's dtype and of one leading shape, and about 10 us more otherwise. Without Python's C headers,
-    every call takes 10 us more.
+    If the robot has a floating base, "base frame" means the world frame. A call takes about 0.3 us in addition to the
+    arithmetic, if the arrays are contiguous, have the robot's dtype and equal axes (...). Calls with other arrays take
+    about 10 us in addition, and so do all calls if Python's C headers are not installed.
     """
 
     def _bind(self, compiled: CompiledFunctions) -> None:

@@ -53,12 +53,12 @@ class RobotFacts:
 
     @property
     def name(self) -> str:
-        """Return the name of the robot in C, with which the names of its C functions begin."""
+        """Return the name of the robot in C. The names of all C functions of the robot begin with this name."""
         return self._interface.robot
 
     @property
     def n(self) -> int:
-        """Return the number of joints; mimic joints, which follow another joint, are not counted."""
+        """Return the number of joints, without mimic joints, which follow another joint."""
         return self._interface.n
 
     @property
@@ -93,7 +93,7 @@ class RobotFacts:
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Return the names of the frames for poses, Jacobians and wrenches, in the order of the results."""
+        """Return the names of the named frames, in the order in which `forward_kinematics` returns their positions."""
         return self._interface.frame_names
 
     @property
@@ -109,18 +109,27 @@ class RobotFacts:
 
     @cached_property
     def limits(self) -> JointLimits:
-        """Return the joint limits of the robot file, each (n,). The functions do not enforce these limits."""
+        """Return the joint limits of the robot file: lower, upper, speed, acceleration and effort, each of shape (n,).
+
+        A limit that the file does not give is infinite. The robot's functions do not check the limits.
+        """
         columns = np.array(self._interface.limits, np.float64).T
         return JointLimits(*(_frozen(column) for column in columns))
 
     @cached_property
     def gravity_acceleration(self) -> Vector:
-        """Return the acceleration of gravity in the code, (3,) m/s^2 in the base frame (world frame for a floating base)."""
+        """Return the acceleration of gravity that the code contains, (3,), m/s^2, along the axes of the base frame.
+
+        If the robot has a floating base, the axes are those of the world frame.
+        """
         return _frozen(self._interface.gravity)
 
     @cached_property
     def theta_b(self) -> Vector | None:
-        """Return the compiled-in base parameters, (l,), SI units; None if unknown: pass `theta_b` in each call then."""
+        """Return the base parameters that the code contains, (l,), SI units, or None if they are unknown.
+
+        If the base parameters are unknown, pass `theta_b` in each call.
+        """
         values = self._interface.theta_b
         return None if values is None else _frozen(values)
 
@@ -224,12 +233,14 @@ class CompiledFunctions(RobotFacts):
         theta_b: ArrayLike | None = None,
         out: Any = None,
     ) -> Any:
-        """Call a generated function by its declaration, as methods such as `inverse_dynamics` do; returns their result.
+        """Call the generated function that a declaration describes, and return its result.
 
-        function  the declaration, from psdmc.functions.SIGNATURES
-        inputs    arrays in the order of the declaration
-        theta_b   (l,) base parameters in place of the compiled-in ones; optional
-        out       array, or tuple of arrays, that takes the results and is returned; None: new arrays
+        `robot.call(SIGNATURES["gravity"], [q])` returns the same as `robot.gravity(q)`.
+
+        function  a declaration from psdmc.functions.SIGNATURES
+        inputs    the inputs of the function, as a list of arrays
+        theta_b   (l,) base parameters that replace those in the code; optional
+        out       array into which psdmc writes the result, or a tuple of arrays for several results; optional
         """
         if any(map(is_foreign, inputs)):
             return self._foreign(function, inputs, theta_b, out)
@@ -252,11 +263,14 @@ class CompiledFunctions(RobotFacts):
         return outs[0] if len(outs) == 1 else results(function)(*outs)
 
     def pattern(self, name: str) -> tuple[Array, Array]:
-        """Return the row and column indices, (k,) each, of the k matrix entries that can differ from zero.
+        """Return the row indices and the column indices, (k,) each, of the k matrix entries that can differ from zero.
 
-        `robot.mass_matrix(q)[..., rows, columns]` equals `robot.mass_matrix_packed(q)`.
+        If rows and columns are the indices of 'mass_matrix_packed', `robot.mass_matrix(q)[..., rows, columns]` equals
+        `robot.mass_matrix_packed(q)`.
 
-        name  a function that returns one matrix, such as 'mass_matrix' or 'regressor'; others raise InputError
+        name  name of a function that returns one matrix, such as 'mass_matrix', 'regressor' or 'regressor_packed'
+
+        Raises InputError if the function does not return one matrix, or is not compiled.
         """
         self._kernel(name)
         if name not in self._patterns:

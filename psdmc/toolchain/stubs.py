@@ -59,9 +59,13 @@ def documentation(function: Signature) -> str:
     several = len(function.outputs) > 1
     lead = ("...",) if function.inputs else ()
     given = [(q.name, f"{_shape(q)} {q.means}") for q in function.inputs]
-    theta = "(l,) base parameters in place of the model's, SI units; optional if the model's are known"
+    theta = "(l,) base parameters to use instead of the model's, SI units; optional if the model's are known"
     given += [("theta_b", theta)] if function.theta else []
-    written = "tuple of arrays that take the results" if several else "array that takes the result"
+    written = (
+        "tuple of arrays into which psdmc writes the results"
+        if several
+        else "array into which psdmc writes the result"
+    )
     given += [("out", f"{written}; optional")]
     made = [(q.name, f"{_shape(q, lead)} {q.means}") for q in function.outputs]
     axes = {axis for q in (*function.inputs, *function.outputs) for axis in q.axes}
@@ -73,12 +77,14 @@ def documentation(function: Signature) -> str:
     return "\n\n".join([function.summary, _rows(given), returned, _rows(made), footer])
 
 
-_STATES = "The leading axes (...) count states."
+_STATES = "For many states, the axes (...) count the states; for one state, there are no such axes."
 _SIZES = {
-    "nq": "nq is the length of q: the number of joints if every joint has one coordinate.",
+    "nq": "nq is the length of q, which is the number of joints if every joint has one coordinate.",
     "nv": "nv is the number of joint rates.",
+    "nx": "nx is 2 nv: one row per joint rate for q_next, and one for qd_next.",
     "l": "l is the number of base parameters.",
     "frames": "frames is the number of named frames.",
+    "nonzeros": "nonzeros is the number of entries that can differ from zero.",
 }
 
 
@@ -86,7 +92,7 @@ def _failures(function: Signature) -> list[str]:
     """What NaN means."""
     if function.positive is None:
         return []
-    stage = " or in a stage of its step" if len(function.positive.quantity.axes) > 1 else ""
+    stage = " or in a stage of the step" if len(function.positive.quantity.axes) > 1 else ""
     state = f"If the mass matrix is not positive definite in a state{stage},"
     return [f"{state} the results of that state are NaN."]
 

@@ -50,7 +50,7 @@ def test_a_good_log_gives_a_model(folder: Path):
 
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[0] == "verdict: usable"
-    assert load(folder / "good.npz").provenance["calibration"]["verdict"]["usable"] is True
+    assert load(folder / "good.npz").calibrated.verdict.usable is True
 
 
 def test_a_negated_log_gives_a_reason_a_report_and_no_model(folder: Path):
@@ -83,4 +83,4 @@ def test_who_insists_gets_the_file_and_the_status_all_the_same(folder: Path):
     words = ("calibrate", folder / "arm.npz", folder / "negated.csv", "-o", folder / "kept.npz", "--keep")
 
     assert status(*words) == NOT_USABLE
-    assert load(folder / "kept.npz").provenance["calibration"]["verdict"]["usable"] is False
+    assert load(folder / "kept.npz").calibrated.verdict.usable is False

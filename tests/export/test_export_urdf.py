@@ -15,11 +15,13 @@ from pinocchio_robots import path_of
 from shared_data import UR10_LOG
 
 import psdmc
-from psdmc.calibration.identify.physical_links import NoSuchLinks
 from psdmc.cli.boundary import run
 from psdmc.dynamics.parameters import inertia_of, standard_parameters
 from psdmc.errors import InputError
 from psdmc.friction.laws import LAWS
+from psdmc.links.physical_links import NoSuchLinks
+from psdmc.model.calibrated import by_joint
+from psdmc.model.calibrated_json import from_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.zeros import leading_rows
 
@@ -255,7 +257,7 @@ def test_friction_of_a_linear_fit_is_in_dynamics_and_its_offset_is_said(
         for name, value in (("coulomb", 1.5), ("viscous", 0.25), ("offset", 0.4))
     ]
     kept = {"friction": rows, "prediction": {"law": "linear", "exponents": [1.0]}}
-    model = replace(arm, provenance={**arm.provenance, "calibration": kept})
+    model = replace(arm, calibrated=from_json(kept))
     written = psdmc.export_urdf(model, tmp_path / "back.urdf")
     dynamics = {j.get("name"): j.find("dynamics") for j in ET.parse(written.urdf).getroot().findall("joint")}
     assert dynamics["slide"].attrib == {"damping": "0.25", "friction": "1.5"}
@@ -302,7 +304,8 @@ def test_a_calibrated_ur10_keeps_its_drives_and_friction(tmp_path: Path) -> None
     by_urdf = by_pinocchio(written.urdf.read_text(encoding="utf-8"), found, at)
     assert error(by_urdf + drive_torque(mjcf, found, at[2]), found.inverse_dynamics(*at)) < AGREEMENT
     assert error(by_mujoco(mjcf, found, at), found.inverse_dynamics(*at)) < AGREEMENT
-    rows = {(row["joint"], row["name"]): row["value"] for row in found.provenance["calibration"]["friction"]}
+    assert found.calibrated is not None
+    rows = by_joint(found.calibrated.friction)
     for joint in ET.parse(written.mjcf).iter("joint"):
         assert float(joint.get("frictionloss", "nan")) == rows[joint.get("name"), "coulomb"]
         assert float(joint.get("damping", "nan")) == rows[joint.get("name"), "viscous"]

@@ -152,7 +152,14 @@ FORGED = {
     "snapped that is a number": (at("provenance", "snapped")(1), "snapped"),
     "a snapping effect of texts": (at("provenance", "snap_torque_change")(["a", "b"]), "snap_torque_change"),
     "a calibration that is a text": (at("provenance", "calibration")("x"), "calibration"),
-    "a calibration without joints": (at("provenance", "calibration")({"friction": [{}]}), "'joint'"),
+    "a row of friction without a name": (
+        at("provenance", "calibration")({"friction": [{}]}),
+        "a name of the",
+    ),
+    "a joint that there is none of": (
+        at("provenance", "calibration")({"friction": [{"joint": "x", "name": "coulomb", "value": 1.0}]}),
+        "joint 'x'",
+    ),
     "E of floats": (array("E", lambda E: E.astype(float)), "E has type float64"),
     "E of objects": (array("E", lambda E: E.astype(object)), ""),
     "E with a row too many": (array("E", lambda E: np.vstack([E, E[:1]])), "E has 11 rows"),

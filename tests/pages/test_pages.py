@@ -17,12 +17,21 @@ import pytest
 from made_up_bench import made_up_result
 from made_up_denso import denso, made_up_record, plant
 
-from psdmc.calibration.identify.prediction import Prediction
-from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.identify.steps import JointQuality, Sample, StepOptions, StepQuality
-from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
-from psdmc.calibration.verdict.verdict import JointFigures, Verdict
+from psdmc.calibration.verdict.record import Calibration
+from psdmc.model.calibrated import (
+    JointFigures,
+    JointQuality,
+    LogUsed,
+    NumberRow,
+    ParameterRow,
+    Prediction,
+    Quality,
+    Sample,
+    StepQuality,
+    StepUsed,
+    Verdict,
+)
+from psdmc.model.grounds import Ground
 from psdmc.report.bench_page import write_page
 from psdmc.report.calibrate_report import write_report
 from psdmc.report.truth_tables import truth_view
@@ -83,15 +92,9 @@ def calibration() -> Calibration:
     )
     quality = JointQuality(Quality(0.1, 0.999), Quality(0.2, 0.9876))
     figures = tuple(JointFigures(j, 0.98, 0.3, 1.02, 0.05, True, 3.0, 0.2, 1.5, 0.4) for j in JOINTS)
-    log = {
-        "log": "a_log_of_a_long_name_2026-11-22_exciting_motion.csv",
-        "rows": 90000,
-        "seconds": 90.0,
-        "date": "",
-    }
-    data = {"data": [log] * 3, "versions": {"psdmc": "1.0", "numpy": "2.1"}}
+    log = LogUsed("a_log_of_a_long_name_2026-11-22_exciting_motion.csv", 90000, 90.0)
     doubt = "the model lacks an effect at a joint: the residual is no sensor noise"
-    verdict = Verdict((), (doubt,), (), figures, 40.0)
+    verdict = Verdict((), (Ground("said", {"text": doubt}),), (), figures, 40.0)
     equation = "Izz1 + 0.0025 m2 + Iyy2 + 0.183125 m3 + Iyy3 + 0.183525 m4 + 0.183525 m5 + 0.183525 m6"
     return Calibration(
         robot="a robot",
@@ -108,8 +111,10 @@ def calibration() -> Calibration:
             StepQuality(step, dict.fromkeys(JOINTS, quality), samples) for step in ("Gravity", "Inertial")
         ),
         warnings=("a joint hardly moves",),
-        facts={"rank": 31, "singular_values": [3.0, 0.5]} | data,
-        prediction=Prediction("linear", {"all": StepOptions(FilterOptions(cutoff=8.0))}),
+        facts={"rank": 31, "singular_values": [3.0, 0.5]},
+        logs=(log,) * 3,
+        versions={"psdmc": "1.0", "numpy": "2.1"},
+        prediction=Prediction("linear", {"all": StepUsed(8.0)}),
         notes=("physical consistency moved the parameters by 3 standard deviations",),
         verdict=verdict,
     )

@@ -13,7 +13,6 @@ from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.verdict.record import Calibration
-from psdmc.calibration.verdict.said_once import unsaid_warnings
 from psdmc.cli.boundary import run
 from psdmc.compiler import derive
 from psdmc.errors import InputError
@@ -71,7 +70,7 @@ def test_what_a_doubt_says_no_warning_repeats(record: Calibration):
     )
     assert any("the residual is no noise" in text for text in record.warnings)
 
-    assert not any("the residual is no noise" in text for text in unsaid_warnings(record))
+    assert not any("the residual is no noise" in text for text in record.unsaid)
 
 
 def test_show_says_the_verdict_first_then_logs_accuracy_and_friction(

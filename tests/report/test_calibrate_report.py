@@ -11,18 +11,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from psdmc.calibration.identify.prediction import Prediction
-from psdmc.calibration.identify.quality import Quality
-from psdmc.calibration.identify.steps import JointQuality, Sample, StepOptions, StepQuality
-from psdmc.calibration.logs.filter import SplitOptions
-from psdmc.calibration.logs.low_pass import FilterOptions
-from psdmc.calibration.verdict.record import Calibration, NumberRow, ParameterRow
-from psdmc.calibration.verdict.verdict import JointFigures, Verdict
+from psdmc.calibration.verdict.record import Calibration
 from psdmc.errors import InputError
+from psdmc.model.calibrated import (
+    JointFigures,
+    JointQuality,
+    LogUsed,
+    NumberRow,
+    ParameterRow,
+    Prediction,
+    Quality,
+    Sample,
+    StepQuality,
+    StepUsed,
+    Verdict,
+)
+from psdmc.model.grounds import Ground
 from psdmc.report.calibrate_commands import calibrate_command
 from psdmc.report.calibrate_report import report_html, require_free_numbers, write_report
 
-END = SplitOptions(held_out=0.3, blocks=0)
 X = np.linspace(0.0, 1.0, 50)
 SAMPLE = Sample("a", "time [s]", X, np.sin(X), np.sin(X) + 0.01, X > 0.8)
 
@@ -95,18 +102,11 @@ def test_accuracy_is_labelled_held_out(record: Calibration):
 
 
 def test_logs_cut_offs_versions_and_what_shading_means_are_on_the_page(record: Calibration):
-    row = {"log": "one<b>.csv", "rows": 45000, "seconds": 45.0, "date": "2026-11-22"}
-    facts = {
-        "data": [row],
-        "with_load": [row | {"log": "two.csv"}],
-        "versions": {"psdmc": "9.8", "numpy": "7.6"},
-    }
-    steps = {
-        "gravity": StepOptions(FilterOptions(cutoff=4.0)),
-        "all": StepOptions(FilterOptions(cutoff=8.5), END),
-    }
+    log = LogUsed("one<b>.csv", 45000, 45.0, "2026-11-22")
+    logs, versions = (log, replace(log, log="two.csv", use="with_load")), {"psdmc": "9.8", "numpy": "7.6"}
+    steps = {"gravity": StepUsed(4.0), "all": StepUsed(8.5, held_out=0.3, blocks=0)}
 
-    page = report_html(replace(record, facts=facts, prediction=Prediction("linear", steps)))
+    page = report_html(replace(record, logs=logs, versions=versions, prediction=Prediction("linear", steps)))
 
     for cells in (
         "<td>one&lt;b&gt;.csv</td><td>45,000</td><td>45</td><td>2026-11-22</td><td>fitted and held out</td>",
@@ -166,9 +166,11 @@ def test_the_numbers_replace_no_file_of_the_users(record: Calibration, tmp_path:
 def test_the_verdict_comes_first_with_its_figures(record: Calibration, tmp_path: Path):
     figures = JointFigures("a", 0.25, 0.2, -1.02, 0.03, True, -4.5, 0.1, float("nan"), 0.7)
     hidden = replace(figures, joint="b", gain=11.6, visible=False)
-    verdict = Verdict(
-        ("friction <gives> power",), ("few samples",), ("a & b swapped",), (figures, hidden), 5.0
-    )
+    grounds = [
+        (Ground("said", {"text": text}),)
+        for text in ("friction <gives> power", "few samples", "a & b swapped")
+    ]
+    verdict = Verdict(*grounds, (figures, hidden), 5.0)
 
     page, numbers = write_report(replace(record, robot="arm", verdict=verdict), tmp_path / "page.html")
     text = page.read_text(encoding="utf-8")

@@ -21,6 +21,8 @@ from psdmc.cli.boundary import run
 from psdmc.compiler import emit_c
 from psdmc.errors import InputError
 from psdmc.lower.kernels import lower
+from psdmc.model.calibrated import NumberRow, parameters_of
+from psdmc.model.calibrated_json import as_json, from_json
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.linear_friction import linear_friction
 from psdmc.model.load import load
@@ -43,7 +45,7 @@ def formula(v: np.ndarray) -> np.ndarray:
 
 
 def with_friction(model: DynamicsModel, **law: object) -> DynamicsModel:
-    """The model with those numbers in its provenance, where a calibration writes them."""
+    """The model with those numbers, as psdmc 0.2 wrote them."""
     terms = {"coulomb": COULOMB, "viscous": VISCOUS, "viscous^1.5": CURVED, "offset": OFFSET}
     rows = [
         {"joint": joint, "name": name, "value": float(values[k])}
@@ -51,9 +53,7 @@ def with_friction(model: DynamicsModel, **law: object) -> DynamicsModel:
         for k, joint in enumerate(model.joint_names)
     ]
     prediction = {"law": "linear", "exponents": [1.0, 1.5], "sign_speed": SIGN_SPEED, **law}
-    return replace(
-        model, provenance={**model.provenance, "calibration": {"friction": rows, "prediction": prediction}}
-    )
+    return replace(model, calibrated=from_json({"friction": rows, "prediction": prediction}))
 
 
 @pytest.fixture(scope="module")
@@ -82,16 +82,17 @@ ASYMMETRY, PEAK, SLOW = np.array([0.5, -0.3]), np.array([0.6, 0.25]), 0.01234567
 
 def uneven(model: DynamicsModel) -> DynamicsModel:
     """With an asymmetry and a Stribeck effect at the first joint, and a spring, which is no friction."""
-    kept = with_friction(model).provenance["calibration"]
+    kept = with_friction(model).calibrated
+    assert kept is not None
     joints = model.joint_names
     further = [
-        {"joint": joint, "name": "coulomb_asymmetry", "value": float(ASYMMETRY[k])}
+        NumberRow(joint, "coulomb_asymmetry", float(ASYMMETRY[k]), 0.0, "Nm")
         for k, joint in enumerate(joints)
     ]
-    further.append({"joint": joints[0], "name": f"stribeck_{SLOW!r}", "value": float(PEAK[0])})
-    springs = [{"spring": "*/ x", "name": "stiffness", "value": 1.0}]
-    whole = {**kept, "friction": [*kept["friction"], *further], "springs": springs}
-    return replace(model, provenance={**model.provenance, "calibration": whole})
+    name = f"stribeck_{SLOW!r}"
+    further.append(NumberRow(joints[0], name, float(PEAK[0]), 0.0, "Nm", parameters=parameters_of(name)))
+    springs = (NumberRow("*/ x", "stiffness", 1.0, 0.0, "Nm/rad"),)
+    return replace(model, calibrated=replace(kept, friction=(*kept.friction, *further), springs=springs))
 
 
 @pytest.mark.parametrize(("real", "limit"), [("float64", 1e-14), ("float32", 2e-6)])
@@ -115,12 +116,10 @@ def test_asymmetry_and_stribeck_in_c(real: str, limit: float, tmp_path: Path) ->
     "name", ["stribeck_", "stribeck_inf", "stribeck_-1.0", "stribeck_1e-3", "stribeck_*/"]
 )
 def test_a_forged_stribeck_velocity_is_refused(name: str) -> None:
-    model = with_friction(bundled_model("two_link_full"))
-    kept = model.provenance["calibration"]
-    rows = [*kept["friction"], {"joint": model.joint_names[0], "name": name, "value": 1.0}]
-    forged = {**model.provenance, "calibration": {**kept, "friction": rows}}
-    with pytest.raises(InputError, match="damaged"):
-        package(replace(model, provenance=forged))
+    kept = as_json(with_friction(bundled_model("two_link_full")).calibrated)
+    kept["friction"][0]["name"] = name
+    with pytest.raises(ValueError, match="is a value of no friction law"):
+        from_json(kept)
 
 
 MAIN = """
@@ -215,7 +214,7 @@ def test_what_has_no_such_friction_is_refused(arm: DynamicsModel, tmp_path: Path
     [{"sign_speed": 0.0}, {"sign_speed": "fast"}, {"exponents": [1.0, "inf"]}, {"exponents": [1.0, 99.0]}],
 )
 def test_forged_numbers_are_refused(law: dict[str, object], tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="damaged"):
+    with pytest.raises((InputError, ValueError), match=r"damaged|expected a number|with number 99"):
         emit_c(
             with_friction(bundled_model("two_link_full"), **law),
             tmp_path / "c",
@@ -252,13 +251,14 @@ def test_viscous_terms_are_called_by_their_exponents_and_those_of_psdmc_0_1_are_
         ]
         law = {"law": "linear", "exponents": list(exponents), "sign_speed": SIGN_SPEED}
         kept = {"friction": rows, "prediction": law}
-        save(
-            replace(model, provenance={**model.provenance, "calibration": kept}), tmp_path / f"{version}.npz"
-        )
+        old = replace(model, provenance={**model.provenance, "calibration": kept})
+        save(old, tmp_path / f"{version}.npz")
 
         found = load(tmp_path / f"{version}.npz")
 
         expected = np.tanh(speed / SIGN_SPEED) * (COULOMB + size) + OFFSET
         assert np.allclose(linear_friction(found).torque(speed), expected, rtol=1e-14)
-        said = [row["name"] for row in found.provenance["calibration"]["friction"]][2:-2:2]
+        assert found.calibrated is not None
+        assert "calibration" not in found.provenance
+        said = [row.name for row in found.calibrated.friction][2:-2:2]
         assert said == names["now"]

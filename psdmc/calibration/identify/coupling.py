@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psdmc.calibration.logs.log import Array
+from psdmc.model.calibrated import Matrix
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,10 +39,6 @@ class Coupling:
     def torque_of_motors(self, torque: Array) -> Array:
         """(..., n) joint torques to motor torques."""
         return np.asarray(torque @ self.matrix)
-
-
-Matrix = tuple[tuple[float, ...], ...]
-"""C as options and files hold it; empty: every motor drives its own joint."""
 
 
 def coupling_of(matrix: Matrix) -> Coupling | None:

@@ -13,15 +13,9 @@ from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.identify.quality import quality
 from psdmc.calibration.identify.residuals import CORRELATED
-from psdmc.calibration.identify.steps import (
-    FrictionOptions,
-    FrictionRun,
-    JointQuality,
-    Sample,
-    StepOptions,
-    StepQuality,
-)
+from psdmc.calibration.identify.steps import FrictionOptions, FrictionRun, StepOptions
 from psdmc.calibration.logs.log import Array
+from psdmc.model.calibrated import JointQuality, Remark, Sample, StepQuality
 from psdmc.processes import in_processes
 from psdmc.robot.mechanism import Mechanism
 
@@ -67,10 +61,11 @@ def _correlated(found: Mapping[str, JointFriction]) -> tuple[str, ...]:
     ]
     if not named:
         return ()
-    return (
+    text = (
         f"friction: the residual is no noise but correlated from sample to sample, joint(s) {', '.join(named)}: the "
-        "model lacks an effect there; standard deviations are widened for it, by the factor named",
+        "model lacks an effect there; standard deviations are widened for it, by the factor named"
     )
+    return (Remark(text, "residual"),)
 
 
 def judge_friction(runs: Mapping[str, JointRun], joints: Mapping[str, JointFriction]) -> StepQuality:

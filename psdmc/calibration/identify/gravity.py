@@ -14,11 +14,12 @@ from psdmc.calibration.identify.motor_model import Motors
 from psdmc.calibration.identify.predictor import Regressor, gravity_regressor, payload_torque
 from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
-from psdmc.calibration.identify.steps import GravityRun, StepOptions, StepQuality, judged
+from psdmc.calibration.identify.steps import GravityRun, StepOptions, judged
 from psdmc.calibration.logs.filter import States, away_from, filtered, held_out
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.errors import InputError
+from psdmc.model.calibrated import StepQuality
 from psdmc.robot.mechanism import Mechanism
 
 SAME_PLACE = 5e-3

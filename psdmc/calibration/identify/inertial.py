@@ -22,10 +22,11 @@ from psdmc.calibration.identify.predictor import Regressor, payload_torque
 from psdmc.calibration.identify.prior import base_parameter_scale, torque_sizes
 from psdmc.calibration.identify.residuals import noise_warnings
 from psdmc.calibration.identify.state_friction import friction_torque
-from psdmc.calibration.identify.steps import InertialRun, StepOptions, StepQuality, judged
+from psdmc.calibration.identify.steps import InertialRun, StepOptions, judged
 from psdmc.calibration.logs.filter import States, filtered, held_out, thinned
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import checked
+from psdmc.model.calibrated import StepQuality
 from psdmc.robot.mechanism import Mechanism
 
 FRICTION_STEP = 0.1

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from psdmc.calibration.columns.columns import Columns, read_columns
-from psdmc.calibration.identify.coupling import Matrix
 from psdmc.calibration.identify.estimate import FitOptions
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log_checks import CheckOptions
@@ -17,6 +16,7 @@ from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.calibration.logs.stored_log import HELD_BYTES
 from psdmc.friction.law import Term
 from psdmc.friction.terms import every_joint_s
+from psdmc.model.calibrated import Matrix
 from psdmc.robot.mechanism import Mechanism
 
 

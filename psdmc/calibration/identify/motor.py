@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from psdmc.calibration.identify.predictor import payload_torque
 from psdmc.calibration.identify.quality import quality
 from psdmc.calibration.identify.residuals import widening
-from psdmc.calibration.identify.steps import JointQuality, MotorRun, Sample, StepOptions, StepQuality
+from psdmc.calibration.identify.steps import MotorRun, StepOptions
 from psdmc.calibration.logs.filter import away_from, filtered, held_out
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.log_checks import checked
 from psdmc.calibration.logs.low_pass import FilterOptions
 from psdmc.errors import InputError
+from psdmc.model.calibrated import JointQuality, Remark, Sample, StepQuality
 from psdmc.robot.mechanism import Mechanism
 
 STEADY = 0.9
@@ -69,7 +70,10 @@ def calibrate_motors(chain: Mechanism, runs: Sequence[MotorRun], options: StepOp
 def negative_warnings(joint_names: Sequence[str], constants: Array) -> tuple[str, ...]:
     """A warning for each torque constant (N m/A, NaN: none) that is negative."""
     return tuple(
-        f"joint {name}: torque constant is negative: the current's sign is against the joint's"
+        Remark(
+            f"joint {name}: torque constant is negative: the current's sign is against the joint's",
+            "negative_constant",
+        )
         for name, value in zip(joint_names, constants, strict=True)
         if value < 0
     )

@@ -40,6 +40,7 @@ from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.stored_log import AnyLog
 from psdmc.calibration.logs.wording import listed
 from psdmc.errors import InputError
+from psdmc.model.calibrated import Remark
 from psdmc.progress import Progress
 from psdmc.robot.mechanism import Mechanism
 
@@ -199,7 +200,7 @@ def _missing(
     """A sentence for each joint without a constant: why, and what to mount or how to move."""
     poses = np.concatenate([_poses(log, options) for log in loaded])
     reasons = unreached(chain, poses, load)
-    sentences = []
+    sentences: list[str] = []
     for k, joint in enumerate(chain.joints):
         if found[k]:
             continue
@@ -210,7 +211,9 @@ def _missing(
             REMEDIES[reason] if reason else "mount more, farther from the axis, or move faster and longer"
         )
         why = f"{reason}, and {felt}" if reason else felt
-        sentences.append(f"joint {joint.name}: torque constant not found: {why}; {remedy}")
+        sentences.append(
+            Remark(f"joint {joint.name}: torque constant not found: {why}; {remedy}", "constant_not_found")
+        )
     return sentences
 
 

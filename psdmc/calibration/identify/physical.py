@@ -8,23 +8,15 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
-from importlib import import_module
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.link_bodies import (
-    flat_rows,
-    held_rows,
-    pseudo_inertia,
-    reference_body,
-    vanishes,
-)
 from psdmc.calibration.logs.log import Array
 from psdmc.dynamics.parameters import inertia_matrix, second_moments
 from psdmc.errors import InputError, InternalError
+from psdmc.links.link_terms import PhysicalOptions, known_inner, link_terms, require_cvxpy
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.mechanism import PARAMETERS_PER_LINK
 
@@ -63,23 +55,6 @@ NO_BOUNDS = Bounds(np.zeros((0, 0)), np.zeros(0), ())
 
 class NotPhysical(InputError):
     """No parameters that a real robot could have were found near an estimate."""
-
-
-@dataclass(frozen=True, slots=True)
-class PhysicalOptions:
-    """Bounds of the physical estimate, and weights of the distance from the file's bodies.
-
-    smallest        eigenvalue of each link's pseudo-inertia, kg with lengths in units of 0.1 m
-    smallest_drive  kg m^2, of each drive inertia that is a parameter
-    known_body      variances that one unit of divergence from the file's body costs (Lee, Wensing, Park 2020: the
-                    divergence of one distribution of mass from another, the same in any unit and frame)
-    unknown_body    the same for an ordinary body, where the file has none: enough to stay off the boundary
-    """
-
-    smallest: float = 1e-6
-    smallest_drive: float = 1e-4
-    known_body: float = 1.0
-    unknown_body: float = 1e-2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,13 +187,6 @@ def whitening_of(covariance: Array) -> Array:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(correlation)) / scale)
 
 
-def known_inner(model: DynamicsModel) -> Array:
-    """The span's coordinates of the file's standard parameters; zero where it has none."""
-    span = model.mechanism.parameter_span
-    known = np.nan_to_num(model.mechanism.parameters.reshape(-1))
-    return np.asarray(np.linalg.lstsq(span, known, rcond=None)[0])
-
-
 def require_physical(model: DynamicsModel, x: Array) -> None:
     """NotPhysical unless the solution's pseudo-inertias have no negative eigenvalue beyond rounding, whatever the
     solver reports."""
@@ -239,36 +207,3 @@ SOLVER_SLACK = 1e-5
 ROUNDING = 1e-7
 """Negative eigenvalue of a pseudo-inertia, relative to its largest entry, that counts as zero: the solver keeps
 constraints to 1e-8. The mass matrix is checked separately."""
-
-
-def link_terms(
-    cp: Any, model: DynamicsModel, x: Any, link: int, options: PhysicalOptions
-) -> tuple[list[Any], Any]:
-    """Constraints, pseudo-inertia above its bound, and divergence from the file's body; none of them for a link that
-    the chain assumes massless."""
-    start = PARAMETERS_PER_LINK * link
-    span: Array = model.mechanism.parameter_span
-    constraints: list[Any] = []
-    if np.any(span[start + 10]):
-        constraints.append(x[start + 10] >= options.smallest_drive)
-    if not np.any(span[start]):
-        return constraints, 0.0
-    held = held_rows(span, start)
-    body = cp.bmat(pseudo_inertia([x[start + k] for k in range(10)]))
-    constraints += [body[k, :] == 0 for k in flat_rows(span, start) if not vanishes(span, start, k)]
-    block = body[held, :][:, held] if len(held) < 4 else body
-    near, is_known = reference_body(model.mechanism.parameters[link], held)
-    weight = options.known_body if is_known else options.unknown_body
-    divergence = cp.trace(np.linalg.inv(near) @ block) - cp.log_det(block)
-    return [*constraints, block >> options.smallest * np.eye(len(held))], weight * divergence
-
-
-def require_cvxpy() -> Any:
-    """cvxpy; InputError with the remedy where it or its solver is not installed."""
-    missing = [name for name in ("cvxpy", "clarabel") if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"physical consistency needs {' and '.join(missing)}, not installed here",
-            "pip install 'psdmc[calibrate]', or see the unconstrained fit with --no-physical",
-        )
-    return import_module("cvxpy")

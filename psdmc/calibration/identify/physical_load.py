@@ -7,10 +7,11 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.link_bodies import pseudo_inertia
-from psdmc.calibration.identify.physical import NotPhysical, require_cvxpy
+from psdmc.calibration.identify.physical import NotPhysical
 from psdmc.calibration.logs.log import Array
 from psdmc.dynamics.parameters import inertia_matrix, inertia_of, second_moments
+from psdmc.links.link_bodies import pseudo_inertia
+from psdmc.links.link_terms import require_cvxpy
 
 LOAD = 10
 

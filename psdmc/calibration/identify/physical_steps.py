@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from psdmc.calibration.identify.four_steps import FourSteps
 from psdmc.calibration.identify.friction import FrictionResult
 from psdmc.calibration.identify.friction_fit import JointFriction, step_sizes, to_seven, unknowns_of
-from psdmc.calibration.identify.physical import PhysicalOptions, nearest_physical, whitening_of
+from psdmc.calibration.identify.physical import nearest_physical, whitening_of
 from psdmc.calibration.logs.log import Array
 from psdmc.friction.state import STATE_LAW
+from psdmc.links.link_terms import PhysicalOptions
 from psdmc.model.dynamics_model import DynamicsModel
 
 SEVEN = 7

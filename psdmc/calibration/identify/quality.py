@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from psdmc.calibration.logs.log import Array
-
-
-@dataclass(frozen=True, slots=True)
-class Quality:
-    """RMSE (target's unit) and R^2 of one joint in one step; R^2 is NaN where the target does not vary."""
-
-    rmse: float
-    r2: float
+from psdmc.model.calibrated import Quality
 
 
 def quality(measured: Array, predicted: Array) -> Quality:

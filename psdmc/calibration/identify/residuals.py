@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from psdmc.calibration.logs.log import Array
+from psdmc.model.calibrated import Remark
 
 
 class Judged(Protocol):
@@ -84,7 +85,8 @@ def noise_warnings(step: str, joint_names: Sequence[str], solved: Judged) -> tup
     if not found and solved.noise_factor < NOISY:
         return ()
     where = ", ".join(f"{name} ({rho:.2f})" for name, rho in found) or "all joints together"
-    return (
+    text = (
         f"{step}: the residual is no noise but correlated from sample to sample, joint(s) {where}: the model lacks an "
-        f"effect there; standard deviations are widened for it, by a factor of up to {solved.noise_factor:.1f}",
+        f"effect there; standard deviations are widened for it, by a factor of up to {solved.noise_factor:.1f}"
     )
+    return (Remark(text, "residual"),)

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import FitOptions
-from psdmc.calibration.identify.quality import Quality, quality
+from psdmc.calibration.identify.quality import quality
 from psdmc.calibration.logs.filter import SplitOptions
 from psdmc.calibration.logs.log import Array, Log
 from psdmc.calibration.logs.low_pass import FilterOptions
+from psdmc.model.calibrated import JointQuality, Sample, StepQuality, StepUsed
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,19 @@ class StepOptions:
     split: SplitOptions = field(default_factory=SplitOptions)
     fit: FitOptions = field(default_factory=FitOptions)
 
+    @property
+    def used(self) -> StepUsed:
+        """What a calibrated model keeps of it."""
+        low_pass, split = self.filter, self.split
+        return StepUsed(low_pass.cutoff, low_pass.order, low_pass.settle, split.held_out, split.blocks)
+
+
+def step_of(used: StepUsed) -> StepOptions:
+    """The options of a step that a calibrated model keeps; InputError where they cannot be."""
+    return StepOptions(
+        FilterOptions(used.cutoff, used.order, used.settle), SplitOptions(used.held_out, used.blocks)
+    )
+
 
 @dataclass(frozen=True, slots=True)
 class FrictionOptions:
@@ -106,35 +120,6 @@ class CalibrationOptions:
     lugre: FrictionOptions = field(default_factory=FrictionOptions)
     inertial: StepOptions = field(default_factory=lambda: StepOptions(FilterOptions(cutoff=15.0)))
     passes: int = 2
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sample:
-    """A stretch of measured and predicted torque, for plots: held-out part marked."""
-
-    joint: str
-    abscissa: str
-    x: Array
-    measured: Array
-    predicted: Array
-    held_out: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class JointQuality:
-    """Fit and held-out quality of one joint in one step."""
-
-    fit: Quality
-    held_out: Quality
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StepQuality:
-    """One column of table 3: per joint name, and samples to look at."""
-
-    step: str
-    joints: dict[str, JointQuality]
-    samples: tuple[Sample, ...] = field(default_factory=tuple)
 
 
 def judged(

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from psdmc.calibration.identify.estimate import FitOptions
 from psdmc.calibration.logs.log import Array
+from psdmc.model.calibrated import IDENTIFIED, SHOWN, WEAK, Remark
 
-IDENTIFIED = "identified"
-WEAK = "weakly visible"
 TOGETHER_WORDS = "only in combination with "
 WEAK_SHARE = 0.5
 """Standard deviation, as a share of the value, from which a parameter is called weakly visible: its sign is then
@@ -29,11 +28,11 @@ NAMED = 4
 class Visibility:
     """What the data show of each unknown.
 
-    words       (m)  "identified", "weakly visible", "only in combination with ...", "not visible: kept at ..."
+    words       (m)  Remarks: "identified", "weakly visible", "only in combination with ...", "not visible: kept at ..."
     determined  (m,) whether the data fix the unknown by itself, however weakly: then it has a standard deviation
     """
 
-    words: tuple[str, ...]
+    words: tuple[Remark, ...]
     determined: NDArray[np.bool_]
 
 
@@ -66,8 +65,7 @@ def visibility(
     return Visibility(tuple(words), share < limit)
 
 
-DROPPED = "not essential: kept at "
-BY_PRIOR = "by the stated prior more than by the data"
+BY_PRIOR = Remark("by the stated prior more than by the data", "stated")
 
 
 def as_fitted(
@@ -75,22 +73,28 @@ def as_fitted(
 ) -> Visibility:
     """The words of unknowns of which some were dropped, and those that are `stated` have a prior of stated confidence."""
     words = [
-        f"{DROPPED}{kept_at[k]}" if dropped[k] else BY_PRIOR if stated[k] and not known else word
+        Remark(f"not essential: kept at {kept_at[k]}", "dropped")
+        if dropped[k]
+        else BY_PRIOR
+        if stated[k] and not known
+        else word
         for k, (word, known) in enumerate(zip(seen.words, seen.determined, strict=True))
     ]
     return Visibility(tuple(words), (seen.determined | stated) & ~dropped)
 
 
-def _unseen(names: Sequence[str], j: int, share: Array, together: Array, limit: float, kept_at: str) -> str:
+def _unseen(
+    names: Sequence[str], j: int, share: Array, together: Array, limit: float, kept_at: str
+) -> Remark:
     if share[j] > INVISIBLE_SHARE:
-        return f"not visible: kept at {kept_at}"
+        return Remark(f"not visible: kept at {kept_at}", "invisible")
     partly = (share >= limit) & (share <= INVISIBLE_SHARE) & (together > TOGETHER)
     partners = [k for k in np.argsort(-together, kind="stable") if partly[k] and k != j]
     if not partners:
-        return f"mostly invisible: near {kept_at}"
+        return Remark(f"mostly invisible: near {kept_at}", "mostly")
     named = ", ".join(names[k] for k in partners[:NAMED])
     more = f" and {len(partners) - NAMED} more" if len(partners) > NAMED else ""
-    return f"{TOGETHER_WORDS}{named}{more}"
+    return Remark(f"{TOGETHER_WORDS}{named}{more}", "together")
 
 
 def visibility_warnings(step: str, names: Sequence[str], found: Visibility) -> tuple[str, ...]:
@@ -98,11 +102,11 @@ def visibility_warnings(step: str, names: Sequence[str], found: Visibility) -> t
     together = [
         f"{name} (with {words.removeprefix(TOGETHER_WORDS)})"
         for name, words in zip(names, found.words, strict=True)
-        if words.startswith(TOGETHER_WORDS)
+        if words.code == "together"
     ]
     groups: dict[str, list[str]] = {}
     for name, words in zip(names, found.words, strict=True):
-        if words not in (IDENTIFIED, WEAK) and not words.startswith((TOGETHER_WORDS, DROPPED)):
+        if words.code not in SHOWN and words.code not in ("together", "dropped"):
             groups.setdefault(words, []).append(name)
     alone = tuple(f"{step}: {', '.join(own)}: {words}" for words, own in groups.items())
     if not together:
@@ -115,10 +119,10 @@ def visibility_warnings(step: str, names: Sequence[str], found: Visibility) -> t
 
 def weak_notes(step: str, names: Sequence[str], found: Visibility) -> tuple[str, ...]:
     """Notes that name the unknowns that the data fix hardly better than to their own size."""
-    weak = [name for name, words in zip(names, found.words, strict=True) if words == WEAK]
+    weak = [name for name, words in zip(names, found.words, strict=True) if words.code == WEAK.code]
     if not weak:
         return ()
-    seen = sum(words == IDENTIFIED for words in found.words)
+    seen = sum(words.code == IDENTIFIED.code for words in found.words)
     return (
         f"{step}: {seen} of {len(names)} unknowns identified; {len(weak)} weakly visible (standard deviation above "
         f"half of the value): {', '.join(weak)}",

@@ -14,6 +14,7 @@ from psdmc.calibration.logs.log_survey import NoNumber, Survey, surveyed
 from psdmc.calibration.logs.stored_log import AnyLog, StoredLog
 from psdmc.calibration.logs.wording import first_faults, listed
 from psdmc.errors import InputError
+from psdmc.model.calibrated import Remark, code_of
 from psdmc.robot.mechanism import Mechanism
 
 UNITS = (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
@@ -175,7 +176,7 @@ def checked(log: LogKind, chain: Mechanism, cutoff: float, options: CheckOptions
                 f"{log.name}: {first_faults([fault.text for fault in faults])}", faults[0].remedy
             )
     notes = [text for check in _REMARKS for text in check(log, survey, chain, cutoff, options)]
-    return _with_notes(log, tuple(f"{log.name}: {note}" for note in notes))
+    return _with_notes(log, tuple(Remark(f"{log.name}: {note}", code_of(note)) for note in notes))
 
 
 def _with_notes(log: LogKind, notes: tuple[str, ...]) -> LogKind:
@@ -317,7 +318,7 @@ def _still(log: AnyLog, survey: Survey, chain: Mechanism, cutoff: float, options
         for name, motion in zip(log.joint_names, survey.motion, strict=True)
         if motion < options.smallest_motion
     ]
-    return [f"joint(s) {listed(still)} stand still"] if still else []
+    return [Remark(f"joint(s) {listed(still)} stand still", "standing")] if still else []
 
 
 def _dead_effort(
@@ -328,7 +329,7 @@ def _dead_effort(
 
 
 Check = Callable[[AnyLog, Survey, Mechanism, float, CheckOptions], list[Fault]]
-Remark = Callable[[AnyLog, Survey, Mechanism, float, CheckOptions], list[str]]
+Noticing = Callable[[AnyLog, Survey, Mechanism, float, CheckOptions], list[str]]
 
 
 def _times(
@@ -343,4 +344,4 @@ _FAULTS: tuple[tuple[Check, ...], ...] = (
     (_positions, _speeds, _rates, _nothing_there),
 )
 """In stages: the checks of a stage make sense only where earlier stages found no fault."""
-_REMARKS: tuple[Remark, ...] = (_jitter, _saturation, _still, _dead_effort)
+_REMARKS: tuple[Noticing, ...] = (_jitter, _saturation, _still, _dead_effort)

@@ -9,6 +9,7 @@ import numpy as np
 
 from psdmc.calibration.logs.log import LARGEST_NUMBER, Array, Log
 from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.model.grounds import at_level
 
 STRETCH_ROWS = 32_768
 """Rows that are surveyed, filtered and fitted at once."""
@@ -168,7 +169,7 @@ class Saturated:
 
     @property
     def words(self) -> str:
-        return f"{self.joint} at {f'{self.level:.4g} {self.unit}'.rstrip()} in {self.share:.0%}"
+        return at_level(self.joint, self.level, self.unit, self.share)
 
 
 def saturated(

@@ -54,9 +54,8 @@ def _torques(model: DynamicsModel, chain: Mechanism, regressor: Regressor) -> To
     largest = np.where(largest > 0, largest, np.inf)
     if model.theta_b is None or not np.isfinite(largest).any():
         return None
-    known = "calibration" in model.provenance
     try:
-        friction = linear_friction(model).by_speed if known else None
+        friction = linear_friction(model).by_speed if model.calibrated else None
     except InputError:
         friction = None  # of a campaign: it has a state
     return TorqueLimits(chain, regressor, largest, model.theta_b, friction)

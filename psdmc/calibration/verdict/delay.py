@@ -15,7 +15,7 @@ from psdmc.calibration.identify.predictor import Regressor
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import Shifted
 from psdmc.calibration.verdict.gains import FEWEST, basis, clustered
-from psdmc.calibration.verdict.verdict import Delay
+from psdmc.model.grounds import Delay
 
 ROUNDS = 3
 """Fits: the first weights joints by their torques, the others by what the fit before leaves of these."""

@@ -27,10 +27,9 @@ from psdmc.calibration.identify.linear_options import LinearOptions
 from psdmc.calibration.identify.linear_problem import friction_columns, names_of
 from psdmc.calibration.identify.motor import judge_motors
 from psdmc.calibration.identify.motor_model import Motors
-from psdmc.calibration.identify.prediction import Prediction, prediction_from_json
 from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.identify.state_friction import PARAMETERS
-from psdmc.calibration.identify.steps import StepOptions, StepQuality, judged
+from psdmc.calibration.identify.steps import StepOptions, judged, step_of
 from psdmc.calibration.logs.filter import States, held_out_of, smoothed_rows, stretches
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.logs.log_checks import CheckOptions, checked
@@ -39,6 +38,7 @@ from psdmc.calibration.sources import campaign_of, plain_sources
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
 from psdmc.model import recursive
+from psdmc.model.calibrated import Prediction, StepQuality, by_joint
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load, model_of
 from psdmc.model.store import save
@@ -51,6 +51,7 @@ class Delivered:
 
     friction         by joint and parameter name
     constants        N m/A by joint, empty where torques were logged
+    shown            those of them that a step found; given ones are not judged by it
     columns, extra   springs and further friction, and their values (m,)
     """
 
@@ -58,6 +59,7 @@ class Delivered:
     prediction: Prediction
     friction: Mapping[tuple[str, str], float]
     constants: Mapping[str, float]
+    shown: Mapping[str, float]
     columns: Columns = field(default_factory=Columns)
     extra: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -77,22 +79,24 @@ class Delivered:
 
 def delivered(model: DynamicsModel) -> Delivered:
     """The contents of a calibrated model; InputError where it was not calibrated by this psdmc or a newer one."""
-    kept = model.provenance.get("calibration")
-    if model.theta_b is None or not isinstance(kept, Mapping) or "prediction" not in kept:
+    kept = model.calibrated
+    if model.theta_b is None or kept is None or kept.prediction is None:
         raise InputError(
             f"the model of '{model.mechanism.name}' holds no calibration that torques can be predicted from",
             "run `psdmc calibrate` first",
         )
-    prediction = prediction_from_json(kept["prediction"])
+    prediction = kept.prediction
     columns = read_columns(prediction.columns, model.mechanism, model.mechanism.name, prediction.offset)
-    friction = {(row["joint"], row["name"]): float(row["value"]) for row in kept["friction"]}
-    springs = {(row["spring"], row["name"]): float(row["value"]) for row in kept.get("springs", [])}
+    friction, springs = by_joint(kept.friction), by_joint(kept.springs)
     extra = [
         (springs if sprung else friction)[unknown.owner, unknown.name]
         for unknown, sprung in zip(columns.unknowns, columns.of_springs.tolist(), strict=True)
     ]
-    constants = {row["joint"]: float(row["value"]) for row in kept["motors"]}
-    return Delivered(model, prediction, friction, constants, columns, np.array(extra, dtype=np.float64))
+    constants = {row.joint: row.value for row in kept.motors}
+    shown = {row.joint: row.value for row in kept.motors if row.seen}
+    return Delivered(
+        model, prediction, friction, constants, shown, columns, np.array(extra, dtype=np.float64)
+    )
 
 
 def sprung(found: Delivered) -> Callable[[States, NDArray[np.intp]], Array] | None:
@@ -167,13 +171,13 @@ def log_parts(
     """Of one log's independent samples, by a model that plain logs calibrated: time (N,), measured torque and the model's
     (N, n), and which are held out (N,)."""
     found = delivered(model)
-    step = found.prediction.steps["all"]
+    step = step_of(found.prediction.steps["all"])
     time, measured, predicted = _log_parts(found, log, step, check)
     return time, measured, predicted, held_out_of(log, len(time), step.split)
 
 
 def _log_quality(found: Delivered, logs: Sequence[AnyLog], check: CheckOptions) -> StepQuality:
-    chain, step = found.model.mechanism, found.prediction.steps["all"]
+    chain, step = found.model.mechanism, step_of(found.prediction.steps["all"])
     parts = [_log_parts(found, log, step, check) for log in logs]
     time, measured, predicted = (np.concatenate([part[k] for part in parts]) for k in range(3))
     out = np.concatenate(
@@ -213,24 +217,19 @@ def _torque(found: Delivered, states: States, rows: slice) -> Array:
 
 
 def _campaign_quality(found: Delivered, runs: Runs) -> tuple[StepQuality, ...]:
-    chain, motors, theta, steps = found.model.mechanism, found.motors, found.theta_b, found.prediction.steps
+    chain, motors, theta = found.model.mechanism, found.motors, found.theta_b
+    steps = {name: step_of(step) for name, step in found.prediction.steps.items()}
     regressor = ChainRegressor(found.model)
     friction = _with_state(found)
     joints = friction.joints
     alone = prepared_runs(chain, regressor, motors, theta, runs.friction, steps["friction"])
-    motor = (judge_motors(chain, runs.motor, steps["motor"], _identified(found)),) if runs.motor else ()
+    motor = (judge_motors(chain, runs.motor, steps["motor"], found.shown),) if runs.motor else ()
     return (
         *motor,
         judge_gravity(chain, regressor, motors, runs.gravity, steps["gravity"], theta),
         judge_friction(alone, joints),
         *judge_inertial(chain, regressor, motors, theta, friction, runs.inertial, steps["inertial"]),
     )
-
-
-def _identified(found: Delivered) -> dict[str, float]:
-    """Torque constants that a motor step found; given ones are not judged by it."""
-    rows = found.model.provenance["calibration"]["motors"]
-    return {row["joint"]: found.constants[row["joint"]] for row in rows if row["seen"]}
 
 
 def _with_state(found: Delivered) -> FrictionResult:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.calibration.identify.quality import Quality
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.delay import delays_of
 from psdmc.calibration.verdict.evidence import Evidence
 from psdmc.calibration.verdict.gains import friction_powers, joint_gains
 from psdmc.calibration.verdict.record import Calibration
-from psdmc.calibration.verdict.verdict import JointFigures, listed
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
+from psdmc.model.calibrated import JointFigures, Quality
 
 NOISE_FLOOR = 1e-4
 """Share of the torque's variation: less noise above the cut-off means a log that was smoothed, or that is no sensor's."""
@@ -84,17 +84,23 @@ class Findings:
     def unit(self, k: int) -> str:
         return self.evidence.model.mechanism.joints[k].type.effort_unit
 
-    def gained(self, joints: Sequence[int]) -> str:
-        words = [f"{self.gains[k].value:.3g} +- {self.gains[k].std:.1g}" for k in joints]
-        return listed([f"joint {self.names[k]} {word}" for k, word in zip(joints, words, strict=True)])
+    def gained(self, joints: Sequence[int]) -> list[dict[str, Any]]:
+        """Items of a ground: joints with their gains."""
+        return [
+            {"joint": self.names[k], "gain": self.gains[k].value, "std": self.gains[k].std} for k in joints
+        ]
 
-    def followed(self, joints: Sequence[int]) -> str:
-        return listed(
-            [
-                f"joint {self.names[k]} {self.held_out[k].r2:.3g} (RMSE {self.held_out[k].rmse:.3g} {self.unit(k)})"
-                for k in joints
-            ]
-        )
+    def followed(self, joints: Sequence[int]) -> list[dict[str, Any]]:
+        """Items of a ground: joints with R^2 and RMSE on held-out data."""
+        return [
+            {
+                "joint": self.names[k],
+                "r2": self.held_out[k].r2,
+                "rmse": self.held_out[k].rmse,
+                "unit": self.unit(k),
+            }
+            for k in joints
+        ]
 
     def figures(self, k: int) -> JointFigures:
         gain, power = self.gains[k], self.powers[k]

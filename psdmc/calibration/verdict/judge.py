@@ -8,17 +8,80 @@ limits, decision 0021 their reasons.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import Any
 
-from psdmc.calibration.verdict.doubts import doubts, fits_poorly
-from psdmc.calibration.verdict.evidence import Evidence
+import numpy as np
+
+from psdmc.calibration.identify.coupling import coupling_of
+from psdmc.calibration.identify.four_steps import Runs
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.predictor import Regressor
+from psdmc.calibration.identify.residuals import CORRELATED
+from psdmc.calibration.logs.log_survey import Saturated
+from psdmc.calibration.logs.low_pass import FilterOptions
+from psdmc.calibration.logs.stored_log import AnyLog
+from psdmc.calibration.verdict.delivered import delivered, sprung
+from psdmc.calibration.verdict.evidence import Evidence, Motion, evidence_of
 from psdmc.calibration.verdict.findings import Demand, Findings
-from psdmc.calibration.verdict.reasons import reasons
-from psdmc.calibration.verdict.record import Calibration
-from psdmc.calibration.verdict.suspects import suspect
-from psdmc.calibration.verdict.units import unit_suspect
-from psdmc.calibration.verdict.verdict import Verdict
+from psdmc.calibration.verdict.record import Calibration, with_verdict
+from psdmc.calibration.verdict.suspects import suspect, unit_suspect
 from psdmc.calibration.verdict.verdict_limits import VerdictOptions
+from psdmc.model.calibrated import Verdict
+from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.grounds import Delay, Ground
+
+NOT_PHYSICAL = "not_physical"
+"""Name of the fact that tells why a record has no physically consistent version."""
+ALONE = ("Motor", "Friction")
+"""Steps that move one joint alone, so that each of them must fit."""
+
+
+def with_verdict_on_logs(
+    record: Calibration,
+    model: DynamicsModel,
+    regressor: Regressor,
+    logs: Sequence[AnyLog],
+    motors: Motors,
+    options: FilterOptions,
+    limits: VerdictOptions,
+) -> Calibration:
+    """The record of a fit of plain logs, with its verdict.
+
+    model   as it was given, whose theta_b is the file's; record holds the calibrated one
+    """
+    matrix = () if record.prediction is None else record.prediction.coupling
+    springs = sprung(delivered(record.model))
+    motions = [Motion(log) for log in logs]
+    evidence = evidence_of(model, regressor, motions, motors, options, coupling_of(matrix), springs)
+    demand = Demand("linear fit", _fitted(record, "All"), record.facts["rank"])
+    return with_verdict(record, judge(record, evidence, [demand], limits))
+
+
+def with_verdict_on_campaign(
+    record: Calibration,
+    model: DynamicsModel,
+    regressor: Regressor,
+    runs: Runs,
+    motors: Motors,
+    options: FilterOptions,
+    limits: VerdictOptions,
+) -> Calibration:
+    """The record of a campaign with its verdict: gains and friction are judged on its exciting motions."""
+    motions = [Motion(run.log, run.tool) for run in runs.inertial]
+    evidence = evidence_of(model, regressor, motions, motors, options)
+    demands = [
+        Demand("gravity", _fitted(record, "Gravity"), record.facts["gravity_rank"]),
+        Demand("inertial", _fitted(record, "All"), record.facts["inertial_rank"]),
+    ]
+    return with_verdict(record, judge(record, evidence, demands, limits))
+
+
+def _fitted(record: Calibration, step: str) -> int:
+    """Independent samples that a step was fitted to, all joints together."""
+    samples = next(found.samples for found in record.steps if found.step == step)
+    return sum(int((~sample.held_out).sum()) for sample in samples)
 
 
 def judge(
@@ -32,20 +95,286 @@ def judge(
     against, doubted = list(reasons(found)), list(doubts(found))
     likely = _suspects(found)
     if likely and not against:
-        (against if fits_poorly(found) else doubted).append("the log contradicts the model's joints")
+        (against if fits_poorly(found) else doubted).append(Ground("contradicted"))
     return Verdict(
-        reasons=tuple(against),
-        doubts=tuple(doubted),
-        suspects=likely,
+        against=tuple(against),
+        doubted=tuple(doubted),
+        suspected=likely,
         joints=tuple(found.figures(k) for k in range(len(found.names))),
         samples_per_unknown=min((demand.per_unknown for demand in found.demands), default=float("inf")),
         delays=found.delays,
     )
 
 
-def _suspects(found: Findings) -> tuple[str, ...]:
+def _suspects(found: Findings) -> tuple[Ground, ...]:
     """Explanations of a bad fit; none for a log too short to tell."""
     if found.starved:
         return ()
     named = (suspect(found.evidence), unit_suspect(found.gains))
-    return tuple(text for text in named if text is not None)
+    return tuple(ground for ground in named if ground is not None)
+
+
+# Reasons
+
+
+def reasons(found: Findings) -> Iterator[Ground]:
+    """Why a calibration is not usable; none where it is."""
+    yield from _saturated(found)
+    yield from _late(found)
+    yield from _unphysical(found)
+    yield from _too_few(found)
+    yield from _wrong_gains(found)
+    yield from _powered(found)
+    yield from _poor(found)
+
+
+def _saturated(found: Findings) -> Iterator[Ground]:
+    piled = found.evidence.saturated
+    if any(each.certain for each in piled):
+        yield Ground("saturated", {"items": _levels(piled)})
+
+
+def _levels(piled: Sequence[Saturated]) -> list[dict[str, Any]]:
+    names = ("joint", "level", "unit", "share")
+    return [{name: getattr(each, name) for name in names} for each in piled]
+
+
+def _late(found: Findings) -> Iterator[Ground]:
+    for delay in found.delays:
+        if delay.shown and abs(delay.value) > found.limits.late:
+            yield late(delay)
+
+
+def late(delay: Delay) -> Ground:
+    """A delay, and how to take it out."""
+    return Ground("late", {"log": delay.log, "seconds": delay.value, "std": delay.std})
+
+
+def _unphysical(found: Findings) -> Iterator[Ground]:
+    failed = found.record.facts.get(NOT_PHYSICAL)
+    if failed:
+        yield Ground("not_physical", {"why": failed})
+
+
+def _too_few(found: Findings) -> Iterator[Ground]:
+    least = found.limits.fewest_samples
+    for demand in found.demands:
+        if demand.per_unknown < least:
+            yield Ground("starved", {**asdict(demand), "limit": least})
+
+
+def _wrong_gains(found: Findings) -> Iterator[Ground]:
+    low, high = found.limits.gains
+    wrong = [k for k, gain in enumerate(found.gains) if gain.visible and not low <= gain.value <= high]
+    if wrong:
+        yield Ground("wrong_gains", {"items": found.gained(wrong), "low": low, "high": high})
+
+
+def _powered(found: Findings) -> Iterator[Ground]:
+    motor = found.limits.friction_share * found.variation * found.speed
+    giving = [
+        {"joint": found.names[k], "power": power.value, "std": power.std}
+        for k, power in enumerate(found.powers)
+        if power.value < -max(found.limits.sure * power.std, motor[k])
+    ]
+    if giving:
+        yield Ground("friction_gives_power", {"items": giving})
+
+
+def _poor(found: Findings) -> Iterator[Ground]:
+    poor = [k for k in range(len(found.names)) if found.follows_badly(k)]
+    named = [k for k in poor if not found.excused(k)]
+    if named:
+        yield Ground("low_r2", {"items": found.followed(named), "limit": found.limits.poor_r2})
+    elif len(poor) == len(found.names):
+        yield Ground("nothing_followed", {"items": found.followed(poor)})
+
+
+# Doubts
+
+
+def doubts(found: Findings) -> Iterator[Ground]:
+    """All doubts."""
+    yield from _perhaps_saturated(found)
+    yield from _a_little_late(found)
+    yield from _sampled_slowly(found)
+    yield from _few(found)
+    yield from _fair(found)
+    yield from _earlier_steps(found)
+    yield from _odd_gains(found)
+    yield from _unlike_limits(found)
+    yield from _hardly_moving(found)
+    yield from _lacking(found)
+    yield from _not_carried_over(found)
+    yield from _open_parameters(found)
+    yield from _indefinite(found)
+    yield from _unchecked(found)
+
+
+def _perhaps_saturated(found: Findings) -> Iterator[Ground]:
+    """A doubt about efforts that friction of a constant size explains as well as a limit does."""
+    piled = found.evidence.saturated
+    if piled and not any(each.certain for each in piled):
+        yield Ground("perhaps_saturated", {"items": _levels(piled)})
+
+
+def _a_little_late(found: Findings) -> Iterator[Ground]:
+    for delay in found.delays:
+        if delay.shown and found.limits.hardly_late < abs(delay.value) <= found.limits.late:
+            yield late(delay)
+
+
+def fits_poorly(found: Findings) -> bool:
+    """Whether R^2 or gains raise a doubt. Only then are other readings of the log's columns considered."""
+    return any(True for _ in (*_fair(found), *_odd_gains(found)))
+
+
+def _sampled_slowly(found: Findings) -> Iterator[Ground]:
+    """Doubts about plain logs whose differences are no good accelerations up to the filter's cut-off."""
+    step = None if found.record.prediction is None else found.record.prediction.steps.get("all")
+    logs = [log for log in found.record.logs if log.use != "with_load" and log.seconds > 0]
+    rates = [(log.rows - 1) / log.seconds for log in logs]
+    if step is None or not rates:
+        return
+    rate, cutoff = min(rates), step.cutoff
+    lost = acceleration_lost(cutoff / rate)
+    sound = cutoff_for(found.limits.acceleration_lost) * rate
+    if lost > found.limits.acceleration_lost:
+        values = {"rate": rate, "cutoff": cutoff, "lost": lost, "sound": sound}
+        yield Ground("sampled_slowly", values)
+
+
+def acceleration_lost(share: float) -> float:
+    """Share by which a second difference is smaller than the second derivative of a sine, whose frequency is `share` of
+    the sampling rate: 1 - (2 - 2 cos w) / w^2, w = 2 pi share."""
+    w = 2.0 * np.pi * share
+    return float(1.0 - (2.0 - 2.0 * np.cos(w)) / w**2)
+
+
+def cutoff_for(lost: float) -> float:
+    """The largest frequency, in units of the sampling rate, whose acceleration loses no more than this share: by the
+    first terms of the series, w^2 / 12 - w^4 / 360."""
+    return float(np.sqrt(15.0 - np.sqrt(225.0 - 360.0 * lost)) / (2.0 * np.pi))
+
+
+def _few(found: Findings) -> Iterator[Ground]:
+    for demand in found.demands:
+        if found.limits.fewest_samples <= demand.per_unknown < found.limits.few_samples:
+            yield Ground("few_samples", {**asdict(demand), "limit": found.limits.few_samples})
+
+
+def _fair(found: Findings) -> Iterator[Ground]:
+    named = [
+        k
+        for k in range(len(found.names))
+        if (found.follows_badly(k) and found.excused(k))
+        or found.limits.poor_r2 <= found.held_out[k].r2 < found.limits.fair_r2
+    ]
+    if named:
+        yield Ground("low_r2", {"items": found.followed(named), "limit": found.limits.fair_r2})
+
+
+def _earlier_steps(found: Findings) -> Iterator[Ground]:
+    """Doubts about motors and friction. Gravity and inertia are left out, as they may be too small at a joint to fit."""
+    for step in found.record.steps[:-1]:
+        named = [
+            {"joint": name, "r2": both.held_out.r2}
+            for name, both in step.joints.items()
+            if step.step in ALONE and not both.held_out.r2 >= found.limits.fair_r2
+        ]
+        if named:
+            yield Ground("low_r2_of_step", {"step": step.step, "items": named})
+
+
+def _odd_gains(found: Findings) -> Iterator[Ground]:
+    (low, high), (least, most) = found.limits.sure_gains, found.limits.gains
+    odd = [
+        k
+        for k, gain in enumerate(found.gains)
+        if gain.visible and least <= gain.value <= most and not low <= gain.value <= high
+    ]
+    if odd:
+        yield Ground("odd_gains", {"items": found.gained(odd)})
+
+
+def _unlike_limits(found: Findings) -> Iterator[Ground]:
+    """Torques that are far below the file's limits for the motors, or several times as large."""
+    limits = np.array([joint.limits.effort for joint in found.evidence.model.mechanism.joints])
+    known = np.isfinite(limits) & (limits > 0)
+    if not known.any():
+        return
+    share = np.abs(found.evidence.torque).max(axis=0)[known] / limits[known]
+    low, high = found.limits.of_limit
+    if share.max() < low or share.max() > high:
+        yield Ground("unlike_limits", {"share": float(share.max())})
+
+
+def _hardly_moving(found: Findings) -> Iterator[Ground]:
+    slow = [{"joint": name} for k, name in enumerate(found.names) if found.speed[k] < found.limits.hardly]
+    if slow:
+        yield Ground("hardly_moving", {"items": slow, "limit": found.limits.hardly})
+
+
+def _lacking(found: Findings) -> Iterator[Ground]:
+    """Residuals beyond noise that are correlated, or many times the sensor's noise."""
+    correlation = found.record.facts.get("residual_correlation", {})
+    named = []
+    for k, name in enumerate(found.names):
+        ratio = found.noise_ratio(k)
+        correlated = correlation.get(name, 0.0) > CORRELATED and not ratio < found.limits.sure
+        if found.noticeable(k) and (correlated or ratio > found.limits.noise_ratio):
+            named.append({"joint": name, "ratio": ratio})
+    if named:
+        factor = found.record.facts.get("noise_factor", float("nan"))
+        yield Ground("lacking_effect", {"items": named, "factor": factor})
+
+
+def _not_carried_over(found: Findings) -> Iterator[Ground]:
+    named = [
+        {
+            "joint": name,
+            "held_out": found.held_out[k].rmse,
+            "fitted": found.fitted[k].rmse,
+            "unit": found.unit(k),
+        }
+        for k, name in enumerate(found.names)
+        if found.held_out[k].rmse
+        > max(found.limits.worse * found.fitted[k].rmse, found.limits.carried * found.variation[k])
+    ]
+    if named:
+        yield Ground("not_carried_over", {"items": named})
+
+
+def _open_parameters(found: Findings) -> Iterator[Ground]:
+    """Parameters that the data leave open, or determine so badly that it matters to the torque."""
+    rows = found.record.parameters
+    fixed = np.array([np.isfinite(row.std) for row in rows])
+    unseen = [{"name": row.name} for row, seen in zip(rows, fixed, strict=True) if not seen]
+    if unseen:
+        yield Ground("open_parameters", {"items": unseen, "count": len(rows)})
+    columns = found.evidence.columns()
+    share = np.sqrt(np.mean(columns**2, axis=0)) / np.maximum(found.variation, 1e-300)[:, None]
+    std = np.where(fixed, [row.std for row in rows], 0.0)
+    badly = np.flatnonzero(
+        np.max(share * std, axis=0, initial=0.0, where=found.moved()) > found.limits.settled
+    )
+    if len(badly):
+        names = ("name", "value", "std", "unit")
+        yield Ground(
+            "known_badly", {"items": [{name: getattr(rows[j], name) for name in names} for j in badly]}
+        )
+
+
+def _indefinite(found: Findings) -> Iterator[Ground]:
+    """A mass matrix that is not positive definite, where that was tested."""
+    mass = found.record.facts.get("mass_matrix", {})
+    if mass.get("failing"):
+        yield Ground("indefinite", {"failing": mass["failing"], "poses": mass["poses"]})
+
+
+def _unchecked(found: Findings) -> Iterator[Ground]:
+    if found.evidence.model.theta_b is None and not found.record.motors:
+        yield Ground("unchecked")
+    turned = [{"joint": row.joint} for row in found.record.motors if row.value < 0]
+    if turned:
+        yield Ground("negative_constants", {"items": turned})

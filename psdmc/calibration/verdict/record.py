@@ -1,186 +1,112 @@
-"""The result of a calibration as tables, from which the report and the model file are made."""
+"""The record of a calibration: its result with the model that carries it, made of either method's numbers."""
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from psdmc.calibration.identify.prediction import Prediction
-from psdmc.calibration.identify.steps import StepQuality
-from psdmc.calibration.identify.visibility import IDENTIFIED
+from psdmc.calibration.identify.four_steps import FourSteps, Runs
+from psdmc.calibration.identify.linear_fit import LinearResult
+from psdmc.calibration.identify.linear_options import LinearOptions
+from psdmc.calibration.identify.motor import MotorResult
+from psdmc.calibration.identify.motor_model import Motors
+from psdmc.calibration.identify.steps import CalibrationOptions, StepOptions
+from psdmc.calibration.identify.visibility import (
+    Visibility,
+    as_fitted,
+    visibility,
+    visibility_warnings,
+    weak_notes,
+)
 from psdmc.calibration.logs.log import Array
+from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.stored_log import AnyLog
-from psdmc.calibration.verdict.verdict import Verdict
-from psdmc.calibration.verdict.versions_used import versions_used
+from psdmc.calibration.verdict.delivered import delivered_quality, reread
 from psdmc.errors import InternalError
+from psdmc.friction.law import Term
+from psdmc.friction.law import unit_of as own_unit
+from psdmc.friction.state import STATE_LAW
+from psdmc.model.calibrated import (
+    IDENTIFIED,
+    LINEAR,
+    WHOLE,
+    Calibrated,
+    FrictionRunConstants,
+    LogUsed,
+    NumberRow,
+    ParameterRow,
+    Prediction,
+    Remark,
+    StepQuality,
+    Verdict,
+    code_of,
+    parameters_of,
+)
+from psdmc.model.calibrated_json import document
 from psdmc.model.dynamics_model import DynamicsModel
+from psdmc.model.mass_check import check_mass_matrix
+from psdmc.robot.mechanism import Joint
+from psdmc.robot.missing_inertia import massless_words, unknown_option
+from psdmc.version import psdmc_version
+
+LIBRARIES = ("numpy", "scipy", "cvxpy", "clarabel")
+"""Whose results enter a calibration's numbers."""
+MOVED = 1e-6
+"""Distance from the prior, in units of what is believable, from which an invisible parameter counts as moved by
+physical consistency."""
+DROPPED_LINKS = "dropped_links"
+"""Code of the warning about links that the model has no parameters for."""
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterRow:
-    """One base parameter of table 4.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Calibration(Calibrated):
+    """The whole result of a calibration, its steps with samples to plot.
 
-    std           infinite where the data do not fix it by itself; value then as near to the prior as they allow
-    identifiable  whether `visibility` is "identified": fixed by itself, to less than half of its value
-    file          value by the file that was calibrated; None where it has none
+    model  the calibrated model, whose `calibrated` has these numbers
     """
 
-    name: str
-    group: str
-    value: float
-    std: float
-    unit: str
-    equation: str
-    identifiable: bool
-    visibility: str = IDENTIFIED
-    file: float | None = None
-
-    @property
-    def relative(self) -> float:
-        return self.std / abs(self.value) if self.value else float("inf")
-
-
-@dataclass(frozen=True, slots=True)
-class NumberRow:
-    """A number of one joint with its standard deviation; `seen` says whether the data determine it."""
-
-    joint: str
-    name: str
-    value: float
-    std: float
-    unit: str
-    seen: bool = True
-    visibility: str = ""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Calibration:
-    """The whole result of a calibration.
-
-    model       the calibrated model, its provenance carrying these numbers
-    motors      torque constants
-    friction    seven per joint, or Coulomb, viscous and offset
-    steps       table 3's columns, computed from the model file's content (delivered.delivered_quality)
-    prediction  what else a prediction needs
-    notes       remarks without consequences for its use
-    facts       plain values: ranks, condition numbers, singular values, delay, options
-    verdict     whether it can be used; None before it was judged
-    springs     values of springs, whose names stand in place of a joint's
-    covariance  (l, l) of the base parameters, with the prior's in directions that the data do not show; None: not kept
-    """
-
-    robot: str
-    method: str
-    joint_names: tuple[str, ...]
     model: DynamicsModel
-    parameters: tuple[ParameterRow, ...]
-    motors: tuple[NumberRow, ...]
-    friction: tuple[NumberRow, ...]
-    steps: tuple[StepQuality, ...]
-    warnings: tuple[str, ...]
-    facts: dict[str, Any] = field(default_factory=dict)
-    prediction: Prediction | None = None
-    notes: tuple[str, ...] = ()
-    verdict: Verdict | None = None
-    springs: tuple[NumberRow, ...] = ()
-    covariance: Array | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values; numbers that are not finite become null."""
-        judged = {} if self.verdict is None else {"verdict": self.verdict.as_json()}
-        sprung = {"springs": [_spring(row) for row in self.springs]} if self.springs else {}
-        return (
-            judged
-            | sprung
-            | {
-                "robot": self.robot,
-                "method": self.method,
-                "joints": list(self.joint_names),
-                "base_parameters": [
-                    {
-                        "name": row.name,
-                        "group": row.group,
-                        "file": row.file,
-                        "value": row.value,
-                        "std": _finite(row.std),
-                        "relative": _finite(row.relative),
-                        "unit": row.unit,
-                        "equation": row.equation,
-                        "identifiable": row.identifiable,
-                        "visibility": row.visibility,
-                    }
-                    for row in self.parameters
-                ],
-                "motors": [_number(row) for row in self.motors],
-                "friction": [_number(row) for row in self.friction],
-                "quality": {step.step: _quality(step) for step in self.steps},
-                "warnings": list(self.warnings),
-                "notes": list(self.notes),
-                "prediction": None if self.prediction is None else self.prediction.as_json(),
-                "facts": self.facts,
-            }
-        )
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _number(row: NumberRow) -> dict[str, Any]:
-    return {
-        "joint": row.joint,
-        "name": row.name,
-        "value": _finite(row.value),
-        "std": _finite(row.std),
-        "unit": row.unit,
-        "seen": row.seen,
-        "visibility": row.visibility,
-    }
-
-
-def _spring(row: NumberRow) -> dict[str, Any]:
-    kept = _number(row)
-    return {"spring": kept.pop("joint"), **kept}
-
-
-def _quality(step: StepQuality) -> dict[str, Any]:
-    return {
-        name: {
-            "fit": {"rmse": _finite(both.fit.rmse), "r2": _finite(both.fit.r2)},
-            "held_out": {"rmse": _finite(both.held_out.rmse), "r2": _finite(both.held_out.r2)},
-        }
-        for name, both in step.joints.items()
-    }
+        """Plain values for a user; numbers that are not finite become null."""
+        return document(self)
 
 
 def with_model(record: Calibration, theta_b: Array | None = None) -> Calibration:
     """The record with a model that carries its present numbers, and these base parameters where given."""
-    provenance = {**record.model.provenance, "calibration": record.as_json()}
     theta = record.model.theta_b if theta_b is None else theta_b
-    return replace(record, model=replace(record.model, theta_b=theta, provenance=provenance))
+    return replace(record, model=replace(record.model, theta_b=theta, calibrated=record.kept()))
 
 
 def with_data(record: Calibration, logs: Sequence[AnyLog]) -> Calibration:
-    """The record with the names, lengths and dates of its logs."""
-    return replace(record, facts={**record.facts, "data": data_of(logs), "versions": versions_used()})
+    """The record with its logs and the versions of the programs that computed it."""
+    return replace(record, logs=logs_used(logs), versions=_versions())
 
 
-def data_of(logs: Sequence[AnyLog]) -> list[dict[str, Any]]:
-    """Names, lengths and dates of logs as plain values."""
-    return [_data(log) for log in logs]
+def logs_used(logs: Sequence[AnyLog], use: str = "") -> tuple[LogUsed, ...]:
+    """Names, lengths and dates of logs; use: instead of each log's own."""
+    return tuple(LogUsed(log.name, len(log), log.duration, log.date, use or log.use) for log in logs)
 
 
-def _data(log: AnyLog) -> dict[str, Any]:
-    """A log in plain values; `use` where it is not for fitting."""
-    found = {"log": log.name, "rows": len(log), "seconds": log.duration, "date": log.date}
-    return found if log.use == "fit" else {**found, "use": log.use}
+def _versions() -> dict[str, str]:
+    """psdmc's, Python's and the libraries' versions, by name; libraries that are not installed are left out."""
+    found = {"psdmc": psdmc_version(), "Python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
 
 
 def with_verdict(record: Calibration, verdict: Verdict) -> Calibration:
-    """The calibration with its verdict, which is also in the model's provenance."""
+    """The calibration with its verdict, which its model also has."""
     return with_model(replace(record, verdict=verdict))
 
 
@@ -189,3 +115,316 @@ def verdict_of(record: Calibration) -> Verdict:
     if record.verdict is None:
         raise InternalError(f"{record.robot}: calibrated, but not judged")
     return record.verdict
+
+
+# Of a campaign, in four steps
+
+
+def four_step_record(
+    model: DynamicsModel, found: FourSteps, theta_b: Array, options: CalibrationOptions
+) -> Calibration:
+    """The record of a campaign with these base parameters, without its quality."""
+    inertial, gravity = found.inertial, found.gravity
+    groups = ["inertial"] * model.l
+    for k in gravity.split.pivots:
+        groups[int(k)] = "gravity"
+    names = model.base_parameters.labels
+    at = _kept_at(model, theta_b, inertial.scale)
+    seen = visibility(names, theta_b, inertial.std, inertial.unseen / inertial.scale[:, None], at)
+    facts = {
+        "delay_s": found.friction.delay,
+        "gravity_rank": gravity.estimate.rank,
+        "gravity_condition": gravity.estimate.condition,
+        "gravity_singular_values": gravity.estimate.singular_values.tolist(),
+        "inertial_rank": inertial.estimate.rank,
+        "inertial_condition": inertial.estimate.condition,
+        "inertial_singular_values": inertial.estimate.singular_values.tolist(),
+        "residual_correlation": _by_joint(model, inertial.estimate.correlation),
+        "noise_factor": max(gravity.estimate.noise_factor, inertial.estimate.noise_factor),
+    }
+    steps = {
+        "motor": options.motor,
+        "gravity": options.gravity,
+        "friction": options.friction,
+        "inertial": options.inertial,
+    }
+    runs = {
+        name: FrictionRunConstants(joint.inertia, joint.offset, joint.delay)
+        for name, joint in found.friction.joints.items()
+    }
+    return with_model(
+        Calibration(
+            robot=model.mechanism.name,
+            method="four steps",
+            joint_names=model.joint_names,
+            model=model,
+            parameters=_parameter_rows(model, theta_b, inertial.std, groups, seen),
+            motors=_motor_rows(model, found.motors, found.motor),
+            friction=_friction_rows(model, found),
+            steps=(),
+            warnings=(*dropped_links(model), *found.warnings, *visibility_warnings("inertial", names, seen)),
+            facts=facts,
+            prediction=Prediction(
+                STATE_LAW.name, {name: step.used for name, step in steps.items()}, runs=runs
+            ),
+            notes=weak_notes("inertial", names, seen),
+            covariance=_covariance(inertial.covariance + inertial.prior_covariance),
+        ),
+        theta_b,
+    )
+
+
+def _friction_rows(model: DynamicsModel, found: FourSteps) -> tuple[NumberRow, ...]:
+    """The seven per joint; the uncertainty of forces includes the torque constant's."""
+    relative = dict(zip(model.joint_names, found.motors.relative_std.tolist(), strict=True))
+    rows: list[NumberRow] = []
+    joints = {joint.name: joint for joint in model.mechanism.joints}
+    units = Term(STATE_LAW).units()
+    for name, joint in found.friction.joints.items():
+        values = zip(STATE_LAW.parameters, joint.friction.tolist(), joint.std.tolist(), units, strict=True)
+        for parameter, value, std, unit in values:
+            by_constant = relative[name] * value if unit.startswith("Nm") else 0.0
+            seen = parameter not in joint.unseen
+            own = _unit_of(joints[name], unit)
+            rows.append(NumberRow(name, parameter, value, float(np.hypot(std, by_constant)), own, seen))
+    return tuple(rows)
+
+
+# Of plain logs, in one linear fit
+
+
+def linear_record(
+    model: DynamicsModel, found: LinearResult, values: Array, options: LinearOptions
+) -> Calibration:
+    """The record of a linear fit with these values of the whole vector, without its quality."""
+    problem, solved = found.problem, found.estimate
+    names = (*model.base_parameters.labels, *problem.names)
+    at = _kept_at(model, values, found.prior.scale, found.prior.values)
+    seen = visibility(names, values, solved.std, solved.unseen, at)
+    dropped = np.zeros(len(values), dtype=bool) if found.dropped is None else found.dropped
+    stated = np.arange(len(values)) < (model.l if found.stated else 0)
+    stated[list(model.unknown_base_parameters)] = False
+    seen = as_fitted(seen, at, dropped, stated)
+    facts = {
+        "rank": solved.rank,
+        "unknowns": len(values),
+        "condition": solved.condition,
+        "singular_values": solved.singular_values.tolist(),
+        "residual_correlation": _by_joint(model, solved.correlation),
+        "noise_factor": solved.noise_factor,
+    }
+    std = solved.std
+
+    def row(k: int, owner: str, name: str, unit: str) -> NumberRow:
+        word = seen.words[k]
+        is_seen = code_of(word) == IDENTIFIED.code
+        return NumberRow(
+            owner, name, float(values[k]), float(std[k]), unit, is_seen, word, parameters_of(name)
+        )
+
+    joints = {joint.name: joint for joint in model.mechanism.joints}
+    turning = {
+        name: unit for term in problem.terms for name, unit in zip(term.names, term.units(), strict=True)
+    }
+    friction = [
+        row(k, owner, name, _unit_of(joints[owner], turning[name]))
+        for k, (owner, name) in enumerate(problem.plain, start=model.l)
+    ]
+    unknowns = enumerate(problem.columns.unknowns, start=problem.first_extra)
+    extra = [row(k, unknown.owner, unknown.name, unknown.unit) for k, unknown in unknowns]
+    of_springs = problem.columns.of_springs
+    step = StepOptions(options.filter, options.split, options.fit)
+    return with_model(
+        Calibration(
+            robot=model.mechanism.name,
+            method="linear fit",
+            joint_names=model.joint_names,
+            model=model,
+            parameters=_parameter_rows(model, values, solved.std, ["all"] * model.l, seen),
+            motors=_motor_rows(model, found.motors, None),
+            friction=(*friction, *_chosen(extra, ~of_springs)),
+            springs=_chosen(extra, of_springs),
+            steps=(),
+            warnings=(
+                *dropped_links(model),
+                *found.warnings,
+                *visibility_warnings("linear fit", names, seen),
+            ),
+            facts=facts,
+            prediction=Prediction(
+                LINEAR,
+                {"all": step.used},
+                options.sign_speed,
+                options.exponents,
+                options.offset,
+                coupling=options.coupling,
+                columns=problem.columns.content,
+            ),
+            notes=(*_coupled_notes(options), *weak_notes("linear fit", names, seen)),
+            covariance=_covariance((solved.total_covariance + solved.prior_covariance)[: model.l, : model.l]),
+        ),
+        values[: model.l],
+    )
+
+
+def _coupled_notes(options: LinearOptions) -> tuple[str, ...]:
+    if not options.coupling:
+        return ()
+    return (
+        "friction is of the motors, which are called like the joints: some of them drive several together",
+    )
+
+
+def _chosen(rows: Sequence[NumberRow], wanted: NDArray[np.bool_]) -> tuple[NumberRow, ...]:
+    return tuple(row for row, is_wanted in zip(rows, wanted.tolist(), strict=True) if is_wanted)
+
+
+# Rows that both methods have
+
+
+def _kept_at(model: DynamicsModel, values: Array, scale: Array, start: Array | None = None) -> list[str]:
+    """The value that each unseen parameter is kept at, in words: theta_b at the file's, what follows it at `start`, zero
+    where that is None."""
+    prior = np.zeros(len(values)) if start is None else start.copy()
+    known, unknown = model.file_theta_b, model.unknown_base_parameters
+    prior[: model.l] = 0.0 if known is None else known
+    words = ["the known links' part" if k in unknown else "the file's value" for k in range(model.l)]
+    names = ["zero"] * model.l if known is None else words
+    names += [f"{value:g}" if value else "zero" for value in prior[model.l :]]
+    moved = np.abs(values - prior) > MOVED * scale
+    return [
+        f"the physical value nearest to {name}" if m else name for name, m in zip(names, moved, strict=True)
+    ]
+
+
+def dropped_links(model: DynamicsModel) -> tuple[str, ...]:
+    """A sentence on links without inertia in the file, which the model has no parameters for."""
+    chain = model.mechanism
+    if not chain.massless:
+        return ()
+    return (
+        Remark(
+            f"{massless_words(chain)}, so the model has no parameters to calibrate there; derive it again with "
+            f"{unknown_option(chain)}",
+            DROPPED_LINKS,
+        ),
+    )
+
+
+def _covariance(found: Array) -> Array:
+    """(l, l) without what rounding leaves of exact zeros: no variance negative, no correlation above one."""
+    std = np.sqrt(np.maximum(np.diag(found), 0.0))
+    largest = std * std[:, None]
+    return np.clip(found, -largest, largest)
+
+
+def _unit_of(joint: Joint, turning: str) -> str:
+    """The unit of a joint's number, given that of one that turns: for Nms/rad Ns/m where it slides."""
+    return own_unit(joint.type.effort_unit, turning)
+
+
+def _by_joint(model: DynamicsModel, values: Array) -> dict[str, float]:
+    """Values (n,) by their joints' names."""
+    return dict(zip(model.joint_names, values.tolist(), strict=True))
+
+
+def _parameter_rows(
+    model: DynamicsModel, theta: Array, std: Array, groups: list[str], seen: Visibility
+) -> tuple[ParameterRow, ...]:
+    """One row for each base parameter: theta and std (l,), the group of each, and what the data show of it."""
+    return tuple(
+        ParameterRow(
+            name=f"theta_b[{k}]",
+            group=groups[k],
+            value=float(theta[k]),
+            std=float(std[k]) if seen.determined[k] else float("inf"),
+            unit=parameter.unit,
+            equation=parameter.equation,
+            identifiable=code_of(seen.words[k]) == IDENTIFIED.code,
+            visibility=seen.words[k],
+            file=parameter.value,
+        )
+        for k, parameter in enumerate(model.base_parameters)
+    )
+
+
+def _motor_rows(model: DynamicsModel, motors: Motors, step: MotorResult | None) -> tuple[NumberRow, ...]:
+    """Rows of the torque constants; none where torques were logged. A given constant, which is exact, is marked as not
+    seen."""
+    constants, relative = motors.torque_constant, motors.relative_std
+    if step is None and np.all(constants == 1.0):
+        return ()
+    seen = relative > 0.0 if step is None else step.identified
+    own = zip(model.mechanism.joints, constants, relative, seen, strict=True)
+    return tuple(
+        NumberRow(
+            joint.name,
+            "torque_constant",
+            float(value),
+            float(abs(value) * share),
+            _unit_of(joint, "Nm/A"),
+            bool(known),
+        )
+        for joint, value, share, known in own
+    )
+
+
+# The figures of its model file
+
+
+def judged_record(
+    record: Calibration,
+    source: Sequence[AnyLog] | Runs,
+    plain: Calibration | None = None,
+    distance: float | None = None,
+    check: CheckOptions | None = None,
+) -> Calibration:
+    """The record with its quality on these logs or runs, read back from its model's file.
+
+    plain     the unconstrained fit's record, where this one is physically consistent; distance from it in standard
+              deviations
+    """
+    model = reread(record.model)
+    steps = delivered_quality(model, source, check)
+    mass = check_mass_matrix(model)
+    facts = {**record.facts, "physically_consistent": plain is not None}
+    notes, warnings = list(record.notes), list(record.warnings)
+    if plain is not None and distance is not None:
+        cost = _cost(plain.steps, steps)
+        facts["physical_cost_r2"] = cost
+        facts["physical_distance_std"] = distance
+        notes.append(_price(cost, distance, _cost_of_friction(plain.steps, steps)))
+    if mass is not None:
+        facts["mass_matrix"] = {"poses": mass.poses, "failing": mass.failing, "smallest": mass.smallest}
+        if not mass.passed:
+            warnings.append(Remark(f"{mass.reason}: there is no forward dynamics", "indefinite"))
+    method = f"{record.method}, physically consistent" if plain is not None else record.method
+    whole = replace(
+        record, method=method, steps=steps, facts=facts, notes=tuple(notes), warnings=tuple(warnings)
+    )
+    return with_model(whole)
+
+
+def _cost(before: Sequence[StepQuality], after: Sequence[StepQuality]) -> dict[str, float]:
+    """Held-out R^2 of the whole torque that is lost, by joint."""
+    was, now = ({step.step: step for step in steps}[WHOLE].joints for steps in (before, after))
+    return {name: was[name].held_out.r2 - now[name].held_out.r2 for name in now}
+
+
+def _cost_of_friction(before: Sequence[StepQuality], after: Sequence[StepQuality]) -> float | None:
+    """The largest loss of held-out R^2 in any joint's friction run; None where there are no such runs."""
+    was, now = ({step.step: step for step in steps}.get("Friction") for steps in (before, after))
+    if was is None or now is None:
+        return None
+    return max(
+        (was.joints[name].held_out.r2 - now.joints[name].held_out.r2 for name in now.joints), default=0.0
+    )
+
+
+def _price(cost: dict[str, float], distance: float, of_friction: float | None) -> str:
+    words = ", ".join(f"{name} {-price:+.4f}" for name, price in cost.items())
+    rubbed = "" if of_friction is None else f"; of friction runs by {-of_friction:+.4f} at worst"
+    return (
+        f"physical consistency moved the parameters by {distance:.3g} standard deviations in all and held-out R^2 by "
+        f"{words}{rubbed}"
+    )

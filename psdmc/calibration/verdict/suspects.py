@@ -1,4 +1,4 @@
-"""Explanations of a bad fit: columns of joints exchanged, signs reversed.
+"""Explanations of a bad fit: columns of joints exchanged, signs reversed, another unit.
 
 Hypotheses on positions (a sign reversed, two columns exchanged) are tried one after the other, the best kept. Under
 each, every effort column is explained by every joint with either sign (`explain`), and an assignment finds which column
@@ -7,17 +7,18 @@ is whose. A change must improve the explanation enough to be named.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+from scipy.optimize import linear_sum_assignment, nnls
 
 from psdmc.calibration.logs.log import Array
 from psdmc.calibration.verdict.evidence import Evidence
-from psdmc.calibration.verdict.explain import Explainer
-from psdmc.calibration.verdict.suspect_words import exchanges, in_words
+from psdmc.calibration.verdict.gains import RANK_TOLERANCE, Gain, basis
+from psdmc.model.grounds import SCALES, Ground, exchanges
+from psdmc.robot.mechanism import DRIVE
 
 ROWS = 500
 """Samples on which hypotheses are tried."""
@@ -68,12 +69,15 @@ class Hypothesis:
         fallen = np.log((left + max(gained, 0.0)) / left) / np.log(FACTOR) if gained > LEAST else 0.0
         return float(max(gained / PRICE, fallen)) - self.changes
 
-    def said(self, names: tuple[str, ...]) -> str:
-        return in_words(names, self.order, self.signs, self.effort_order, self.effort_signs)
+    @property
+    def reading(self) -> dict[str, tuple[int, ...]]:
+        """The hypothesis as a ground has it."""
+        names = ("order", "signs", "effort_order", "effort_signs")
+        return {name: getattr(self, name) for name in names}
 
 
-def suspect(evidence: Evidence, positions: bool = True) -> str | None:
-    """The best explanation, in words, of a log that is not what it says; None where none is much better.
+def suspect(evidence: Evidence, positions: bool = True) -> Ground | None:
+    """The best explanation of a log that is not what it says; None where none is much better.
 
     positions   whether positions are suspected, too, or efforts alone
     """
@@ -86,10 +90,11 @@ def suspect(evidence: Evidence, positions: bool = True) -> str | None:
     least = best.worth(stated) - CLOSE
     alike = [one for one in tried if one.changes == best.changes and one.worth(stated) > least]
     alike.sort(key=lambda one: -one.worth(stated))
-    words = list(dict.fromkeys(one.said(evidence.model.joint_names) for one in alike))
-    named = words if len(words) <= MOST_NAMED else words[:1]
+    readings = list({tuple(one.reading.values()): one.reading for one in alike}.values())
+    named = readings if len(readings) <= MOST_NAMED else readings[:1]
     explained, logged = (max(one.score, 0.0) / evidence.n for one in (best, stated))
-    return f"{', or '.join(named)} (that explains {explained:.0%} of the torque's variation; the log as it is {logged:.0%})"
+    values = {"joints": evidence.model.joint_names, "readings": named}
+    return Ground("columns", {**values, "explained": explained, "logged": logged})
 
 
 def _searched(evidence: Evidence, stated: Hypothesis, rounds: int) -> list[Hypothesis]:
@@ -152,3 +157,101 @@ def _chosen(shares: Array, moving: Array, turning: Array) -> tuple[tuple[int, ..
     sides = turned[joints, columns]
     score = float(shares[joints, columns, sides].sum())
     return tuple(-1 if side else 1 for side in sides), tuple(int(i) for i in columns), score
+
+
+# How well a joint explains a column of efforts, with either sign
+#
+# Where the file states parameters: by the joint's torque times a gain that is not negative. Else by the joint's
+# regressor, fitted to the first part of the data and judged on the rest. Both include friction that takes power, so that
+# signs are found where the rigid torque does not show them.
+
+TRAINING = 0.7
+"""Share of the samples that a joint's own parameters are fitted to, where the file states none."""
+
+
+class Explainer:
+    """explain(k, torque) -> share of a column's variation that joint k explains as it is, and turned: each 0 to 1."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        evidence = evidence.of_motors()
+        columns = evidence.columns()
+        theta_b = evidence.model.theta_b
+        self._joints: list[_ByFile | _ByFit] = [
+            _ByFit(evidence, columns[:, k], k)
+            if theta_b is None
+            else _ByFile(evidence, columns[:, k] @ theta_b, k)
+            for k in range(evidence.n)
+        ]
+
+    def __call__(self, k: int, torque: Array) -> tuple[float, float]:
+        if not np.ptp(torque):
+            return 0.0, 0.0
+        return self._joints[k].share(torque), self._joints[k].share(-torque)
+
+
+class _ByFile:
+    """Torque by the file with a gain, friction, drive inertia (none of them negative) and an offset."""
+
+    def __init__(self, evidence: Evidence, by_file: Array, k: int) -> None:
+        columns = [by_file, evidence.sign[:, k], evidence.qd[:, k]]
+        if not evidence.model.mechanism.parameters[k, DRIVE] > 0:
+            columns.append(evidence.qdd[:, k])
+        design = np.stack(columns, axis=1)
+        design = design - design.mean(axis=0)
+        scale = np.linalg.norm(design, axis=0)
+        self._q, self._r = np.linalg.qr(design / np.where(scale > 0, scale, 1.0))
+
+    def share(self, torque: Array) -> float:
+        y = torque - torque.mean()
+        seen = self._q.T @ y
+        _, left = nnls(self._r, seen)
+        power = float(y @ y)
+        return 1.0 - (float(left) ** 2 + max(power - float(seen @ seen), 0.0)) / power
+
+
+class _ByFit:
+    """The joint's own regressor, free, with friction that takes power: fitted to the first rows, judged on the last."""
+
+    def __init__(self, evidence: Evidence, rigid: Array, k: int) -> None:
+        self._first = round(TRAINING * len(evidence))
+        columns = np.column_stack([rigid, np.ones(len(evidence))])
+        self._rigid = columns
+        self._friction = np.stack([evidence.sign[:, k], evidence.qd[:, k]], axis=1)
+        self._basis = basis(columns[: self._first])
+        train = self._friction[: self._first]
+        self._left = train - self._basis @ (self._basis.T @ train)
+        self._fit = np.linalg.pinv(columns[: self._first], rcond=RANK_TOLERANCE)
+
+    def share(self, torque: Array) -> float:
+        first = self._first
+        y = torque[:first]
+        friction, _ = nnls(self._left, y - self._basis @ (self._basis.T @ y))
+        rigid = self._fit @ (y - self._friction[:first] @ friction)
+        error = torque[first:] - self._rigid[first:] @ rigid - self._friction[first:] @ friction
+        spread = float(np.sum((torque[first:] - torque[first:].mean()) ** 2))
+        return max(1.0 - float(error @ error) / spread, 0.0) if spread > 0 else 0.0
+
+
+# Units
+
+ABOUT = 2.5
+"""Factor within which two gains count as similar: a file's own masses may be wrong by as much."""
+ALIKE = 12.0
+"""Largest over smallest gain of a log whose joints share one fault: torque constants differ by a few times."""
+MOTOR_SIDE = (1.0 / 300.0, 1.0 / ABOUT)
+"""Gains that amperes, or torque before a gear, would give."""
+
+
+def unit_suspect(gains: Sequence[Gain]) -> Ground | None:
+    """The suspected unit; None where the visible gains are about one, or contradict each other."""
+    seen = np.array([gain.value for gain in gains if gain.visible])
+    if not len(seen) or np.any(seen <= 0) or seen.max() > ALIKE * seen.min():
+        return None
+    middle = float(np.exp(np.mean(np.log(seen))))
+    if 1.0 / ABOUT < middle < ABOUT:
+        return None
+    for unit in SCALES:
+        if unit / ABOUT < middle < unit * ABOUT:
+            return Ground("scaled", {"gain": unit})
+    is_motor_side = MOTOR_SIDE[0] < middle < MOTOR_SIDE[1]
+    return Ground("motor_side" if is_motor_side else "other_unit", {"gain": middle})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -24,8 +25,11 @@ from psdmc.cli.boundary import run
 from psdmc.errors import InputError
 from psdmc.friction.own import laws_of, read_law
 from psdmc.lower.kernels import lower
+from psdmc.model.calibrated import by_joint
+from psdmc.model.calibrated_json import as_json, from_json
 from psdmc.model.linear_friction import linear_friction
 from psdmc.model.load import load
+from psdmc.model.store import save
 from psdmc.program.interpret import interpret
 from psdmc.robot.reference import reference
 
@@ -72,22 +76,23 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_fit_finds_its_values(folder: Path) -> None:
     model = load(folder / "found.npz")
-    kept = model.provenance["calibration"]
-    rows = {(row["joint"], row["name"]): row for row in kept["friction"]}
+    kept = model.calibrated
+    assert kept is not None
+    rows = {(row.joint, row.name): row for row in kept.friction}
     truth = {"coulomb": COULOMB, "viscous": VISCOUS, "ripple_sin": SINES, "ripple_cos": COSINES}
     for k, joint in enumerate(model.joint_names):
         for name, value in truth.items():
             row = rows[joint, name]
-            assert abs(row["value"] - value[k]) < 3.0 * row["std"], (joint, name)
-            assert row["std"] < 0.05
-            assert row["seen"]
-        assert rows[joint, "ripple_sin"]["unit"] == "Nm"
+            assert abs(row.value - value[k]) < 3.0 * row.std, (joint, name)
+            assert row.std < 0.05
+            assert row.seen
+        assert rows[joint, "ripple_sin"].unit == "Nm"
     (quality,) = delivered_quality(model, folder / "arm.csv")
-    told = kept["quality"]["All"]
+    (told,) = kept.steps
     for joint in model.joint_names:
         r2 = quality.joints[joint].held_out.r2
         assert r2 > 0.999
-        assert r2 == pytest.approx(told[joint]["held_out"]["r2"], abs=1e-9)
+        assert r2 == pytest.approx(told.joints[joint].held_out.r2, abs=1e-9)
 
 
 def test_report_show_and_export_name_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -112,7 +117,8 @@ def test_c_is_its_program_and_its_formula(folder: Path, tmp_path: Path, real: st
     )
     library = Direct(view, shared_library(view, tmp_path, ["-O0"]))
     found = linear_friction(model)
-    rows = {(row["joint"], row["name"]): row["value"] for row in model.provenance["calibration"]["friction"]}
+    assert model.calibrated is not None
+    rows = by_joint(model.calibrated.friction)
 
     def of(name: str) -> np.ndarray:
         return np.array([rows[joint, name] for joint in model.joint_names])
@@ -139,6 +145,34 @@ def test_the_package_builds_and_tests_itself(folder: Path, tmp_path: Path) -> No
     header = next((tmp_path / "c" / "include").rglob("two_link_full.h")).read_text(encoding="utf-8")
     assert "_friction(const double *q, const double *qd, double *tau_f);" in header
     assert "ripple_sin sin(5 q) + ripple_cos cos(5 q)" in header
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"program": "import os"}, "cannot read"),
+        ({"program": "t0 = load tau[0]\nout torque[0] = t0"}, "reads or gives something else"),
+        ({"name": "*/ x"}, "expected a word of small letters"),
+        ({"values": []}, "values: expected"),
+    ],
+)
+def test_a_forged_law_in_a_calibration_is_refused(folder: Path, change: dict[str, Any], said: str) -> None:
+    found = load(folder / "found.npz").calibrated
+    assert found is not None
+    kept = json.loads(json.dumps(as_json(found)))
+    assert as_json(from_json(kept)) == kept
+    kept["prediction"]["columns"]["friction"]["laws"][0] |= change
+    with pytest.raises(ValueError, match=re.escape(said)):
+        from_json(kept)
+
+
+def test_values_of_a_law_that_the_calibration_lacks_are_refused(folder: Path) -> None:
+    found = load(folder / "found.npz").calibrated
+    assert found is not None
+    kept = as_json(found)
+    kept["prediction"]["columns"]["friction"] = {}
+    with pytest.raises(ValueError, match="'ripple_cos' is a value of no friction law"):
+        from_json(kept)
 
 
 START = "from psdmc.friction import *\n"
@@ -208,8 +242,11 @@ def test_a_model_file_runs_no_code(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         "friction": [],
         "prediction": {"law": "linear", "exponents": [], "sign_speed": 1.0, "columns": tables},
     }
-    with pytest.raises(InputError, match="damaged"):
-        linear_friction(replace(model, provenance={**model.provenance, "calibration": kept}))
+    with pytest.raises(ValueError, match="a friction law is no table"):
+        from_json(kept)
+    save(replace(model, provenance={**model.provenance, "calibration": kept}), tmp_path / "forged.npz")
+    with pytest.raises(InputError, match="damaged model file"):
+        load(tmp_path / "forged.npz")
     assert not (tmp_path / "ran").exists()
 
 

@@ -46,7 +46,7 @@ def test_a_log_for_validation_is_held_out_whole_and_the_other_fitted_whole(folde
     alone = psdmc.calibrate(model, folder / "one.csv", psdmc_options(5.0))
 
     assert fitted == held == sum(counts(alone))
-    assert [log.get("use", "fit") for log in described.facts["data"]] == ["fit", "validate"]
+    assert [log.use for log in described.logs] == ["fit", "validate"]
     listed = psdmc.calibrate(model, folder / "one.csv", psdmc_options(5.0), validation=folder / "two.csv")
     assert np.array_equal(listed.model.theta_b, described.model.theta_b)
 

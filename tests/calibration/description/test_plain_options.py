@@ -14,7 +14,7 @@ from psdmc.calibration.description.description import read_description
 from psdmc.calibration.description.read_described import described_logs
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log, write_columns
-from psdmc.calibration.verdict.doubts import acceleration_lost, cutoff_for
+from psdmc.calibration.verdict.judge import acceleration_lost, cutoff_for
 from psdmc.cli.boundary import run
 
 

@@ -130,7 +130,7 @@ def test_bounds_of_masses_and_centres_hold_in_the_links_that_are_written(
 ) -> None:
     """The elbow's link is bounded away from what the log says: theta_b then is that of a body within, and it is said."""
     pytest.importorskip("cvxpy")
-    from psdmc.calibration.identify.physical_links import physical_links
+    from psdmc.links.physical_links import physical_links
 
     link = arm.model.mechanism.joints[1].link_name
     body = {"link": link, "mass": [0.5, 1.2], "com": {"x": [-0.3, -0.12]}}

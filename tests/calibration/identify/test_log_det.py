@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from psdmc.calibration.identify.log_det import Block, feasible_point, nearest_definite
+from psdmc.links.log_det import Block, feasible_point, nearest_definite
 
 
 def block(

@@ -15,6 +15,7 @@ from psdmc.calibration.actuators import ActuatorView, actuator_files, calibrated
 from psdmc.calibration.identify import state_friction
 from psdmc.errors import InputError
 from psdmc.friction.state import STATE_LAW
+from psdmc.model.calibrated_json import from_json
 from psdmc.toolchain.compiler_command import find_compiler
 
 
@@ -161,4 +162,4 @@ def test_a_calibration_without_lugre_has_no_friction_function():
     plain = {"friction": [{"joint": "a", "name": "coulomb", "value": 1.0}], "motors": []}
 
     with pytest.raises(InputError, match=r"no friction with a state was identified for joint\(s\) a"):
-        calibrated_actuators("arm", ("a",), plain)
+        calibrated_actuators("arm", ("a",), from_json(plain))

@@ -16,6 +16,7 @@ from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.verdict.record import Calibration
 from psdmc.derivation.derive import derive_model
+from psdmc.model.calibrated import by_joint
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.model.mass_check import check_mass_matrix
@@ -45,12 +46,14 @@ def predicted(record: Calibration, log: Log, folder: Path) -> np.ndarray:
     """(N, n) torque by the written file: rigid bodies, and friction as the file's rows and its law say."""
     save(record.model, folder / "calibrated.npz")
     file = load(folder / "calibrated.npz")
-    kept = file.provenance["calibration"]
-    value = {(row["joint"], row["name"]): row["value"] for row in kept["friction"]}
+    kept = file.calibrated
+    assert kept is not None
+    assert kept.prediction is not None
+    value = by_joint(kept.friction)
     qd = np.gradient(log.position, 1.0 / RATE, axis=0)
     tau = file.inverse_dynamics(log.position, qd, np.gradient(qd, 1.0 / RATE, axis=0))
     for k, joint in enumerate(log.joint_names):
-        sign = np.tanh(qd[:, k] / kept["prediction"]["sign_speed"])
+        sign = np.tanh(qd[:, k] / kept.prediction.sign_speed)
         tau[:, k] += (
             sign * value[joint, "coulomb"] + qd[:, k] * value[joint, "viscous"] + value[joint, "offset"]
         )

@@ -31,6 +31,7 @@ from psdmc.cli import main
 from psdmc.cli.show_checks import print_accuracy
 from psdmc.compiler import emit_c
 from psdmc.errors import InputError
+from psdmc.model.calibrated_json import document
 from psdmc.model.load import load
 from psdmc.model.mass_check import check_mass_matrix
 from psdmc.model.store import save
@@ -71,7 +72,8 @@ def require_delivered(record: Calibration, source, folder: Path, capsys: pytest.
                 assert found.r2 == pytest.approx(told["r2"], abs=1e-9, nan_ok=True)
                 assert found.rmse == pytest.approx(told["rmse"], rel=1e-9)
             assert f"{both.held_out.r2:.4f}" in console
-    assert file.provenance["calibration"]["quality"] == said
+    assert file.calibrated is not None
+    assert document(file.calibrated)["quality"] == said
     mass = check_mass_matrix(file)
     assert mass is not None
     assert mass.passed
@@ -143,7 +145,7 @@ def test_blocks_give_what_the_whole_log_gives(arm, log: Log, monkeypatch: pytest
 def test_without_a_solver_the_remedy_is_said(arm, log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     found = importlib.util.find_spec
     monkeypatch.setattr(
-        sys.modules["psdmc.calibration.identify.physical"],
+        sys.modules["psdmc.links.link_terms"],
         "find_spec",
         lambda name: None if name == "clarabel" else found(name),
     )
@@ -177,8 +179,9 @@ def test_physical_is_the_default_of_the_command(
                 ]
             )
         assert left.value.code in (0, None)
-        rows = load(tmp_path / "out.npz").provenance["calibration"]["friction"]
-        return [row["value"] for row in rows if row["name"] == "coulomb"]
+        found = load(tmp_path / "out.npz").calibrated
+        assert found is not None
+        return [row.value for row in found.friction if row.name == "coulomb"]
 
     assert min(coulomb("--no-physical")) < 0
     capsys.readouterr()

@@ -20,9 +20,9 @@ from psdmc.calibration.logs.log_checks import CheckOptions
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.logs.log_survey import Saturated, surveyed
 from psdmc.calibration.plant.spoiled import clipped, late
-from psdmc.calibration.verdict.doubts import doubts
 from psdmc.calibration.verdict.findings import Findings
-from psdmc.calibration.verdict.verdict import Delay
+from psdmc.calibration.verdict.judge import doubts
+from psdmc.model.grounds import Delay
 from psdmc.model.store import save
 
 
@@ -64,7 +64,8 @@ def test_torque_that_comes_25_rows_late_is_refused_with_the_delay(arm, plant_log
     )
     assert delay.value - own.value == pytest.approx(0.25, abs=3 * np.hypot(delay.std, own.std))
     assert delay.std < 0.01
-    assert found.as_json()["delays"] == [{"log": "plant", "seconds": delay.value, "std": delay.std}]
+    assert [delay.log for delay in found.delays] == ["plant"]
+    assert found.against[0].code == "late"
 
 
 def test_the_delay_it_names_written_into_a_description_makes_the_log_usable(arm, tmp_path: Path):
@@ -183,7 +184,7 @@ def test_what_friction_alone_explains_is_a_doubt_that_says_what_to_check():
     """A level whose unit is not known has none."""
     piled = Saturated("J2", 12.1, 0.08, False), Saturated("J3", 3.0, 0.05, False, "N")
     found = SimpleNamespace(evidence=SimpleNamespace(saturated=piled))
-    assert next(doubts(cast("Findings", found))) == (
+    assert next(doubts(cast("Findings", found))).words == (
         "the effort may be cut off at a limit, or this may be friction alone: joint J2 at 12.1 in 8%, J3 at 3 N in 5% of "
         "its moving rows: if the drive or sensor has that limit, record again with slower motions"
     )

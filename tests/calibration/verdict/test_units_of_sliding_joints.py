@@ -61,7 +61,7 @@ def test_tables_say_both_units_and_each_number_once(
     page = report_html(record)
     assert "coulomb [Nm, N]" in page
     assert "torque constant [Nm/A, N/A]" in page
-    print_calibration(record.as_json())
+    print_calibration(record)
     heads = " ".join(re.findall(r"^joint .*$", capsys.readouterr().out, flags=re.MULTILINE))
     assert heads.count("coulomb") == 1
     assert "coulomb [Nm, N]" in heads

@@ -14,7 +14,8 @@ from psdmc.calibration.identify.physical import NotPhysical
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import write_log
 from psdmc.calibration.plant.spoiled import ALL, MOVED, decimated, noise_only, scaled, swapped, turned
-from psdmc.calibration.verdict.verdict import NOT_USABLE_STATUS, Verdict, listed
+from psdmc.model.calibrated import NOT_USABLE_STATUS, Verdict
+from psdmc.model.grounds import listed
 
 CONSTANTS = (12.0, 5.0)
 
@@ -157,7 +158,8 @@ def test_the_model_file_and_the_numbers_carry_the_verdict_first(arm, plant_log):
 
     assert next(iter(record.as_json())) == "verdict"
     assert record.as_json()["verdict"]["verdict"] == record.verdict.word
-    assert record.model.provenance["calibration"]["verdict"] == record.verdict.as_json()
+    assert record.model.calibrated is not None
+    assert record.model.calibrated.verdict == record.verdict
 
 
 def test_python_says_the_same(arm, plant_log, tmp_path):

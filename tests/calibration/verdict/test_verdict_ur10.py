@@ -14,8 +14,8 @@ from psdmc.calibration.identify.predictor import ChainRegressor
 from psdmc.calibration.logs.log import Log
 from psdmc.calibration.logs.log_files import read_log
 from psdmc.calibration.plant.spoiled import ALL, MOVED, noise_only, scaled, swapped, turned
-from psdmc.calibration.verdict.verdict import Verdict
 from psdmc.derivation.derive import derive_model
+from psdmc.model.calibrated import Verdict
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.robot.load import load_robot
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psdmc.calibration.logs.log import Array
+from psdmc.robot.mechanism import Array
 
 MOST_STEPS = 200
 """Newton steps of one minimisation; tens are usual."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.logs.log import Array
+from psdmc.robot.mechanism import Array
 
 ORDINARY_BODY = (1.0, 1.0, 1.0, 5.0)
 """Diagonal of a pseudo-inertia: 5 kg spread over 0.1 m."""

@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from psdmc.calibration.identify.link_bodies import flat_equations, held_rows, pseudo_inertia, reference_body
-from psdmc.calibration.identify.log_det import Block, nearest_definite
-from psdmc.calibration.identify.physical import PhysicalOptions, known_inner, link_terms, require_cvxpy
-from psdmc.calibration.logs.log import Array
 from psdmc.dynamics.parameters import inertia_matrix, second_moments
 from psdmc.errors import InputError
+from psdmc.links.link_bodies import flat_equations, held_rows, pseudo_inertia, reference_body
+from psdmc.links.link_terms import PhysicalOptions, known_inner, link_terms, require_cvxpy
+from psdmc.links.log_det import Block, nearest_definite
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
-from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK
+from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, PARAMETERS_PER_LINK, Array
 
 OPEN = PhysicalOptions(smallest=0.0, smallest_drive=0.0)
 """Links may be as small as they like: the divergence keeps them off the boundary."""
