@@ -233,10 +233,10 @@ class DynamicsModel(Answers):
         return np.asarray(times(self.B, known.reshape(-1)))
 
     def equivalent_parameters(self) -> Array:
-        """Return standard parameters, (11n,), that give the same torques as the model: `representative @ theta_b`.
+        """Return a vector of standard parameters, (11n,), whose torques are those of the model.
 
-        Many vectors of standard parameters give the same torques. The returned vector is not the one of the real links,
-        and can contain negative masses. Raises InputError if theta_b is unknown.
+        The vector is `representative @ theta_b`. Many vectors of standard parameters give the same torques. This one
+        does not describe the real links, and can contain negative masses. Raises InputError if theta_b is unknown.
         """
         found: Array = times(self.representative, self.known_theta_b())
         return found
@@ -260,10 +260,10 @@ class DynamicsModel(Answers):
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the axes of the link frames
             drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the drive inertias of the model
 
-        Pass the result to a function's argument `theta_b`. Raises InputError if a number is not finite or too large for a
-        robot file, or if a mass is negative. Raises InputError also if an inertia is not symmetric or belongs to a link
-        without mass, or if a link contradicts an assumption of the model, such as `assume_zero`. Warns if no rigid body can
-        have one of the inertias.
+        Pass the result to a function's argument `theta_b`. Raises InputError if a number is not finite, or
+        exceeds the limit for numbers in robot files, or if a mass is negative. Raises InputError also if an inertia is not
+        symmetric or belongs to a link without mass, or if a link contradicts an assumption of the model, such as
+        `assume_zero`. Warns if an inertia is physically impossible for a rigid body.
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
