@@ -272,8 +272,8 @@ def compile(
     functions  names of functions, or one name, to compile only these functions. None: psdmc compiles the default functions
                at once, and each other function at its first call
 
-    `emit_c` explains the other options. Raises InputError if the target is a microcontroller, because Python needs the
-    functions for many states. Raises ToolchainError if the compiler or the CPU does not support the target.
+    `emit_c` explains the other options. Raises InputError if the target is a microcontroller, because its code lacks the
+    batch functions that Python calls. Raises ToolchainError if the compiler or the CPU does not support the target.
 
     >>> robot = compile("scara.npz", real="float32")  # doctest: +SKIP
     >>> robot.gravity([0.0, 0.0, 0.0, 0.0]).dtype  # doctest: +SKIP
