@@ -34,7 +34,7 @@ def table(text: str, robot: str) -> list[Bars]:
         for line in text.splitlines()
         if line.startswith("|")
     ]
-    head = next(row for row in rows if row[:2] == ["robot", "inverse dynamics"])
+    head = next(row for row in rows if row[1:2] == ["inverse dynamics"])
     cells = dict(
         zip(head, next(row for row in rows if row[0] == robot and len(row) == len(head)), strict=True)
     )

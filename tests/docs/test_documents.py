@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
 from blocks import ROOT, blocks, documents, run
+from installed import is_installed
 from slow_cases import slow_but_for
 from unoptimised import wrapper
 
@@ -37,7 +37,7 @@ LONG = [
 )
 def test_blocks_run(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """What they build is not optimised: what they show does not depend on it."""
-    if "\n$ cargo " in document.read_text(encoding="utf-8") and shutil.which("cargo") is None:
+    if "\n$ cargo " in document.read_text(encoding="utf-8") and not is_installed("cargo"):
         pytest.skip("cargo is not installed")
     (tmp_path / "document").mkdir()
     monkeypatch.chdir(tmp_path / "document")

@@ -288,7 +288,7 @@ BESIDE = ("matplotlib", "psdmc.calibration.calibrate", "psdmc.bench.run", "psdmc
 
 DEFAULTS = {
     *("psdmc.bench", "psdmc.bench.defaults"),
-    *("psdmc.calibration", "psdmc.calibration.motions", "psdmc.calibration.motions.excite"),
+    *("psdmc.calibration", "psdmc.calibration.motions", "psdmc.calibration.motions.excite_options"),
 }
 """Of which the command line loads what its help says."""
 

@@ -27,7 +27,7 @@ def package(
     quantities = [
         tuple(Quantity(name, (str(size),)) for name, size in each.items()) for each in (inputs, outputs)
     ]
-    positive = Positive(Quantity("pivot", (str(pivots),)), "which", "why", "c") if pivots else None
+    positive = Positive(Quantity("pivot", (str(pivots),)), "which", "c") if pivots else None
     function = Signature("trial", 1000, "regions", *quantities, theta=False, positive=positive)
     kernels = {
         "forward_dynamics": kernel("forward_dynamics", CALLED),
