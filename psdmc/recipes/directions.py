@@ -32,7 +32,9 @@ DQ, DQD, DQDD, DTAU = (
 """Directions of inputs, and derivatives of outputs along them."""
 
 GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
-    Quantity(f"grad_{name}", ("nv",), means=f"gradient of the weighted sum by {name}, one entry per joint rate")
+    Quantity(
+        f"grad_{name}", ("nv",), means=f"gradient of the weighted sum by {name}, one entry per joint rate"
+    )
     for name in ("q", "qd", "qdd", "tau")
 )
 GRADIENT_THETA = Quantity("grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b")
