@@ -66,8 +66,8 @@ def derive(
 ) -> DynamicsModel:
     """Derive the dynamics model of a robot from a file (URDF, xacro, MJCF or DH table).
 
-    The result is a DynamicsModel, which contains the matrices E and P and the base parameters theta_b. psdmc compares the
-    torques of the model with those of the Newton-Euler algorithm before it returns the model.
+    The result is a DynamicsModel, with the matrices E and P and the base parameters theta_b. Before `derive` returns the
+    model, it compares the model's torques with those of the Newton-Euler algorithm.
 
     robot          path of the robot file
     base, tip      names of the first and last link, to model only the chain between them; None: the whole robot
@@ -79,9 +79,9 @@ def derive(
                    most `snap`, psdmc uses the exact angle; 0: never
     expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
     progress       function that psdmc calls with the name of each stage, such as print
-    frames         names of links. The frames of these links become named frames, which have poses and Jacobians, and to which
-                   wrenches and loads apply; if empty: the tip, or the end of each branch
-    tool           x, y, z (m) and roll, pitch, yaw (rad) of a tool frame, relative to the tip; psdmc adds the frame as 'tool'
+    frames         names of links. Their frames become the named frames, for poses, Jacobians, wrenches and loads; if empty:
+                   the tip, or the end of each branch
+    tool           x, y, z (m) and roll, pitch, yaw (rad) of a frame, relative to the tip; psdmc adds this frame as 'tool'
     lock           joints that stay at a fixed position: a dictionary of positions (rad or m) by joint name
     floating       True: the root link moves freely. The first entries of q are the link's position (m) and quaternion
                    (x, y, z, w). The first entries of qd are the link's linear and angular velocity along the link's axes

@@ -36,9 +36,9 @@ def calibrate(
                        psdmc finds the constants of all joints that feel the load; give only those of the other joints
     validation         logs that psdmc uses only to test the fit. psdmc then fits the model to all of `logs`. Without
                        validation logs, psdmc tests the fit with the last part of each log
-    loaded             logs of motor currents that were recorded with a known load. From `logs` and `loaded`, psdmc finds torque
-                       constants
-    load               the known load of `loaded`: mass (kg) and centre of mass (m, in the tip frame), four numbers; or a load file
+    loaded             logs of motor currents that were recorded with a known load. From `logs` and `loaded`, psdmc finds
+                       torque constants
+    load               the load of `loaded`: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load file
 
     Raises InputError if a file is missing or if psdmc cannot use a log.
     """

@@ -238,7 +238,9 @@ class DynamicsModel(Answers):
         """Return a vector of standard parameters, (11n,), whose torques are those of the model.
 
         The vector is `representative @ theta_b`. Many vectors of standard parameters give the same torques. The
-        returned vector does not describe the real links, and can contain negative masses. Raises InputError if theta_b is unknown.
+        returned vector does not describe the real links, and can contain negative masses.
+
+        Raises InputError if theta_b is unknown.
         """
         found: Array = times(self.representative, self.known_theta_b())
         return found
