@@ -64,33 +64,34 @@ def derive(
     packages: Mapping[str, str | Path] | None = None,
     unknown: Sequence[str] | str = (),
 ) -> DynamicsModel:
-    """Derive the model (E, P, theta_b) of a robot file (URDF, xacro, MJCF or DH table), and return it.
+    """Derive the dynamics model of a robot from a file (URDF, xacro, MJCF or DH table).
 
-    The result is a DynamicsModel. psdmc has checked the torques of the model against the Newton-Euler algorithm.
+    The result is a DynamicsModel, with the matrices E and P and the base parameters theta_b. Before `derive` returns the
+    model, it compares the model's torques with those of the Newton-Euler algorithm.
 
     robot          path of the robot file
     base, tip      names of the first and last link, to model only the chain between them; None: the whole robot
     gravity        (3,) m/s^2 along the axes of the file's root frame; None: the gravity in the file, or (0, 0, -9.81)
-    drive_inertia  True: the drive inertias of the joints are parameters of the model; or the values of these
-                   parameters, one per joint, kg m^2 (kg for a sliding joint)
-    assume_zero    parameters that psdmc assumes to be zero, such as "link5:mx" or "link5:Ixz@com": a list or one name
-    snap           rad. If a rounded angle of the file, such as 1.5708, differs from the exact right angle by at most this
-                   number, psdmc replaces the rounded angle; 0: never
+    drive_inertia  True: the drive inertias of the joints are parameters of the model. Instead of True, you can give the
+                   values of the drive inertias, one per joint, kg m^2 (kg for a sliding joint)
+    assume_zero    link parameters that psdmc assumes to be zero, such as "link5:mx" or "link5:Ixz@com": a list or one name
+    snap           largest difference, rad. If an angle of the file, such as 1.5708, differs from an exact right angle by at
+                   most `snap`, psdmc uses the exact angle; 0: never
     expand         False: leave out E and P, for robots with many joints; None: leave them out for branched robots
     progress       function that psdmc calls with the name of each stage, such as print
-    frames         links for whose frames psdmc computes poses, Jacobians, wrenches and loads; if empty: the tip, or the
-                   end of each branch
-    tool           x, y, z (m) and roll, pitch, yaw (rad), relative to the tip, of a frame that psdmc adds as 'tool'
+    frames         names of links. Their frames become the named frames, for poses, Jacobians, wrenches and loads; if empty:
+                   the tip, or the end of each branch
+    tool           x, y, z (m) and roll, pitch, yaw (rad) of a frame, relative to the tip; psdmc adds this frame as 'tool'
     lock           joints that stay at a fixed position: a dictionary of positions (rad or m) by joint name
     floating       True: the root link moves freely. The first entries of q are the link's position (m) and quaternion
                    (x, y, z, w). The first entries of qd are the link's linear and angular velocity along the link's axes
-    root           name of the robot's first body, if several bodies move in the world of an MJCF; psdmc leaves out the
-                   other bodies
+    root           name of the robot's first body, for an MJCF in which several separate bodies move; psdmc leaves out the
+                   bodies that do not belong to the robot
     xacro_args     values of the arguments of a xacro file, by name
     packages       folders of ROS packages that a xacro file uses, by package name; psdmc also looks for packages in
                    ROS_PACKAGE_PATH and AMENT_PREFIX_PATH
-    unknown        links whose masses and inertias are unknown: a list, one name, or "all". "missing" means all
-                   links without an inertia in the file. Without this option, such links are massless
+    unknown        links whose masses and inertias are unknown: a list, one name, "all", or "missing", which means all links
+                   without an inertia in the file. Without this option, links without an inertia are massless
 
     Raises InputError if the file or an option is wrong. Raises DerivationError if the file has no mistake but the model
     needs other options, for example `expand=False` because E and P need too much memory.
@@ -151,11 +152,11 @@ def emit_c(
 
     model      a model, or the path of a model file
     directory  folder for the package; it must be missing, empty, or already hold a package that psdmc wrote
-    lowering   method that generates the arithmetic: "expanded" from E and P, "factored" from a recursion over the links;
-               "auto": the method that needs fewer operations
-    functions  names of functions, or one name; None: the default functions
+    lowering   how psdmc generates the arithmetic: "expanded" from E and P, "factored" from a recursion over the links, or
+               "auto", which is the one of these two that needs fewer operations
+    functions  names of the functions to generate, or one name; None: the default functions
     real       precision, "float64" or "float32"; None: the precision of the target
-    trig       how the code computes sines: "inline", "freestanding" (without libm) or "libm"; None: as the target does
+    trig       how the code computes sines: "inline", "freestanding" (without libm) or "libm"; None: the method of the target
     name       name of the robot in C, with which all symbols begin; None: the name of the model
     force      True: also write into a folder with files that psdmc did not write, and over edited package files. psdmc
                deletes no file that it did not write. A file with the same name as a package file becomes NAME.orig
@@ -166,9 +167,11 @@ def emit_c(
     friction   True: add the function that computes friction torques, for a model that was calibrated from logs
     bodies     True: add the function that computes theta_b from the masses and inertias of all links
 
-    Raises InputError if an option is wrong, or if `friction` is true and the model has no friction. Raises it also if the
-    assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`, or if the mass matrix is not positive
-    definite within the joint limits. In this last case, generate only functions that do not solve for accelerations.
+    Raises InputError if an option is wrong, or if `friction` is true and the model has no friction. Raises
+    InputError also if the assumptions of the model, such as `assume_zero`, rule out `payload` or `bodies`.
+
+    Raises InputError also if the mass matrix is not positive definite at some pose within the joint limits. If so,
+    generate only functions that do not solve for accelerations.
     """
     own = {"payload": payload, "with": adapters, "friction": friction, "bodies": bodies}
     return emit(model, directory, "c", lowering, functions, real, name, force, progress, trig, target, **own)

@@ -46,7 +46,8 @@ class InputError(PsdmcError):
 class DerivationError(PsdmcError):
     """psdmc raises this error if a robot file has no mistake, but psdmc cannot derive a model with the given options.
 
-    For example, E and P of a robot with many joints can need too much memory; the option `expand=False` leaves them out.
+    For example, the matrices E and P of a robot with many joints can need too much memory. The option `expand=False`
+    leaves out E and P.
     A psdmc command then ends with exit status 3.
     """
 

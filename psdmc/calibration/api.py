@@ -23,7 +23,7 @@ def calibrate(
     loaded: str | Path | Sequence[str | Path] = (),
     load: str | Path | Sequence[float] | None = None,
 ) -> Calibration:
-    """Fit a model to logs of the robot. Returns the calibrated model, the identified values and the verdict.
+    """Fit a model to logs of the robot. Returns an object with the calibrated model, the identified values and the verdict.
 
     The attribute `verdict.word` of the result is "usable", "usable, with doubts" or "not usable". The lists
     `verdict.reasons`, `verdict.suspects` and `verdict.doubts` explain the verdict. The attribute `model` is the calibrated
@@ -32,14 +32,15 @@ def calibrate(
     model              a model, or the path of a model file
     logs               paths of the logs, or the path of a log description (TOML)
     options            filter and friction law of the fit; None: those of the log description, or the defaults
-    torque_constants   N m/A at the joint (after the gear) by joint name, for logs of motor currents. With `loaded`, give
-                       only the joints whose current does not depend on the load
+    torque_constants   N m/A at the joint (after the gear) by joint name, for logs of motor currents. With `loaded`,
+                       psdmc finds the constants of all joints that feel the load; give only those of the other joints
     validation         logs that psdmc uses only to test the fit. psdmc then fits the model to all of `logs`. Without
                        validation logs, psdmc tests the fit with the last part of each log
-    loaded             more logs of motor currents, recorded with a known load, from which psdmc finds torque constants
-    load               the known load: mass (kg) and centre of mass (m, in the tip frame) as four numbers, or a load file
+    loaded             logs of motor currents that were recorded with a known load. From `logs` and `loaded`, psdmc finds
+                       torque constants
+    load               the load of `loaded`: mass (kg) and centre of mass (m, tip frame) as four numbers, or a load file
 
-    Raises InputError if a file is missing or a log cannot be used.
+    Raises InputError if a file is missing or if psdmc cannot use a log.
     """
     from psdmc.calibration.calibrate import calibrate as run
     from psdmc.calibration.given_load import given_load

@@ -56,16 +56,18 @@ def export_urdf(
     """Write a model as a URDF, with masses and inertias that are physically possible and give the model's theta_b.
 
     Many masses and inertias give the same theta_b. psdmc chooses those that are nearest to the ones in the robot file. If
-    the model comes from a URDF, psdmc copies names, limits and shapes from that file. The element <dynamics> has the
-    friction of a calibrated model. psdmc then reads the written files with Pinocchio (MJCF: MuJoCo), and compares the
-    torques with the model. Returns the paths, the parameters of the links and the largest torque differences.
+    the model comes from a URDF, psdmc copies names, limits and shapes from that file. If the model is
+    calibrated, its friction becomes the elements <dynamics>. After writing, psdmc reads the URDF with Pinocchio and the
+    MJCF with MuJoCo, and compares their torques with those of the model.
+
+    Returns an object with the paths, the parameters of the links and the largest torque differences.
 
     path      URDF file to write
     mjcf      True: also write an MJCF with the suffix .xml; None: do so only if the model has drive inertias. psdmc
               replaces an existing .xml file only if psdmc wrote it
     progress  function that psdmc calls with the name of each stage, such as print
 
-    Raises InputError if theta_b is unknown, or if a file cannot be written. Raises NoSuchLinks, a kind of InputError, if
+    Raises InputError if theta_b is unknown, or if psdmc cannot write a file. Raises NoSuchLinks, a kind of InputError, if
     no physically possible masses and inertias give theta_b.
     """
     target = Path(path)

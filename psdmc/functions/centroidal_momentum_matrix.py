@@ -74,7 +74,7 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the matrix A(q) of centroidal momentum: A qd is the momentum of all links about "
+        summary="Compute the matrix A(q) of centroidal momentum: A qd is the linear and angular momentum of all links about "
         "their centre of mass.",
     ),
     "centroidal momentum matrix",

@@ -52,7 +52,7 @@ RECIPE = Recipe(
             Quantity(
                 "J",
                 ("3", "nv"),
-                means="column j is the velocity (m/s) if qd[j] is 1 and all other rates are 0",
+                means="column j is the velocity of the centre of mass (m/s) if qd[j] is 1 and all other rates are 0",
             ),
         ),
         theta=False,

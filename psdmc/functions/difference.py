@@ -24,7 +24,7 @@ WAY = Quantity(
     "v",
     ("nv",),
     means="displacement: q1 - q0 for joints with one coordinate; for quaternions the rotation vector (rad) "
-    "of the shorter rotation, along the axes of q0",
+    "of the shorter rotation, in the body frame at q0",
 )
 
 

@@ -90,9 +90,13 @@ RECIPE = Recipe(
                 Quantity(
                     f"dqdd_d{x}",
                     ("nv", "nv"),
-                    means=f"derivatives of qdd by {x}: row i for qdd[i], column j for {entry}",
+                    means=f"derivatives of qdd by {x}: row i for qdd[i], column j for a change of {entry}",
                 )
-                for x, entry in (("q", "joint rate j"), ("qd", "qd[j]"), ("tau", "tau[j]"))
+                for x, entry in (
+                    ("q", "q along joint rate j (q[j] for joints with one coordinate)"),
+                    ("qd", "qd[j]"),
+                    ("tau", "tau[j]"),
+                )
             ),
         ),
         theta=True,

@@ -65,8 +65,8 @@ RECIPE = Recipe(
         (Q, QD, TAU, COTANGENT),
         (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
         theta=True,
-        summary="Compute the accelerations qdd of forward dynamics, and the gradients by q, qd and tau "
-        "of the sum of cotangent[i] * qdd[i].",
+        summary="Compute the accelerations qdd of forward dynamics, and the gradients of "
+        "the sum of cotangent[i] * qdd[i] by q, qd and tau.",
         positive=PIVOTS,
     ),
     "gradient of forward dynamics",

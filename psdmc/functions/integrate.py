@@ -19,7 +19,7 @@ WAY = Quantity(
     "v",
     ("nv",),
     3.0,
-    means="displacement, a rate times a time: rad or m; for quaternions a rotation vector along the axes of q",
+    means="displacement, a rate times a time: rad or m; for quaternions a rotation vector in the body frame at q",
 )
 """Rates times seconds: rad or m."""
 

@@ -49,9 +49,13 @@ RECIPE = Recipe(
             Quantity(
                 f"dtau_d{x}",
                 ("nv", "nv"),
-                means=f"derivatives of tau by {x}: row i for tau[i], column j for {entry}",
+                means=f"derivatives of tau by {x}: row i for tau[i], column j for a change of {entry}",
             )
-            for x, entry in (("q", "joint rate j"), ("qd", "qd[j]"), ("qdd", "qdd[j]"))
+            for x, entry in (
+                ("q", "q along joint rate j (q[j] for joints with one coordinate)"),
+                ("qd", "qd[j]"),
+                ("qdd", "qdd[j]"),
+            )
         ),
         theta=True,
         summary="Compute the derivatives of the torques tau of inverse dynamics by q, qd and qdd.",

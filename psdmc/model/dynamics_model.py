@@ -38,11 +38,13 @@ RENAMED = (
 class DynamicsModel(Answers):
     """A model contains a robot's inverse dynamics as data: the torque of joint i is tau[i] = y(state) @ P[i] @ theta_b.
 
-    `psdmc.derive` makes models. y(state) are the values of p monomials, which are products of powers of q, sin q, cos q, qd
-    and qdd. The columns of the matrix E are the exponents of the monomials. A model has n joints and l base parameters
-    theta_b. A model has the same methods as a compiled robot, such as `forward_dynamics`, and computes them in NumPy. In
-    arguments and results, q has the shape (..., nq), and rates and torques have the shape (..., nv), in SI units. The axes
-    (...) count states.
+    `psdmc.derive` makes models. The vector y(state) holds the values of p monomials, which are products of powers of q,
+    sin q, cos q, qd and qdd. The columns of the matrix E are the exponents of the monomials. The matrices P[i] and the l
+    base parameters theta_b are constants of the robot.
+
+    A model has the same methods as a compiled robot, such as `forward_dynamics`, and computes them in NumPy. In arguments
+    and results, q has the shape (..., nq), and rates, accelerations and torques have the shape (..., nv). All numbers are
+    in SI units. The axes (...) count states.
 
     expansion    the matrices E and P; None if the model was derived with `expand=False`
     theta_b      (l,) base parameters, SI units as in `base_parameters`; None if unknown
@@ -186,7 +188,7 @@ class DynamicsModel(Answers):
 
         Many vectors of standard parameters have the same theta_b, and R gives one of them. In x, the pivot of each base
         parameter (see `pivots`) has the value of the base parameter. All other standard parameters are zero, except those
-        that an assumption such as `assume_zero` makes proportional to a pivot. B @ x is theta_b again.
+        that an assumption such as `assume_zero` makes proportional to a pivot. For every theta_b, B @ x equals theta_b.
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -235,8 +237,10 @@ class DynamicsModel(Answers):
     def equivalent_parameters(self) -> Array:
         """Return a vector of standard parameters, (11n,), whose torques are those of the model.
 
-        The vector is `representative @ theta_b`. Many vectors of standard parameters give the same torques. This one
-        does not describe the real links, and can contain negative masses. Raises InputError if theta_b is unknown.
+        The vector is `representative @ theta_b`. Many vectors of standard parameters give the same torques. The
+        returned vector does not describe the real links, and can contain negative masses.
+
+        Raises InputError if theta_b is unknown.
         """
         found: Array = times(self.representative, self.known_theta_b())
         return found
@@ -260,7 +264,7 @@ class DynamicsModel(Answers):
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the axes of the link frames
             drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the drive inertias of the model
 
-        Pass the result to a function's argument `theta_b`. Raises InputError if a number is not finite, or
+        Pass the result as the argument `theta_b` of a function. Raises InputError if a number is not finite, or
         exceeds the limit for numbers in robot files, or if a mass is negative. Raises InputError also if an inertia is not
         symmetric or belongs to a link without mass, or if a link contradicts an assumption of the model, such as
         `assume_zero`. Warns if an inertia is physically impossible for a rigid body.

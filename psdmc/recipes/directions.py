@@ -23,19 +23,21 @@ from psdmc.robot.mechanism import Array
 if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
-COTANGENT = Quantity("cotangent", ("nv",), means="weights cotangent[i] of the sum")
+COTANGENT = Quantity("cotangent", ("nv",), means="weights of the weighted sum")
 
 DQ, DQD, DQDD, DTAU = (
-    Quantity(f"d{name}", ("nv",), means=f"change of {name} along the direction")
+    Quantity(f"d{name}", ("nv",), means=f"direction of {name}: its change, one entry per joint rate")
     for name in ("q", "qd", "qdd", "tau")
 )
 """Directions of inputs, and derivatives of outputs along them."""
 
 GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
-    Quantity(f"grad_{name}", ("nv",), means=f"gradient of the sum by {name}, one entry per joint rate")
+    Quantity(
+        f"grad_{name}", ("nv",), means=f"gradient of the weighted sum by {name}, one entry per joint rate"
+    )
     for name in ("q", "qd", "qdd", "tau")
 )
-GRADIENT_THETA = Quantity("grad_theta_b", ("l",), means="gradient of the sum by theta_b")
+GRADIENT_THETA = Quantity("grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b")
 """Derivatives of the weighted sum of outputs by each input."""
 
 _FREE = "free_qdd"

@@ -16,7 +16,7 @@ from psdmc.robot.mechanism import Array
 VALUES = Quantity(
     "values",
     ("nonzeros",),
-    means="the entries; `CompiledRobot.pattern` returns their rows and columns",
+    means="matrix entries that can differ from zero; `CompiledRobot.pattern` returns their rows and columns",
 )
 
 

@@ -24,8 +24,10 @@ Q_NEXT = Quantity(
     "q_next", ("nq",), means="joint positions after the step, rad or m, with quaternions of unit length"
 )
 QD_NEXT = Quantity("qd_next", ("nv",), means="joint rates after the step, rad/s or m/s")
-A = Quantity("A", ("nx", "nx"), means="derivatives of the state (q_next, qd_next) by the state (q, qd)")
-B = Quantity("B", ("nx", "nv"), means="derivatives of the state (q_next, qd_next) by tau")
+A = Quantity(
+    "A", ("nx", "nx"), means="derivatives of the new state (q_next, qd_next) by the old state (q, qd)"
+)
+B = Quantity("B", ("nx", "nv"), means="derivatives of the new state (q_next, qd_next) by tau")
 
 Rows = Sequence[Sequence[Scalar]]
 

@@ -22,18 +22,21 @@ from psdmc.toolchain.stubs import documentation
 class CompiledRobot(CompiledFunctions):
     """A compiled robot has one method for each generated function. The methods take and return NumPy arrays.
 
-    `psdmc.compile` makes compiled robots. One call computes one state or many: q has the shape (..., nq), rates and torques
-    have the shape (..., nv), in SI units. The axes (...) count states and broadcast as in NumPy. All results have the type
-    `dtype`. A function with several results returns a named tuple. During a call for many states, other Python threads can
-    run.
+    `psdmc.compile` makes compiled robots. One call computes one state or many. Joint positions q have the shape (..., nq).
+    Rates, accelerations and torques have the shape (..., nv). All numbers are in SI units. The axes (...) count states and
+    broadcast as in NumPy. Results have the NumPy type that the attribute `dtype` names. A method with several results
+    returns a named tuple. During a call for many states, other Python threads can run.
+
+    All methods have the argument `out`, and most have `theta_b`:
 
     theta_b  (l,) base parameters that replace those in the code; optional
     out      array into which psdmc writes the result, or a tuple of arrays for several results; optional. Each array needs
              the shape and dtype of the result, and may be an input array
 
-    If the robot has a floating base, "base frame" means the world frame. A call takes about 0.3 us in addition to the
-    arithmetic, if the arrays are contiguous, have the robot's dtype and equal axes (...). Calls with other arrays take
-    about 10 us in addition, and so do all calls if Python's C headers are not installed.
+    If the robot has a floating base, "base frame" means the world frame. A call takes
+    about 0.3 us more than its arithmetic if all input arrays are contiguous and have the robot's dtype and equal axes
+    (...). With other input arrays, a call takes about 10 us more than its arithmetic. If Python's C headers are not
+    installed, all calls take about 10 us more.
     """
 
     def _bind(self, compiled: CompiledFunctions) -> None:
