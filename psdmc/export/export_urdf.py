@@ -57,14 +57,14 @@ def export_urdf(
 
     Many masses and inertias give the same theta_b. psdmc chooses those that are nearest to the ones in the robot file. If
     the model comes from a URDF, psdmc copies names, limits and shapes from that file. If the model is
-    calibrated, its friction becomes the elements <dynamics>. After writing, psdmc reads the URDF with Pinocchio and the
-    MJCF with MuJoCo, and compares their torques with those of the model.
+    calibrated, its friction becomes the elements <dynamics>. After writing, psdmc reads the URDF with Pinocchio and compares
+    its torques with those of the model. If psdmc also wrote an MJCF, MuJoCo does the same for that file.
 
     Returns an object with the paths, the parameters of the links and the largest torque differences.
 
     path      URDF file to write
-    mjcf      True: also write an MJCF with the suffix .xml; None: do so only if the model has drive inertias. psdmc
-              replaces an existing .xml file only if psdmc wrote it
+    mjcf      True: also write an MJCF with the suffix .xml; False: write no MJCF; None: write one only if the model has
+              drive inertias. psdmc replaces an existing .xml file only if psdmc wrote it
     progress  function that psdmc calls with the name of each stage, such as print
 
     Raises InputError if theta_b is unknown, or if psdmc cannot write a file. Raises NoSuchLinks, a kind of InputError, if

@@ -93,7 +93,7 @@ RECIPE = Recipe(
                     means=f"derivatives of qdd by {x}: row i for qdd[i], column j for a change of {entry}",
                 )
                 for x, entry in (
-                    ("q", "q along joint rate j (q[j] for joints with one coordinate)"),
+                    ("q", "q in the direction of joint rate j (q[j] for joints with one coordinate)"),
                     ("qd", "qd[j]"),
                     ("tau", "tau[j]"),
                 )

@@ -65,8 +65,8 @@ RECIPE = Recipe(
         (Q, QD, TAU, COTANGENT),
         (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
         theta=True,
-        summary="Compute the accelerations qdd of forward dynamics, and the gradients of "
-        "the sum of cotangent[i] * qdd[i] by q, qd and tau.",
+        summary="Compute the accelerations qdd, and the gradients of "
+        "the sum of cotangent[i] * qdd[i] with respect to q, qd and tau.",
         positive=PIVOTS,
     ),
     "gradient of forward dynamics",

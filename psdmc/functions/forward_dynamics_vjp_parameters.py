@@ -43,8 +43,8 @@ RECIPE = with_parameter_gradient(
     STATE,
     186,
     "qdd, and the gradient of cotangent . qdd by q, qd, tau and theta_b",
-    "Compute the accelerations qdd of forward dynamics, and the gradients of "
-    "the sum of cotangent[i] * qdd[i] by q, qd, tau and theta_b.",
+    "Compute the accelerations qdd, and the gradients of "
+    "the sum of cotangent[i] * qdd[i] with respect to q, qd, tau and theta_b.",
     trace,
     reference,
     pinocchio,

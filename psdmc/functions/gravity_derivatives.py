@@ -55,7 +55,7 @@ RECIPE = Recipe(
             Quantity(
                 "dg_dq",
                 ("nv", "nv"),
-                means="derivatives of g by q: row i for g[i], column j for a change of q along joint rate j",
+                means="derivatives of g by q: row i for g[i], column j for a change of q in the direction of joint rate j",
             ),
         ),
         theta=True,

@@ -52,7 +52,7 @@ RECIPE = Recipe(
                 means=f"derivatives of tau by {x}: row i for tau[i], column j for a change of {entry}",
             )
             for x, entry in (
-                ("q", "q along joint rate j (q[j] for joints with one coordinate)"),
+                ("q", "q in the direction of joint rate j (q[j] for joints with one coordinate)"),
                 ("qd", "qd[j]"),
                 ("qdd", "qdd[j]"),
             )

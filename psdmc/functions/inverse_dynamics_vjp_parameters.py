@@ -45,8 +45,8 @@ RECIPE = with_parameter_gradient(
     STATE,
     182,
     "tau, and the gradient of cotangent . tau by q, qd, qdd and theta_b",
-    "Compute the torques tau of inverse dynamics, and the gradients of "
-    "the sum of cotangent[i] * tau[i] by q, qd, qdd and theta_b.",
+    "Compute the torques tau, and the gradients of "
+    "the sum of cotangent[i] * tau[i] with respect to q, qd, qdd and theta_b.",
     trace,
     reference,
     pinocchio,

@@ -199,7 +199,10 @@ class DynamicsModel(Answers):
         )
 
     def expanded(self) -> Expansion:
-        """Return an object with the matrices E and P. Raises InputError if the model was derived with `expand=False`."""
+        """Return the model's torques as sums of monomials: E holds the exponents, P the coefficients.
+
+        Raises InputError if the model was derived with `expand=False`, without E and P.
+        """
         if self.expansion is None:
             raise InputError("this model was derived without E and P", "derive it again without --no-expand")
         return self.expansion
@@ -235,10 +238,11 @@ class DynamicsModel(Answers):
         return np.asarray(times(self.B, known.reshape(-1)))
 
     def equivalent_parameters(self) -> Array:
-        """Return a vector of standard parameters, (11n,), whose torques are those of the model.
+        """Return a vector of standard parameters that gives the same torques as the model.
 
-        The vector is `representative @ theta_b`. Many vectors of standard parameters give the same torques. The
-        returned vector does not describe the real links, and can contain negative masses.
+        The vector has 11 numbers for each of the n links, and is `representative @ theta_b`, a product of the model's
+        matrix `representative` (11n, l) with the base parameters. Many other vectors give the same
+        torques. The returned vector does not describe the real links, and can contain negative masses.
 
         Raises InputError if theta_b is unknown.
         """
