@@ -9,7 +9,7 @@ from psdmc.dynamics.derivatives import Derivatives, inverse_dynamics_derivatives
 from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import factorize, inner_product, inverse, solve
 from psdmc.program.products import Product
-from psdmc.program.signature import QD, QDD, TAU, Q, Quantity, Signature
+from psdmc.program.signature import QD, QDD, TAU, Q, Signature, jacobian_of
 from psdmc.recipes.accelerations import PIVOTS
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
@@ -84,21 +84,7 @@ RECIPE = Recipe(
         22,
         "qdd, d qdd / d q, d qdd / d qd and d qdd / d tau = M(q)^-1; row i: derivatives of qdd[i]",
         (Q, QD, TAU),
-        (
-            QDD,
-            *(
-                Quantity(
-                    f"dqdd_d{x}",
-                    ("nv", "nv"),
-                    means=f"derivatives of qdd by {x}: row i for qdd[i], column j for a change of {entry}",
-                )
-                for x, entry in (
-                    ("q", "q in the direction of joint rate j (q[j] for joints with one coordinate)"),
-                    ("qd", "qd[j]"),
-                    ("tau", "tau[j]"),
-                )
-            ),
-        ),
+        (QDD, *(jacobian_of("qdd", by) for by in ("q", "qd", "tau"))),
         theta=True,
         summary="Compute the accelerations qdd of forward dynamics, and their derivatives by q, qd and tau.",
         positive=PIVOTS,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
-from psdmc.program.signature import Q, Quantity, Signature
+from psdmc.program.signature import Q, Quantity, Signature, jacobian_of
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -52,11 +52,7 @@ RECIPE = Recipe(
         (Q,),
         (
             Quantity("g", ("nv",), means="gravity torques (N m), or forces (N) of sliding joints"),
-            Quantity(
-                "dg_dq",
-                ("nv", "nv"),
-                means="derivatives of g by q: row i for g[i], column j for a change of q in the direction of joint rate j",
-            ),
+            jacobian_of("g", "q"),
         ),
         theta=True,
         summary="Compute the gravity torques g(q) and their derivatives by q.",

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from psdmc.dynamics.derivatives import inverse_dynamics_derivatives
-from psdmc.program.signature import QD, QDD, Q, Quantity, Signature
+from psdmc.program.signature import QD, QDD, Q, Signature, jacobian_of
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
@@ -45,18 +45,7 @@ RECIPE = Recipe(
         12,
         "d tau / d q, d tau / d qd and d tau / d qdd = M(q); row i: derivatives of tau[i]",
         (Q, QD, QDD),
-        tuple(
-            Quantity(
-                f"dtau_d{x}",
-                ("nv", "nv"),
-                means=f"derivatives of tau by {x}: row i for tau[i], column j for a change of {entry}",
-            )
-            for x, entry in (
-                ("q", "q in the direction of joint rate j (q[j] for joints with one coordinate)"),
-                ("qd", "qd[j]"),
-                ("qdd", "qdd[j]"),
-            )
-        ),
+        tuple(jacobian_of("tau", by) for by in ("q", "qd", "qdd")),
         theta=True,
         summary="Compute the derivatives of the torques tau of inverse dynamics by q, qd and qdd.",
     ),

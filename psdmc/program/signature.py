@@ -158,3 +158,14 @@ QD = Quantity("qd", ("nv",), 3.0, "joint rates, rad/s or m/s")
 QDD = Quantity("qdd", ("nv",), 5.0, "joint accelerations, rad/s^2 or m/s^2")
 TAU = Quantity("tau", ("nv",), means="joint torques (N m), or forces (N) of sliding joints")
 """Those of q, qd and qdd if states are drawn."""
+
+
+def jacobian_of(output: str, by: str) -> Quantity:
+    """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
+    entry = (
+        "q in the direction of joint rate j (q[j] for joints with one coordinate)"
+        if by == "q"
+        else f"{by}[j]"
+    )
+    means = f"derivatives of {output} by {by}: row i for {output}[i], column j for a change of {entry}"
+    return Quantity(f"d{output}_d{by}", ("nv", "nv"), means=means)
