@@ -150,7 +150,7 @@ def test_a_campaign_with_coloured_noise(arm, campaign: Path, times: tuple[float,
     simulate_campaign(arm.plant, folder, SimulateOptions(ideal_sensors=True))
     runs = read_campaign(folder)
     robot = load_virtual_robot(arm.plant)
-    friction = {(j.name, word): getattr(j, word) for j in robot.joints for word in LUGRE}
+    friction = {(j.name, word): j.friction[word] for j in robot.joints for word in LUGRE}
     inside = []
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)
