@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import chain
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from psdmc.program.operations import Op as Op
 
@@ -66,6 +70,18 @@ class Program:
 
     body: tuple[Instr, ...]
     outputs: tuple[tuple[Slot, int], ...]
+    _arguments: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+
+    def arguments(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """(k,) the arguments of all instructions in their order, and (k,) the instruction of each; found once."""
+        if not self._arguments:
+            given = [args for _, args, _, _ in self.body]
+            counts = np.fromiter(map(len, given), np.intp, len(given))
+            flat = np.fromiter(chain.from_iterable(given), np.intp, int(counts.sum()))
+            self._arguments.append((flat, np.repeat(np.arange(len(given)), counts)))
+        return self._arguments[0]
 
     def inputs(self) -> tuple[Slot, ...]:
         """Slots read, each once, in order of vector name and index."""
@@ -73,10 +89,7 @@ class Program:
 
     def uses(self) -> list[int]:
         """How often each value is an argument or an output."""
-        count = [0] * len(self.body)
-        for _, args, _, _ in self.body:
-            for a in args:
-                count[a] += 1
+        count: list[int] = np.bincount(self.arguments()[0], minlength=len(self.body)).tolist()
         for _, index in self.outputs:
             count[index] += 1
         return count
