@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from psdmc.program.operations import Op as Op
 
 
+_COMMUTATIVE = frozenset(op for op in Op if op.operation.commutative)
+
+
 class Slot(NamedTuple):
     """One entry of a named vector: an input to load or an output to store."""
 
@@ -33,26 +36,26 @@ class Instr(NamedTuple):
 
     def renumbered(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
         """The same operation on the values that its arguments have become; itself where none has moved."""
-        args = self.args
-        if not args:
-            return self
+        op, args, _, _ = self
         if len(args) == 2:
             moved: tuple[int, ...] = (new_index[args[0]], new_index[args[1]])
+        elif not args:
+            return self
         else:
             moved = tuple([new_index[a] for a in args])
-        return self if moved == args else operation(self.op, moved)
+        return self if moved == args else tuple.__new__(Instr, (op, moved, None, None))
 
     def canonical(self, new_index: Sequence[int] | Mapping[int, int]) -> Instr:
         """The same on the values that its arguments have become, commutative ones in ascending order; itself where it is
         that already."""
-        args = self.args
+        op, args, _, _ = self
         if len(args) != 2:
             return self.renumbered(new_index)
         first, second = new_index[args[0]], new_index[args[1]]
-        if first > second and self.op.operation.commutative:
+        if first > second and op in _COMMUTATIVE:
             first, second = second, first
         moved = (first, second)
-        return self if moved == args else operation(self.op, moved)
+        return self if moved == args else operation(op, moved)
 
 
 def operation(op: Op, args: tuple[int, ...]) -> Instr:

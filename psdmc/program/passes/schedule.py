@@ -58,10 +58,12 @@ def _need(program: Program) -> list[int]:
     for _, args, _, _ in program.body:
         if len(args) == 2:
             first, second = need[args[0]], need[args[1]]
-            need.append(max(first, second, 1) if first != second else first + 1)
+            need.append(first + 1 if first == second else first if first > second else second)
+        elif not args:
+            need.append(0)
         else:
             most = sorted([need[a] for a in args], reverse=True)
-            need.append(max([1, *(own + held for held, own in enumerate(most))]) if args else 0)
+            need.append(max([1, *(own + held for held, own in enumerate(most))]))
     return need
 
 
