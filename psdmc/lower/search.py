@@ -25,7 +25,7 @@ from psdmc.lower.branches import Branches
 from psdmc.lower.carrier_columns import every_parameter
 from psdmc.lower.carriers import CarrierSpace
 from psdmc.lower.descent import Descent
-from psdmc.lower.factored import Arrangement, RobotConstants, cost_of_dynamics, trace_dynamics
+from psdmc.lower.factored import Arrangement, Recording, RobotConstants, cost_of_dynamics
 from psdmc.lower.geometry import LARGE, Geometry
 from psdmc.lower.link_parameters import PSEUDO_NAMES, WEIGHTS
 from psdmc.lower.reframe import Foot, Reframed
@@ -41,7 +41,7 @@ from psdmc.target.native import COSTS
 BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
 
-OPERATIONS, OPERATIONS_OF_LARGE = 800_000, 250_000
+OPERATIONS, OPERATIONS_OF_LARGE = 800_000, 100_000
 """Of all PROGRAMs on which one function compares the choices of an arrangement that another function found: for robots of up
 to MANY_JOINTS joints, and of more. The Coriolis matrix of a humanoid with two hands has 45,000: it compares the found
 choices and those that differ in one. A longer function compares fewer."""
@@ -84,7 +84,7 @@ class Search:
         sizes = Sizes(len(chain), chain.nq, chain.nv, l, frames)
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
-        self.is_large = len(chain) > LARGE
+        self.is_large, self.has_many_joints = len(chain) > LARGE, len(chain) > MANY_JOINTS
         self.branches = Branches(self.robot)
         self._is_arm = chain.is_serial and not self.is_large and all(kind.about_z for kind in chain.types)
         self.budget = budget * LARGE**2 // max(LARGE, len(chain)) ** 2
@@ -204,10 +204,14 @@ class Search:
 
     def cost(self, recipe: Recipe, a: Arrangement) -> Cost:
         """Compute the cost of a function's PROGRAM in an arrangement; it is traced once."""
-        key = recipe.name, a.reframed, a.unit, a.carriers, a.choices
+        key = self._key(recipe, a)
         if key not in self._costs:
             self._costs[key] = cost_of_dynamics(recipe, a, self.robot)
         return self._costs[key]
+
+    @staticmethod
+    def _key(recipe: Recipe, a: Arrangement) -> tuple[str, Reframed, float, tuple[int, ...], Choices]:
+        return recipe.name, a.reframed, a.unit, a.carriers, a.choices
 
     def _anew(self, choices: Choices) -> Iterator[Arrangement]:
         """Start the search again from its first choices, in this arrangement. Of what was chosen for another function,
@@ -236,17 +240,24 @@ class Search:
         like the found one's first, and no more than have OPERATIONS together."""
         choices = list(_rearranged(found, _felt(found, distinct(recipe, ALL_CHOICES))))
         costs: dict[int, Cost] = {}
+        recorded: dict[int, Recording] = {}
+        best: set[int] = set()
         is_usual = found.n <= MANY_JOINTS
         left = OPERATIONS if is_usual else OPERATIONS_OF_LARGE
         targets = (self.single, self.batch) if is_usual else (self.batch,)
         for k in sorted(range(len(choices)), key=lambda k: _changes(choices[k].choices, found.choices)):
+            if self._key(recipe, choices[k]) not in self._costs:
+                recorded[k] = Recording.of(recipe, choices[k], self.robot)
+                self._costs[self._key(recipe, choices[k])] = recorded[k].cost()
             costs[k] = self.cost(recipe, choices[k])
+            best = {min(sorted(costs), key=lambda k: target.weight(costs[k])) for target in targets}
+            recorded = {k: recorded[k] for k in best if k in recorded}
             left -= costs[k].total
             if left < costs[k].total:
                 break
-        tried = sorted(costs)
-        for best in sorted({min(tried, key=lambda k: target.weight(costs[k])) for target in targets}):
-            yield trace_dynamics(recipe, choices[best], self.robot)
+        for k in sorted(best):
+            kept = recorded.pop(k, None) or Recording.of(recipe, choices[k], self.robot)
+            yield kept.program()
 
     def starts(self, feet: tuple[Foot, ...]) -> Iterator[Arrangement]:
         reframed = self.geometry.reframed(feet)
