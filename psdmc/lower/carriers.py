@@ -81,9 +81,7 @@ class CarrierSpace:
         default_factory=dict, init=False, repr=False
     )
     """What is not zero of each, by its place: of a tree, one entry in fifty."""
-    _lightest: dict[tuple[float, ...], tuple[int, ...]] = field(
-        default_factory=dict, init=False, repr=False
-    )
+    _lightest: dict[tuple[float, ...], tuple[int, ...]] = field(default_factory=dict, init=False, repr=False)
     """Bases by their weights, of which there are two: every function's search begins with the same ones."""
 
     def __post_init__(self) -> None:

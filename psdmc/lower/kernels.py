@@ -23,7 +23,7 @@ from psdmc.lower.scoring import Scoring, for_lanes, for_one_state
 from psdmc.lower.search import Search
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.program.kernel import Kernel
-from psdmc.program.pipeline import LONG, ordered, shortened
+from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.products import written_out
 from psdmc.program.program import Program
 from psdmc.progress import Step
@@ -190,7 +190,7 @@ class _Lowered:
         """Run the passes, once for a PROGRAM that is scored first and used then."""
         found = next((short for known, short in self._short if known is program), None)
         if found is None:
-            found = shortened(program, 0 if self._search(False).has_many_joints else LONG)
+            found = shortened(program, self._search(False).has_many_joints)
             self._short = [*self._short[-1:], (program, found)]
         return found
 

@@ -30,7 +30,7 @@ from psdmc.program.limb_cost import StageCost, stage_costs
 from psdmc.program.limb_program import LimbGroup, LimbProgram, Stage
 from psdmc.program.limb_stages import staged
 from psdmc.program.passes.free_registers import free_registers
-from psdmc.program.pipeline import LONG, ordered, shortened
+from psdmc.program.pipeline import ordered, shortened
 from psdmc.program.program import Program
 from psdmc.recipes.recipe import Recipe
 from psdmc.robot.limbs import Limbs
@@ -179,7 +179,7 @@ class LimbSearch:
         return trace_limbs(self.recipe, arrangement, self.search.robot, groups)
 
     def _ordered(self, traced: TracedLimbs) -> LimbProgram:
-        short = shortened(traced.program, 0 if self.search.has_many_joints else LONG)
+        short = shortened(traced.program, self.search.has_many_joints)
         stages = staged(short, traced.groups)
         in_order = (free_registers(ordered(stage.program, self.costs)[0]) for stage in stages)
         return LimbProgram(

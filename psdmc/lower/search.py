@@ -44,7 +44,7 @@ BUDGET = 600
 OPERATIONS, OPERATIONS_OF_LARGE = 800_000, 100_000
 """Of all PROGRAMs on which one function compares the choices of an arrangement that another function found: for robots of up
 to MANY_JOINTS joints, and of more. The Coriolis matrix of a humanoid with two hands has 45,000: it compares the found
-choices and those that differ in one. A longer function compares fewer."""
+choices and one set that differs in one of them. A longer function keeps the found choices."""
 
 MANY_JOINTS = 40
 """Joints up to which a search tries all that it knows; what it leaves out of larger robots saves 1 % at most."""
@@ -84,7 +84,7 @@ class Search:
         sizes = Sizes(len(chain), chain.nq, chain.nv, l, frames)
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
-        self.is_large, self.has_many_joints = len(chain) > LARGE, len(chain) > MANY_JOINTS
+        self.is_large = len(chain) > LARGE
         self.branches = Branches(self.robot)
         self._is_arm = chain.is_serial and not self.is_large and all(kind.about_z for kind in chain.types)
         self.budget = budget * LARGE**2 // max(LARGE, len(chain)) ** 2
@@ -92,6 +92,11 @@ class Search:
         self.single, self.batch = for_one_state(costs), for_lanes(costs)
         known = theta_b if known is None else known
         self.accuracy = None if known is None else Accuracy(self.robot, known)
+
+    @property
+    def has_many_joints(self) -> bool:
+        """Whether less than all that a search knows is tried."""
+        return len(self.robot.chain) > MANY_JOINTS
 
     def best(self, recipe: Recipe, scoring: Scoring, start: Arrangement | None = None) -> Arrangement:
         """The cheapest arrangement found for one function. `start` is one found for another function, whose geometry is
@@ -242,7 +247,7 @@ class Search:
         costs: dict[int, Cost] = {}
         recorded: dict[int, Recording] = {}
         best: set[int] = set()
-        is_usual = found.n <= MANY_JOINTS
+        is_usual = not self.has_many_joints
         left = OPERATIONS if is_usual else OPERATIONS_OF_LARGE
         targets = (self.single, self.batch) if is_usual else (self.batch,)
         for k in sorted(range(len(choices)), key=lambda k: _changes(choices[k].choices, found.choices)):

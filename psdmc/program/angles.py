@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from psdmc.program.program import Op, Program
 
-
 TRIGONOMETRIC = frozenset((Op.SIN, Op.COS))
 
 

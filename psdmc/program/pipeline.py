@@ -66,15 +66,15 @@ def optimize(program: Program, costs: Costs = COSTS, *, lanes: bool = False) -> 
     return ordered(shortened(program), costs)[1 if lanes else 0]
 
 
-def shortened(program: Program, long: int = LONG) -> Program:
-    """A PROGRAM with the same outputs in fewer operations, before its instructions are put in order. One of `long`
-    instructions or more ends with the first round that saves LITTLE."""
+def shortened(program: Program, of_large: bool = False) -> Program:
+    """A PROGRAM with the same outputs in fewer operations, before its instructions are put in order. The first round that
+    saves LITTLE is the last one of a long PROGRAM, and of any of a large robot."""
     operations = _operations(program)
     for _ in range(LONGEST):
         shorter = _applied(ROUND, program)
         if shorter is program or (left := _operations(shorter)) >= operations:
             break
-        is_last = len(program) >= long and left > (1.0 - LITTLE) * operations
+        is_last = (of_large or len(program) >= LONG) and left > (1.0 - LITTLE) * operations
         program, operations = shorter, left
         if is_last:
             break

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from psdmc.program.operations import Op as Op
 
-
 _COMMUTATIVE = frozenset(op for op in Op if op.operation.commutative)
 
 

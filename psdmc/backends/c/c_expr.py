@@ -72,7 +72,7 @@ def uniform_of(program: Program, shared: Collection[str] = UNIFORM_VECTORS) -> t
         elif slot is not None:
             uniform.append(slot.vector in shared)
         else:
-            uniform.append(op in _OPERATORS and all([uniform[a] for a in args]))
+            uniform.append(op in _OPERATORS and all(uniform[a] for a in args))
     return tuple(uniform)
 
 
