@@ -41,10 +41,10 @@ from psdmc.target.native import COSTS
 BUDGET = 600
 """Programs traced per function, at 1 to 10 ms each."""
 
-OPERATIONS, OPERATIONS_OF_LARGE = 800_000, 100_000
+OPERATIONS, OPERATIONS_OF_LARGE = 800_000, 250_000
 """Of all PROGRAMs on which one function compares the choices of an arrangement that another function found: for robots of up
 to MANY_JOINTS joints, and of more. The Coriolis matrix of a humanoid with two hands has 45,000: it compares the found
-choices and one set that differs in one of them. A longer function keeps the found choices."""
+choices and those that differ in one. A longer function compares fewer."""
 
 MANY_JOINTS = 40
 """Joints up to which a search tries all that it knows; what it leaves out of larger robots saves 1 % at most."""

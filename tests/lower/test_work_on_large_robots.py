@@ -137,6 +137,7 @@ def test_rounds_of_passes_end_from_so_many_joints_on_when_one_saves_little(
     """A second round would find that there is nothing left to do."""
     monkeypatch.setattr(search, "MANY_JOINTS", many)
     monkeypatch.setattr(pipeline, "LITTLE", 1.0)
+    monkeypatch.setattr(pipeline, "LONG_OF_LARGE", 4)
     applied: list[object] = []
     monkeypatch.setattr(pipeline, "ROUND", (lambda program: applied.append(program) or drop_last(program),))
     lowered = kernels._Lowered(derived(), "factored", COSTS)
