@@ -163,7 +163,7 @@ TAU = Quantity("tau", ("nv",), means="joint torques (N m), or forces (N) of slid
 def jacobian_of(output: str, by: str) -> Quantity:
     """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
     entry = (
-        "q in the direction of joint rate j (q[j] for joints with one coordinate)"
+        "q along joint rate j (of q[j], if every joint has one coordinate)"
         if by == "q"
         else f"{by}[j]"
     )
