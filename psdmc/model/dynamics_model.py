@@ -156,7 +156,9 @@ class DynamicsModel(Answers):
 
     @property
     def p(self) -> int | None:
-        """Return the number of monomials in the model's torques, which are products of powers of q, sin q, cos q, qd and qdd.
+        """Return the number of monomials in the model's torques.
+
+        A monomial is a product of powers of q, sin q, cos q, qd and qdd.
 
         p is None if the model was derived with `expand=False`.
         """

@@ -33,7 +33,9 @@ DQ, DQD, DQDD, DTAU = (
 
 GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
     Quantity(
-        f"grad_{name}", ("nv",), means=f"gradient of the weighted sum by {name}, one entry per joint rate"
+        f"grad_{name}",
+        ("nv",),
+        means=f"gradient of the weighted sum by {name}; entry j is for a change along joint rate j",
     )
     for name in ("q", "qd", "qdd", "tau")
 )
