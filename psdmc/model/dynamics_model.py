@@ -175,7 +175,10 @@ class DynamicsModel(Answers):
 
     @property
     def is_reduced(self) -> bool:
-        """True if every base parameter has a pivot (see `pivots`), as in every model that psdmc derives."""
+        """True if each base parameter contains, with factor one, a standard parameter that no other base parameter contains.
+
+        This standard parameter is its pivot (see `pivots`). Every model that psdmc derives has pivots.
+        """
         return bool(self._leads.any(axis=1).all())
 
     @property
@@ -272,10 +275,11 @@ class DynamicsModel(Answers):
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the axes of the link frames
             drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the drive inertias of the model
 
-        Pass the result as the argument `theta_b` of a function. Raises InputError if a number is not finite, or
-        exceeds the limit for numbers in robot files, or if a mass is negative. Raises InputError also if an inertia is not
-        symmetric or belongs to a link without mass, or if a link contradicts an assumption of the model, such as
-        `assume_zero`. Warns if an inertia is physically impossible for a rigid body.
+        Pass the result as the argument `theta_b` of a function. Warns if no rigid body can have a given inertia.
+
+        Raises InputError if a number is not finite, or is larger than robot files allow, or if a mass is negative. Raises
+        InputError also if an inertia is not symmetric, or belongs to a link without mass. The same error is raised if a
+        value is not zero, but the model was derived with the assumption that it is (option `assume_zero`).
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 COTANGENT = Quantity("cotangent", ("nv",), means="weights of the weighted sum")
 
 DQ, DQD, DQDD, DTAU = (
-    Quantity(f"d{name}", ("nv",), means=f"direction of {name}: its change, one entry per joint rate")
+    Quantity(f"d{name}", ("nv",), means=f"change of {name}; entry j is the change along joint rate j")
     for name in ("q", "qd", "qdd", "tau")
 )
 """Directions of inputs, and derivatives of outputs along them."""
