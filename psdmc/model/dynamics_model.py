@@ -389,8 +389,9 @@ class DynamicsModel(Answers):
             joint    name of the joint, or its number: 0 is the first joint
             numbers  True: the sum contains the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        The symbols q1, qd1 and qdd1 are for the first joint. Raises InputError if the robot has no such joint, if the model
-        has no E and P, or if the torque has more than 2,000 monomials. Raises ToolchainError if SymPy is missing.
+        The symbols q1, qd1 and qdd1 are for joint 0. Raises InputError if the robot has no such joint, or if the torque
+        has more than 2,000 monomials. Raises InputError also if the model has no monomials, for example because it was
+        derived with `expand=False`. Raises ToolchainError if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
         return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)
