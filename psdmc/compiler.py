@@ -152,8 +152,8 @@ def emit_c(
 
     model      a model, or the path of a model file
     directory  folder for the package; it must be missing, empty, or already hold a package that psdmc wrote
-    lowering   how psdmc generates the arithmetic. With "expanded", the code sums monomials, with the model's matrices E and P.
-               With "factored", it is a recursion over the links. With "auto", psdmc takes the one that needs fewer operations
+    lowering   how psdmc generates the arithmetic. With "expanded", the code sums monomials, by the model's matrices E and P.
+               With "factored", it is a recursion over the links. With "auto", psdmc takes the one with fewer operations
     functions  names of the functions to generate, or one name; None: the default functions
     real       precision, "float64" or "float32"; None: the precision of the target
     trig       how the code computes sines. "inline": by its own code, with libm only for angles over 1e5 rad;
