@@ -22,7 +22,7 @@ from psdmc.errors import InputError
 from psdmc.lower.factored import RobotConstants, stored_entries
 from psdmc.lower.reframe import Reframed
 from psdmc.lower.units import STANDARD, dimensions_of_traced, own_axes
-from psdmc.program.dimensioned import DimensionedTracer
+from psdmc.program.dimensioned import DimensionedTracer, UnlikeArguments
 from psdmc.program.dimensions import (
     ACCELERATION,
     INERTIA,
@@ -30,8 +30,8 @@ from psdmc.program.dimensions import (
     MASS,
     MOMENT,
     Dimension,
-    Unlike,
     dimension_of,
+    in_words,
     times,
 )
 from psdmc.program.program import Slot
@@ -59,7 +59,7 @@ def check_dimensions(
     measured = _Measured(reframed, robot)
     try:
         outputs = recipe.trace(measured.ingredients(recipe, choices))
-    except Unlike as unlike:
+    except UnlikeArguments as unlike:
         raise InputError(f"{recipe.name}: {unlike}{_line(recipe, unlike)}", HINT) from unlike
     measured.compare(recipe, outputs)
 
@@ -172,7 +172,8 @@ class _Measured:
             found, unit = self.tracer.dimension(value), wanted[slot.vector][slot.index]
             if found is not None and found != unit:
                 raise InputError(
-                    f"{recipe.name}: {slot} is computed in {found}, the signature says {unit}", HINT
+                    f"{recipe.name}: {slot} is {in_words(found)}, its unit in the signature {in_words(unit)}",
+                    HINT,
                 )
 
 

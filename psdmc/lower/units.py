@@ -1,9 +1,9 @@
 """The units inside a trace. Who writes a function does not see them.
 
-Lowering chooses a unit of length, u metres, so that one length of the robot is exactly one. Energies stay in J and times in s.
+Lowering chooses a unit of length, u metres, so that one length of the robot is exactly one. Energies stay in J, times in s.
 Masses are then in kg/u^2, and a quantity of dimension kg^a m^b s^c is its value in SI times u^(2a - b). The ingredients of a
-trace are in these units. Inputs and outputs of a signature are SI, and are converted with the functions of this file. If a
-coordinate of the robot is a length, u is 1. Base parameters stay in SI.
+trace are in these units. Inputs and outputs of a signature are SI, and this file converts them. If a coordinate of the robot
+is a length, u is 1. Base parameters stay in SI.
 """
 
 from __future__ import annotations

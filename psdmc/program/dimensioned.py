@@ -13,6 +13,10 @@ _WORDS = {Op.ADD: "sum", Op.SUB: "difference", Op.MIN: "minimum", Op.MAX: "maxim
 _append = list.append
 
 
+class UnlikeArguments(Exception):
+    """The operation, and the units of its arguments."""
+
+
 class DimensionedTracer(Tracer):
     """Symbols do their arithmetic in place and append what they record to `steps`, where each step is looked at."""
 
@@ -87,7 +91,7 @@ class _Steps(list[Step]):
         try:
             return raised(own[0], own[1], self._value(b)) if op is Op.POW else op.operation.dimension(*own)
         except Unlike as unlike:
-            raise Unlike(f"{_WORDS.get(op, op.value)} of {unlike}") from None
+            raise UnlikeArguments(f"{_WORDS.get(op, op.value)} of {unlike}") from None
 
     def _value(self, exponent: int) -> float | None:
         value = self.tracer.constants.get(exponent)

@@ -76,8 +76,16 @@ def times(a: Dimension, b: Dimension, power: float = 1) -> Dimension:
     return Dimension(a[0] + power * b[0], a[1] + power * b[1], a[2] + power * b[2])
 
 
+def in_words(dimension: Known) -> str:
+    """The unit, or what has none."""
+    return "zero" if dimension is None else "a number" if dimension == NUMBER else str(dimension)
+
+
 class Unlike(Exception):
-    """What an operation was given, in words."""
+    """Dimensions that an operation cannot have together. As text: their units."""
+
+    def __init__(self, *given: Known) -> None:
+        super().__init__(" and ".join(map(in_words, given)))
 
 
 def alike(*given: Known) -> Known:
@@ -87,7 +95,7 @@ def alike(*given: Known) -> Known:
         if found is None:
             found = each
         elif each is not None and each != found:
-            raise Unlike(" and ".join("0" if one is None else str(one) for one in given))
+            raise Unlike(*given)
     return found
 
 
@@ -112,7 +120,7 @@ def chosen(a: Known, b: Known, x: Known, y: Known) -> Known:
 def number(*given: Known) -> Known:
     """That of functions of numbers, such as exp."""
     if any(each is not None and each != NUMBER for each in given):
-        raise Unlike(" and ".join("0" if one is None else str(one) for one in given))
+        raise Unlike(*given)
     return NUMBER
 
 
