@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
+from pathlib import Path
 
 import numpy as np
 
@@ -66,9 +67,9 @@ def check_dimensions(
 
 def _line(recipe: Recipe, error: Exception) -> str:
     """Where in the function's file an error is from."""
-    code = recipe.trace.__code__
-    lines = [each for each in traceback.extract_tb(error.__traceback__) if each.filename == code.co_filename]
-    return f" in line {lines[-1].lineno}, {lines[-1].line!r}" if lines else ""
+    path = recipe.trace.__code__.co_filename
+    lines = [each for each in traceback.extract_tb(error.__traceback__) if each.filename == path]
+    return f" ({Path(path).name}, line {lines[-1].lineno}: {lines[-1].line})" if lines else ""
 
 
 class _Placed(Placement):
