@@ -13,19 +13,22 @@ from robots_at_hand import subject
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.energy import kinetic_energy, potential_energy
 from psdmc.dynamics.kinematics import jacobian
-from psdmc.dynamics.named_frames import frame_jacobians, placed_frames
+from psdmc.dynamics.named_frames import frame_jacobians, link_wrenches, placed_frames
 from psdmc.dynamics.newton_euler import inverse_dynamics
-from psdmc.dynamics.scalar import dot
+from psdmc.dynamics.scalar import ZERO, Scalar, dot
 from psdmc.dynamics.solve import factorize, solve
 from psdmc.functions import RECIPES
+from psdmc.functions.inverse_dynamics_with_wrenches import WRENCHES
 from psdmc.lower.kernels import lower
 from psdmc.lower.scoring import SINGLE
 from psdmc.lower.search import Search
 from psdmc.program.interpret import interpret
 from psdmc.program.signature import QD, QDD, Q, Quantity, Signature, Sizes
+from psdmc.program.slopes import gradients, slopes
 from psdmc.recipes.accelerations import PIVOTS
 from psdmc.recipes.recipe import Ingredients, Outputs, Recipe
 from psdmc.recipes.regressor_rows import traced_rows
+from psdmc.recipes.torques import torques
 
 STIFFNESS = 300.0
 """N/m, of a spring between the base and the tip."""
@@ -42,7 +45,7 @@ def mobility(g: Ingredients) -> Outputs:
     }
 
 
-def pinocchios_mobility(model, data, tip, q, qd, qdd):
+def pinocchios_mobility(model, data, tip, q, qd=None, qdd=None):
     rows = pin.computeFrameJacobian(model, data, q, tip, pin.LOCAL_WORLD_ALIGNED)[:3]
     return rows @ np.linalg.solve(pin.crba(model, data, q), rows.T)
 
@@ -54,7 +57,7 @@ def held_energy(g: Ingredients) -> Outputs:
     return {"V": fallen + 0.5 * g.si(STIFFNESS, "N/m") * dot(point, point)}
 
 
-def pinocchios_held_energy(model, data, tip, q, qd, qdd):
+def pinocchios_held_energy(model, data, tip, q, qd=None, qdd=None):
     pin.framesForwardKinematics(model, data, q)
     point = np.array(data.oMf[tip].translation)
     fallen = pin.computePotentialEnergy(model, data, q)
@@ -69,7 +72,7 @@ def distance(g: Ingredients) -> Outputs:
     return {"d": dot(point, point)}
 
 
-def pinocchios_distance(model, data, tip, q, qd, qdd):
+def pinocchios_distance(model, data, tip, q, qd=None, qdd=None):
     pin.framesForwardKinematics(model, data, q)
     return np.sum(np.square(data.oMf[tip].translation))
 
@@ -80,7 +83,7 @@ def links_energy(g: Ingredients) -> Outputs:
     return {"T": kinetic_energy(g.frames, g.link_bodies(), still, g.inputs["q"], g.inputs["qd"])}
 
 
-def pinocchios_links_energy(model, data, tip, q, qd, qdd):
+def pinocchios_links_energy(model, data, tip, q, qd=None, qdd=None):
     links = pin.Model(model)
     links.armature = np.zeros(model.nv)
     return pin.computeKineticEnergy(links, links.createData(), q, qd)
@@ -103,9 +106,36 @@ def tip_force(g: Ingredients) -> Outputs:
     return {"f": sum(x * x for x in moved)}
 
 
-def pinocchios_tip_force(model, data, tip, q, qd, qdd):
+def pinocchios_tip_force(model, data, tip, q, qd=None, qdd=None):
     moved = pin.computeFrameJacobian(model, data, q, tip, pin.LOCAL)[:3] @ pin.rnea(model, data, q, qd, qdd)
     return moved @ moved
+
+
+def held(g: Ingredients) -> tuple[Scalar, ...]:
+    """Torques at rest under a wrench at the tip."""
+    wrenches = [g.inputs["wrenches"]]
+    return torques(g, g.still, g.still, ZERO, external=link_wrenches(g.named, wrenches))
+
+
+def by_wrench(g: Ingredients) -> Outputs:
+    """Derivatives of the torques' sum by the wrench, in reverse mode."""
+    tau = held(g)
+    ((*found,),) = gradients(tau, [1.0] * len(tau), [g.inputs["wrenches"]])
+    return {"d": found}
+
+
+def pinocchios_by_wrench(model, data, tip, q, wrench):
+    return -pin.computeFrameJacobian(model, data, q, tip, pin.LOCAL).sum(axis=1)
+
+
+def along_wrench(g: Ingredients) -> Outputs:
+    """The derivative of the torques' sum along the wrench, in forward mode."""
+    wrench = g.inputs["wrenches"]
+    return {"d": sum(slopes(held(g), wrench, wrench))}
+
+
+def pinocchios_along_wrench(model, data, tip, q, wrench):
+    return pinocchios_by_wrench(model, data, tip, q, wrench) @ wrench
 
 
 def regressed(g: Ingredients) -> Outputs:
@@ -113,7 +143,7 @@ def regressed(g: Ingredients) -> Outputs:
     return {"Y": traced_rows(g, g.inputs["qdd"])}
 
 
-def pinocchios_regressed(model, data, tip, q, qd, qdd):
+def pinocchios_regressed(model, data, tip, q, qd=None, qdd=None):
     return pin.rnea(model, data, q, qd, qdd)
 
 
@@ -126,8 +156,12 @@ CASES: list[
     (links_energy, (Q, QD), Quantity("T", unit="J"), pinocchios_links_energy),
     (regressed, (Q, QD, QDD), Quantity("Y", ("nv", "l"), unit="J", powers=(-1, -1)), pinocchios_regressed),
 ]
-TURNING = (tip_force, (Q, QD, QDD), Quantity("f", unit="kg^2 m^6/s^4"), pinocchios_tip_force)
-"""A sum over joints that turn: torques and forces are unlike."""
+TURNING = [
+    (tip_force, (Q, QD, QDD), Quantity("f", unit="kg^2 m^6/s^4"), pinocchios_tip_force),
+    (by_wrench, (Q, WRENCHES), Quantity("d", ("6",), unit="1", powers=(1,)), pinocchios_by_wrench),
+    (along_wrench, (Q, WRENCHES), Quantity("d", unit="J"), pinocchios_along_wrench),
+]
+"""Sums over joints that all turn: torques and forces are unlike."""
 
 
 def sizes_of(model) -> Sizes:
@@ -143,14 +177,15 @@ def recipe(trace, inputs, output) -> Recipe:
 
 @pytest.mark.parametrize("theta", [False, True])
 @pytest.mark.parametrize(
-    ("robot", "case"), [(robot, case) for robot in ("kr6", "scara") for case in CASES] + [("kr6", TURNING)]
+    ("robot", "case"),
+    [(robot, case) for robot in ("kr6", "scara") for case in CASES] + [("kr6", case) for case in TURNING],
 )
 def test_a_function_is_pinocchios_in_si(robot, case, theta, monkeypatch):
     trace, inputs, output, oracle = case
     own, name = recipe(trace, inputs, output), trace.__name__
     monkeypatch.setitem(RECIPES, name, own)
     model, reference, rng = subject(robot).model, subject(robot).pinocchio, np.random.default_rng(5)
-    states = {each.name: rng.uniform(-2, 2, (20, model.nq)) for each in (Q, QD, QDD)}
+    states = {each.name: rng.uniform(-2, 2, (20, sizes_of(model).size(each))) for each in inputs}
     known = {"theta_b": model.theta_b}
 
     kernel = lower(model, "factored", (name,))[name + "_theta" * theta]
