@@ -119,12 +119,12 @@ class DynamicsModel(Answers):
 
     @property
     def n(self) -> int:
-        """Return the number of joints, with mimic joints, which follow another joint."""
+        """Return the number of joints. Mimic joints, which follow another joint, are counted, too."""
         return len(self.mechanism)
 
     @property
     def nq(self) -> int:
-        """Return the length of q: the joint positions, with four entries for a quaternion."""
+        """Return the number of entries of q. A joint with one coordinate has one entry, and a quaternion has four."""
         return self.mechanism.nq
 
     @property
@@ -156,7 +156,9 @@ class DynamicsModel(Answers):
 
     @property
     def p(self) -> int | None:
-        """Return the number of monomials, which are products of powers of q, sin q, cos q, qd and qdd.
+        """Return the number of monomials in the model's torques.
+
+        A monomial is a product of powers of q, sin q, cos q, qd and qdd.
 
         p is None if the model was derived with `expand=False`.
         """
@@ -187,8 +189,9 @@ class DynamicsModel(Answers):
         """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b from base parameters theta_b.
 
         Many vectors of standard parameters have the same theta_b, and R gives one of them. In x, the pivot of each base
-        parameter (see `pivots`) has the value of the base parameter. All other standard parameters are zero, except those
-        that an assumption such as `assume_zero` makes proportional to a pivot. For every theta_b, B @ x equals theta_b.
+        parameter (see `pivots`) has the value of the base parameter, and all other standard parameters are zero. There is
+        one exception: an assumption such as `assume_zero` can tie a standard parameter to a pivot by a fixed factor. Then
+        x contains the value of the pivot times this factor. B @ R is the identity, with the model's matrix B, (l, 11n).
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -240,9 +243,10 @@ class DynamicsModel(Answers):
     def equivalent_parameters(self) -> Array:
         """Return a vector of standard parameters that gives the same torques as the model.
 
-        The vector has 11 numbers for each of the n links, and is `representative @ theta_b`, a product of the model's
-        matrix `representative` (11n, l) with the base parameters. Many other vectors give the same
-        torques. The returned vector does not describe the real links, and can contain negative masses.
+        The vector has 11 numbers for each of the n links: mass, first moments (3), inertias (6) and the drive inertia of
+        its joint. It is `representative @ theta_b`, with the model's matrix `representative`, (11n, l). Many other
+        vectors give the same torques. The returned vector does not describe the real links, and can contain negative
+        masses.
 
         Raises InputError if theta_b is unknown.
         """

@@ -189,11 +189,7 @@ TAU = Quantity(
 
 def jacobian_of(output: str, by: str) -> Quantity:
     """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
-    entry = (
-        "q in the direction of joint rate j (q[j] for joints with one coordinate)"
-        if by == "q"
-        else f"{by}[j]"
-    )
+    entry = "q along joint rate j (of q[j], if every joint has one coordinate)" if by == "q" else f"{by}[j]"
     known = {quantity.name: quantity for quantity in (Q, QD, QDD, TAU)}
     above, below = known.get(output, TAU), known[by]
     unit = str(times(above.dimension, below.dimension, -1))

@@ -45,7 +45,7 @@ GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
     Quantity(
         f"grad_{each.name}",
         ("nv",),
-        means=f"gradient of the weighted sum by {each.name}, one entry per joint rate",
+        means=f"gradient of the weighted sum by {each.name}; entry j is for a change along joint rate j",
         unit=str(dimensions.times(dimensions.dimension_of("J"), each.dimension, -1)),
         powers=(-each.powers[0],),
     )
