@@ -55,9 +55,9 @@ class Quantity:
     largest  SI; tests draw an input from plus or minus this
     means    what Python's documentation says of it, with the unit
     unit     SI unit that all entries have in common, such as 'kg m^2/s'; traces need it (lower/units.py)
-    powers   for each axis, which power of its own units is in the unit of an entry; left out: none. nq, nv and nx have the
-             units of coordinates (rad or m; of nx the second half: per second), l those of base parameters, and 6 has m
-             three times and 1 three times
+    powers   for each axis, the power of its own units in the unit of an entry; left out: zero. nq and nv have the units of
+             joint coordinates (rad or m), nx those of nv and then the same per second, l those of base parameters. The
+             first three of 6 are m, the others 1
     """
 
     name: str
@@ -71,6 +71,8 @@ class Quantity:
         wrong = [axis for axis in self.axes if axis not in WORDS and not axis.isdecimal()]
         if wrong or not self.name.isidentifier():
             raise ValueError(f"{self.name!r} with axes {self.axes}: an axis is a number or one of {WORDS}")
+        if len(self.powers) not in (0, len(self.axes)):
+            raise ValueError(f"{self.name!r} has {len(self.powers)} powers for {len(self.axes)} axes")
 
     @property
     def dimension(self) -> Dimension:
@@ -81,7 +83,7 @@ class Quantity:
         """The dimension of each entry, row by row; `axes` gives the own ones along each axis that is not a number."""
         found = [self.dimension]
         for axis, power in zip(self.axes, self.powers or (0,) * len(self.axes), strict=True):
-            own = axes.get(axis) or [NUMBER] * int(axis)
+            own = axes[axis] if axis in axes else [NUMBER] * int(axis)
             found = [times(each, along, power) for each in found for along in own]
         return found
 
