@@ -175,7 +175,10 @@ class DynamicsModel(Answers):
 
     @property
     def is_reduced(self) -> bool:
-        """True if every base parameter has a pivot (see `pivots`), as in every model that psdmc derives."""
+        """True if each base parameter contains, with factor one, a standard parameter that no other base parameter contains.
+
+        This standard parameter is its pivot (see `pivots`). Every model that psdmc derives has pivots.
+        """
         return bool(self._leads.any(axis=1).all())
 
     @property
@@ -272,10 +275,11 @@ class DynamicsModel(Answers):
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the axes of the link frames
             drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the drive inertias of the model
 
-        Pass the result as the argument `theta_b` of a function. Raises InputError if a number is not finite, or
-        exceeds the limit for numbers in robot files, or if a mass is negative. Raises InputError also if an inertia is not
-        symmetric or belongs to a link without mass, or if a link contradicts an assumption of the model, such as
-        `assume_zero`. Warns if an inertia is physically impossible for a rigid body.
+        Pass the result as the argument `theta_b` of a function. Warns if no rigid body can have a given inertia.
+
+        Raises InputError if a number is not finite, or is larger than robot files allow, or if a mass is negative. Raises
+        InputError also if an inertia is not symmetric, or belongs to a link without mass. The same error is raised if a
+        value is not zero, but the model was derived with the assumption that it is (option `assume_zero`).
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
@@ -385,8 +389,9 @@ class DynamicsModel(Answers):
             joint    name of the joint, or its number: 0 is the first joint
             numbers  True: the sum contains the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        The symbols q1, qd1 and qdd1 are for the first joint. Raises InputError if the robot has no such joint, if the model
-        has no E and P, or if the torque has more than 2,000 monomials. Raises ToolchainError if SymPy is missing.
+        The symbols q1, qd1 and qdd1 are for joint 0. Raises InputError if the robot has no such joint, or if the torque
+        has more than 2,000 monomials. Raises InputError also if the model has no monomials, for example because it was
+        derived with `expand=False`. Raises ToolchainError if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
         return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)

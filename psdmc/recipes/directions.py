@@ -29,15 +29,16 @@ COTANGENT = Quantity("cotangent", ("nv",), means="weights of the weighted sum", 
 
 COTANGENT_OF_QDD = replace(COTANGENT, unit="J s^2", powers=(-1,))
 
-DQ, DQD, DQDD, DTAU = (
-    replace(
-        each,
-        name=f"d{each.name}",
-        axes=("nv",),
-        largest=1.0,
-        means=f"direction of {each.name}: its change, one entry per joint rate",
-    )
+_ENTRY = {
+    each: f"{each.name}; entry j is for "
+    f"{'a change of q along joint rate j' if each is Q else f'{each.name}[j]'}"
     for each in (Q, QD, QDD, TAU)
+}
+"""What an entry per joint rate belongs to."""
+
+DQ, DQD, DQDD, DTAU = (
+    replace(each, name=f"d{each.name}", axes=("nv",), largest=1.0, means=f"change of {entry}")
+    for each, entry in _ENTRY.items()
 )
 """Directions of inputs, and derivatives of outputs along them."""
 
@@ -45,11 +46,11 @@ GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
     Quantity(
         f"grad_{each.name}",
         ("nv",),
-        means=f"gradient of the weighted sum by {each.name}; entry j is for a change along joint rate j",
+        means=f"gradient of the weighted sum by {entry}",
         unit=str(dimensions.times(dimensions.dimension_of("J"), each.dimension, -1)),
         powers=(-each.powers[0],),
     )
-    for each in (Q, QD, QDD, TAU)
+    for each, entry in _ENTRY.items()
 )
 GRADIENT_THETA = Quantity(
     "grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b", unit="J", powers=(-1,)
