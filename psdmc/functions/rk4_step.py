@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from psdmc.robot.reference import Reference
 
 STAGE_PIVOTS = Positive(
-    Quantity("pivot", ("4", "nv")),
+    Quantity("pivot", ("4", "nv"), unit="J s^2", powers=(0, -2)),
     which=f"{PIVOTS.which}, + n times the stage of the step",
     spoilt="states",
 )

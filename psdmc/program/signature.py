@@ -4,11 +4,12 @@ signature names, emission prints it."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from psdmc.errors import InternalError
+from psdmc.program.dimensions import NUMBER, Dimension, dimension_of, times
 from psdmc.program.products import Product
 
 WORDS = ("n", "nq", "nv", "nx", "l", "frames", "nonzeros")
@@ -53,17 +54,38 @@ class Quantity:
     axes     each a word of WORDS or a number
     largest  SI; tests draw an input from plus or minus this
     means    what Python's documentation says of it, with the unit
+    unit     SI unit that all entries have in common, such as 'kg m^2/s'; traces need it (lower/units.py)
+    powers   for each axis, the power of its own units in the unit of an entry; left out: zero. nq and nv have the units of
+             joint coordinates (rad or m), nx those of nv and then the same per second, l those of base parameters. The
+             first three of 6 are m, the others 1
     """
 
     name: str
     axes: tuple[str, ...] = ()
     largest: float = 1.0
     means: str = ""
+    unit: str = ""
+    powers: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         wrong = [axis for axis in self.axes if axis not in WORDS and not axis.isdecimal()]
         if wrong or not self.name.isidentifier():
             raise ValueError(f"{self.name!r} with axes {self.axes}: an axis is a number or one of {WORDS}")
+        if len(self.powers) not in (0, len(self.axes)):
+            raise ValueError(f"{self.name!r} has {len(self.powers)} powers for {len(self.axes)} axes")
+
+    @property
+    def dimension(self) -> Dimension:
+        """What all entries have in common."""
+        return dimension_of(self.unit)
+
+    def dimensions(self, axes: Mapping[str, Sequence[Dimension]]) -> list[Dimension]:
+        """The dimension of each entry, row by row; `axes` gives the own ones along each axis that is not a number."""
+        found = [self.dimension]
+        for axis, power in zip(self.axes, self.powers or (0,) * len(self.axes), strict=True):
+            own = axes[axis] if axis in axes else [NUMBER] * int(axis)
+            found = [times(each, along, power) for each in found for along in own]
+        return found
 
     @property
     def is_matrix(self) -> bool:
@@ -152,16 +174,27 @@ def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
 
 
 Q = Quantity(
-    "q", ("nq",), math.pi, "joint positions: rad or m, or a unit quaternion for a ball joint or floating base"
+    "q",
+    ("nq",),
+    math.pi,
+    "joint positions: rad or m, or a unit quaternion for a ball joint or floating base",
+    "1",
+    (1,),
 )
-QD = Quantity("qd", ("nv",), 3.0, "joint rates, rad/s or m/s")
-QDD = Quantity("qdd", ("nv",), 5.0, "joint accelerations, rad/s^2 or m/s^2")
-TAU = Quantity("tau", ("nv",), means="joint torques (N m), or forces (N) of sliding joints")
+QD = Quantity("qd", ("nv",), 3.0, "joint rates, rad/s or m/s", "1/s", (1,))
+QDD = Quantity("qdd", ("nv",), 5.0, "joint accelerations, rad/s^2 or m/s^2", "1/s^2", (1,))
+TAU = Quantity(
+    "tau", ("nv",), means="joint torques (N m), or forces (N) of sliding joints", unit="J", powers=(-1,)
+)
 """Those of q, qd and qdd if states are drawn."""
 
 
 def jacobian_of(output: str, by: str) -> Quantity:
     """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
     entry = "q along joint rate j (of q[j], if every joint has one coordinate)" if by == "q" else f"{by}[j]"
+    known = {quantity.name: quantity for quantity in (Q, QD, QDD, TAU)}
+    above, below = known.get(output, TAU), known[by]
+    unit = str(times(above.dimension, below.dimension, -1))
+    powers = (above.powers[0], -below.powers[0])
     means = f"derivatives of {output} by {by}: row i for {output}[i], column j for a change of {entry}"
-    return Quantity(f"d{output}_d{by}", ("nv", "nv"), means=means)
+    return Quantity(f"d{output}_d{by}", ("nv", "nv"), means=means, unit=unit, powers=powers)

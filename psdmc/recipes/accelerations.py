@@ -13,7 +13,7 @@ from psdmc.recipes.recipe import Ingredients
 from psdmc.recipes.torques import torques
 
 PIVOTS = Positive(
-    Quantity("pivot", ("nv",)),
+    Quantity("pivot", ("nv",), unit="J s^2", powers=(-2,)),
     which="the number of the joint, from 0, at which the mass matrix is not positive definite",
     spoilt="accelerations",
 )
