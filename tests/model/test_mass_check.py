@@ -10,6 +10,7 @@ import pytest
 from bundled import bundled_model, bundled_robot
 
 from psdmc.derivation.derive import derive_model
+from psdmc.model import mass_check
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.mass_check import check_mass_matrix, is_surely_positive
 from psdmc.robot.load import load_robot_text
@@ -53,6 +54,30 @@ def test_cholesky_leaves_to_eigenvalues_what_it_does_not_prove():
     point = derive_model(load_robot_text(FINGER.format(arm=1, length=0, small=0), "urdf").chain)
 
     assert not any(map(is_surely_positive, (*cases, point)))
+
+
+@pytest.mark.parametrize(
+    ("matrix", "is_sure"),
+    [
+        ([[1.0, 0.5], [0.5, 1.0]], True),
+        ([[1.0, 2.0], [2.0, 1.0]], False),
+        ([[1.0, 1.0 - 1e-15], [1.0 - 1e-15, 1.0]], False),
+        ([[1.0, 0.0], [0.0, 1e-30]], False),
+    ],
+    ids=[
+        "eigenvalues 0.5 and 1.5",
+        "eigenvalues -1 and 3",
+        "an eigenvalue of 1e-15",
+        "an inertia of rounding",
+    ],
+)
+def test_cholesky_proves_only_what_eigenvalues_in_closed_form_say(
+    monkeypatch: pytest.MonkeyPatch, matrix: list[list[float]], is_sure: bool
+):
+    """The eigenvalues of [[1, c], [c, 1]] are 1 - c and 1 + c."""
+    monkeypatch.setattr(mass_check.recursive, "mass_matrix", lambda *_: np.tile(matrix, (2000, 1, 1)))
+
+    assert is_surely_positive(bundled_model("two_link")) == is_sure
 
 
 def test_a_negative_inertia_is_found_and_named():
