@@ -63,5 +63,6 @@ RECIPE = Recipe(
     "computeGeneralizedGravityDerivatives",
     pinocchio,
     shares="inverse_dynamics",
+    in_limbs=True,
     beside="inverse_dynamics",
 )

@@ -12,11 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import compress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from psdmc.program.cost import Cost, counted
 from psdmc.program.lanes import Lanes
 from psdmc.program.program import Instr, Op, Program, Slot, operation
+
+if TYPE_CHECKING:
+    from psdmc.program.limb_sums import LimbSums
 
 Number = float | int
 Constant = Number | Lanes
@@ -57,13 +60,14 @@ def constants_of(group: int) -> str:
 class Tracer:
     """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
 
-    __slots__ = ("_places", "constants", "known", "lane_constants", "steps")
+    __slots__ = ("_places", "constants", "known", "lane_constants", "limb_sums", "steps")
 
     def __init__(self) -> None:
         self.steps: list[Step] = []
         self.known: dict[Step, int] = {}
         self.constants: dict[int, Any] = {}
         self.lane_constants: dict[int, list[tuple[float, ...]]] = {}
+        self.limb_sums: LimbSums | None = None
         self._places: dict[float | Lanes, int] = {}
 
     def symbols(self, vector: str, count: int) -> list[Symbol]:
@@ -113,7 +117,9 @@ class Tracer:
         return index
 
     def arguments(self, index: int) -> tuple[int, ...]:
-        """The indices of the values that a step is computed from."""
+        """The indices of the values that a value is computed from; of a sum over limbs the one that is summed."""
+        if self.limb_sums is not None and index in self.limb_sums.summed:
+            return (self.limb_sums.summed[index],)
         return arguments_of(self.steps[index])
 
     def finish(self, outputs: Outputs) -> Program:
