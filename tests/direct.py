@@ -23,11 +23,11 @@ def write_sources(package: PackageView, folder: Path) -> Path:
     return folder
 
 
-def shared_library(package: PackageView, folder: Path, flags: Sequence[str]) -> Path:
+def shared_library(package: PackageView, folder: Path, flags: Sequence[str], compiler: str = "gcc") -> Path:
     write_sources(package, folder)
     sources = [str(folder / source) for source in package.sources]
     library = folder / "library.so"
-    words = ["gcc", "-std=c99", *flags, "-fPIC", "-shared", f"-I{folder}/include", *sources, "-lm"]
+    words = [compiler, "-std=c99", *flags, "-fPIC", "-shared", f"-I{folder}/include", *sources, "-lm"]
     subprocess.run([*words, "-o", str(library)], check=True)
     return library
 
