@@ -12,14 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import compress
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from psdmc.program.cost import Cost, counted
 from psdmc.program.lanes import Lanes
 from psdmc.program.program import Instr, Op, Program, Slot, operation
-
-if TYPE_CHECKING:
-    from psdmc.program.limb_sums import LimbSums
 
 Number = float | int
 Constant = Number | Lanes
@@ -57,6 +54,18 @@ def constants_of(group: int) -> str:
     return f"{group_name(group)}_constants"
 
 
+class SumsOverLimbs(Protocol):
+    """What a tracer knows of its sums over limbs (limb_sums.py)."""
+
+    summed: dict[int, int]
+
+    def group_of(self, index: int) -> int:
+        """The number of the group whose limbs a value differs between; -1: of none."""
+
+    def total(self, group: int, value: Symbol | Constant) -> Symbol | Constant:
+        """The sum over a group's limbs of a scalar that is one for each of them."""
+
+
 class Tracer:
     """Collects steps; `symbols` makes inputs, `finish` makes the PROGRAM."""
 
@@ -67,7 +76,7 @@ class Tracer:
         self.known: dict[Step, int] = {}
         self.constants: dict[int, Any] = {}
         self.lane_constants: dict[int, list[tuple[float, ...]]] = {}
-        self.limb_sums: LimbSums | None = None
+        self.limb_sums: SumsOverLimbs | None = None
         self._places: dict[float | Lanes, int] = {}
 
     def symbols(self, vector: str, count: int) -> list[Symbol]:
