@@ -62,7 +62,7 @@ def test_nothing_else_lists_functions() -> None:
 
 def test_functions_that_can_fail_need_a_positive_mass_matrix() -> None:
     for recipe in RECIPES.values():
-        assert (recipe.needs is Needs.POSITIVE_MASS) == (recipe.signature.positive is not None), recipe.name
+        assert (recipe.needs is Needs.POSITIVE_MASS) == (bool(recipe.signature.factorises)), recipe.name
 
 
 def test_recipes_only_lean_on_functions_that_there_are() -> None:
