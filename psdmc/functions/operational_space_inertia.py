@@ -96,7 +96,7 @@ def pinocchio(robot: Reference, given: Mapping[str, Array]) -> Arrays:
         rows = [pin.computeFrameJacobian(model, data, q, frame, aligned) for frame in robot.frame_ids]
         jacobians = np.reshape(rows, (-1, 6, model.nv))
         seen = jacobians @ np.linalg.solve(mass, np.swapaxes(jacobians, -1, -2))
-        return np.linalg.inv(seen + mu * np.eye(6))
+        return np.asarray(np.linalg.inv(seen + mu * np.eye(6)), np.float64)
 
     return {"Lambda": robot.each(inertias, given["q"], np.reshape(given[MU.name], (-1, 1)))}
 

@@ -99,9 +99,8 @@ class Signature:
     inputs    read, in this order
     outputs   written, in this order
     theta     whether a variant exists that takes theta_b (length l) at run time
-    factorises  symmetric matrices that it factorises, in the order of their pivots' numbers. Their pivots are computed beside
-              the outputs: if one is not positive the function fails, its outputs are NaN and it returns which; none: it
-              cannot fail
+    factorises  symmetric matrices, in the order of their pivots' numbers. The pivots are computed beside the outputs: if one
+              is not positive the function fails, its outputs are NaN and it returns which; none: it cannot fail
     products  how outputs that a trace does not give follow from what it gives
     normalizes  whether quaternions that it reads may have any length but zero
     summary   a sentence on what it computes, for Python and the table of docs/functions.md

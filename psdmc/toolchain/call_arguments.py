@@ -141,7 +141,7 @@ def indefinite(
         pivot -= math.prod(shape)
     if not matrix.error:
         return None
-    places = zip(matrix.axes, np.unravel_index(pivot, shape), strict=True)
+    places = zip(matrix.axes, map(int, np.unravel_index(pivot, shape)), strict=True)
     names = {axis: axes.names[axis][k] for axis, k in places if axis in axes.names}
     where = f" in state {', '.join(map(str, state))}" if state else ""
     return InputError(f"{function.name}: {matrix.error.format(**names, **scalars)}{where}", matrix.hint)
@@ -159,7 +159,7 @@ def finite_states(function: Signature, arrays: Sequence[Array]) -> NDArray[np.bo
         np.isfinite(array).all(axis=tuple(range(-len(quantity.axes), 0)))
         for quantity, array in zip(function.inputs, arrays, strict=True)
     ]
-    return np.logical_and.reduce(each)
+    return np.asarray(np.logical_and.reduce(each))
 
 
 Shapes = Sequence[tuple[int, ...]]

@@ -298,6 +298,7 @@ class CompiledFunctions(RobotFacts):
     ) -> None:
         """InputError for the first state, of finite inputs, in which a matrix is not positive definite that has an error."""
         tails = [self._sizes.shape(quantity.axes) for quantity in function.inputs]
+        assert kernel.single is not None
         given = [row.reshape(lead + tail) for row, tail in zip(rows, tails, strict=False)]
         failed = finite_states(function, given) & np.isnan(outs[0]).reshape(*lead, -1).any(axis=-1)
         for state in map(tuple, np.argwhere(failed).tolist()):

@@ -6,6 +6,7 @@ import ast
 import re
 import sys
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -106,8 +107,9 @@ def test_sizes_have_one_meaning_each_and_quantities_are_explained() -> None:
     for signature in SIGNATURES.values():
         assert re.fullmatch(r"(Compute|Return) .*\.", signature.summary)
         assert all(quantity.means for quantity in (*signature.inputs, *signature.outputs)), signature.name
-        for quantity in (*signature.inputs, *signature.stored):
-            assert all(axis in WORDS or axis.isdecimal() for axis in quantity.axes)
+        axes = [quantity.axes for quantity in (*signature.inputs, *signature.outputs)]
+        for axis in chain(*axes, *(matrix.axes for matrix in signature.factorises)):
+            assert axis in WORDS or axis.isdecimal()
 
 
 @pytest.mark.parametrize("name", list(RECIPES))

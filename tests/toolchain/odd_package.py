@@ -7,8 +7,8 @@ from psdmc.backends.info import JointInfo, PackageInfo
 from psdmc.backends.options import EmitOptions
 from psdmc.backends.reference_states import ReferenceStates
 from psdmc.model.equations import BaseParameter
-from psdmc.program.kernel import Kernel
 from psdmc.program.factorisation import Structure, SymmetricMatrix
+from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Q, Quantity, Signature
 from psdmc.program.trace import Slot, Tracer
 
