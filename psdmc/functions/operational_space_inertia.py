@@ -18,7 +18,7 @@ from psdmc.program.operations import Op
 from psdmc.program.signature import PIVOTS, Q, Quantity, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX
 from psdmc.recipes.on_arrays import RobotOnArrays, entries
-from psdmc.recipes.pivots import inverse_and_pivots
+from psdmc.recipes.pivots import inverse_and_sign
 from psdmc.recipes.recipe import Arrays, Ingredients, Outputs, Recipe
 from psdmc.robot.mechanism import Array
 
@@ -35,8 +35,8 @@ MU = Quantity(
 SEEN_BY_FRAMES = SymmetricMatrix(
     "J M^-1 J^T + mu I",
     Structure.BLOCKS,
-    ("frames", "6"),
-    number="6 k + r if J M^-1 J^T + mu I of frame k is not positive definite, found in its row r (both from 0)",
+    ("frames",),
+    number="the number, from 0, of the named frame at which J M^-1 J^T + mu I is not positive definite",
     failure="J M^-1 J^T + mu I of a frame is not positive definite, as with mu = 0 if the frame cannot move in all six "
     "directions,",
     error="frame {frames!r}: J M^-1 J^T + mu I is not positive definite at mu = {mu:g}",
@@ -52,10 +52,10 @@ def trace(g: Ingredients) -> Outputs:
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
     metric = [replace(frame, translation=scale(frame.translation, g.unit)) for frame in g.frames]
     jacobians = frame_jacobians(metric, g.named, q, g.root)
-    found, pivots = zip(
-        *(_inverse_and_pivots(_regularised(factors, rows, mu), mu) for rows in jacobians), strict=True
+    found, signs = zip(
+        *(_inverse_and_sign(_regularised(factors, rows, mu), mu) for rows in jacobians), strict=True
     )
-    return {"Lambda": list(found), PIVOTS: [list(factors.pivots), list(pivots)]}
+    return {"Lambda": list(found), PIVOTS: [*factors.pivots, *signs]}
 
 
 def _regularised(factors: Factors, jacobian: Rows, mu: Scalar) -> Rows:
@@ -64,25 +64,25 @@ def _regularised(factors: Factors, jacobian: Rows, mu: Scalar) -> Rows:
     return [[entry + mu if i == j else entry for j, entry in enumerate(row)] for i, row in enumerate(rows)]
 
 
-def _inverse_and_pivots(rows: Rows, mu: Scalar) -> tuple[Rows, list[Scalar]]:
-    """As `inverse_and_pivots`; if mu is negative, it is the first pivot."""
-    found, (first, *others) = inverse_and_pivots(rows)
-    return found, [Op.SELECT(mu, 0.0, mu, first), *others]
+def _inverse_and_sign(rows: Rows, mu: Scalar) -> tuple[Rows, Scalar]:
+    """As `inverse_and_sign`; -1 also if mu is negative."""
+    found, sign = inverse_and_sign(rows)
+    return found, Op.SELECT(mu, 0.0, -1.0, sign)
 
 
 def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
-    """Also all pivots: if one of a state is not positive, Lambda means nothing there."""
+    """Also what must be positive for Lambda to mean anything."""
     q, mu = list(given["q"].T), np.reshape(given[MU.name], -1)
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     factors = factorize([list(row) for row in mass])
     jacobians = frame_jacobians(robot.frames, robot.chain.frames, q)
     matrices = [_regularised(factors, rows, mu) for rows in jacobians]
     with np.errstate(all="ignore"):
-        pivots = [pivot for rows in matrices for pivot in _inverse_and_pivots(rows, mu)[1]]
+        signs = [_inverse_and_sign(rows, mu)[1] for rows in matrices]
         found = reproducible.inverse(entries(matrices, len(mu)))
     return {
         "Lambda": (found + np.swapaxes(found, -1, -2)) / 2,
-        PIVOTS: entries([*factors.pivots, *pivots], len(mu)),
+        PIVOTS: entries([*factors.pivots, *signs], len(mu)),
     }
 
 

@@ -31,8 +31,8 @@ class SymmetricMatrix:
 
     name       in sentences
     structure  how its entries lie
-    axes       lengths, whose product is the number of pivots; of blocks, the last is the number of a block's rows
-    number     which number a pivot has that is not positive, for C: words that follow "1 + "
+    axes       lengths of what must be positive: pivots, or one sign for each block
+    number     which number a pivot or sign has that is not positive, for C: words that follow "1 + "
     failure    what has happened then, in Python's documentation: words that follow "If "
     error      one line that Python raises as an error, in which {axis} stands for the name of an entry of that axis (such
                as {frames}) and {input} for a scalar input; empty: the results of such a state are NaN
@@ -48,7 +48,7 @@ class SymmetricMatrix:
     hint: str = ""
 
     def __post_init__(self) -> None:
-        if (len(self.axes) > 1) != (self.structure is Structure.BLOCKS):
+        if not self.axes or (len(self.axes) > 1 and self.structure is not Structure.BLOCKS):
             raise ValueError(f"{self.name}: {self.structure} with axes {self.axes}")
 
     def in_blocks(self, count: str, number: str, failure: str) -> SymmetricMatrix:

@@ -180,7 +180,7 @@ def in_order(signatures: Sequence[Signature]) -> tuple[Signature, ...]:
 
 
 PIVOTS = "pivot"
-"""What the pivots of a function's matrices are called in its traces."""
+"""What the pivots and signs of a function's matrices are called in its traces."""
 
 Q = Quantity(
     "q", ("nq",), math.pi, "joint positions: rad or m, or a unit quaternion for a ball joint or floating base"

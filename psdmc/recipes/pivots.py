@@ -13,15 +13,16 @@ LOST = 64.0
 so many roundings: 7.1e-15 in float64, 3.8e-6 in float32. That of arms with too few joints is up to 10 roundings."""
 
 
-def inverse_and_pivots(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """The inverse of a symmetric matrix, and its pivots: those of a row that the others explain but for rounding are -1.
+def inverse_and_sign(rows: Sequence[Sequence[Scalar]]) -> tuple[list[list[Scalar]], Scalar]:
+    """The inverse of a symmetric matrix, and 1 if the matrix is positive definite, -1 if it is not, or is singular but for
+    rounding.
 
     Rounding gives a singular matrix pivots of any sign, but its inverse is large, in whatever order it is eliminated. In
-    x < x + 1 the 1 is lost if x is too large for the precision of the code's reals.
+    x < x + 1 the 1 is lost if x is too large for the precision of the code's reals. Nothing is less than NaN.
     """
     factors = factorize(rows)
-    found, pivots = inverse(factors), []
+    found, sign = inverse(factors), 1.0
     for k, pivot in enumerate(factors.pivots):
         x = LOST * (rows[k][k] * found[k][k])
-        pivots.append(Op.SELECT(x, x + 1.0, pivot, -1.0))
-    return found, pivots
+        sign = Op.SELECT(0.0, pivot, Op.SELECT(x, x + 1.0, sign, -1.0), -1.0)
+    return found, sign
