@@ -18,7 +18,7 @@ from psdmc.program.cost import cost
 from psdmc.program.kernel import Kernel
 from psdmc.program.signature import Quantity, Sizes
 
-LOCAL = re.compile(r"t\d+|(sin|cos)_\d+|entry|fma|sqrt|sin_cos")
+LOCAL = re.compile(r"t\d+|(sin|cos)_\d+|entry|fma|select|sqrt|sin_cos")
 """Names of a body's own; no quantity may have one."""
 
 ARRAYS = """Arrays: matrices are arrays of rows. Quaternions, and cosine and sine of an angle, are of length one."""
