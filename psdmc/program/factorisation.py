@@ -32,7 +32,7 @@ class SymmetricMatrix:
     name       in sentences
     structure  how its entries lie
     axes       lengths of what must be positive: pivots, or one sign for each block
-    number     which number a pivot or sign has that is not positive, for C: words that follow "1 + "
+    number     which number a pivot or sign has that is not positive, from 0, in words; C returns 1 more
     failure    what has happened then, in Python's documentation: words that follow "If "
     error      one line that Python raises as an error, in which {axis} stands for the name of an entry of that axis (such
                as {frames}) and {input} for a scalar input; empty: the results of such a state are NaN

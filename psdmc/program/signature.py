@@ -146,13 +146,10 @@ class Signature:
         return any(matrix.error for matrix in self.factorises)
 
     @property
-    def pivot_number(self) -> str:
-        """Which number a pivot has that is not positive: words that follow "1 + "."""
-        words, before = "", ""
-        for matrix in self.factorises:
-            words += f", or 1 + {before}{matrix.number}" if words else matrix.number
-            before += f"{' '.join(matrix.axes)} + "
-        return words
+    def pivot_numbers(self) -> tuple[str, ...]:
+        """Which number a pivot has that is not positive, from 0: words for each matrix."""
+        lengths = [f"{' '.join(matrix.axes)} + " for matrix in self.factorises]
+        return tuple("".join(lengths[:k]) + matrix.number for k, matrix in enumerate(self.factorises))
 
     @property
     def traced(self) -> frozenset[str]:

@@ -23,8 +23,10 @@ def test_pivots_of_several_matrices_are_numbered_one_after_the_other() -> None:
 
     assert function.pivots is not None
     assert SIZES.size(function.pivots) == 7 + 18 + 1
-    assert function.pivot_number == (
-        "the joint at which M fails, or 1 + nv + 6 k + r, or 1 + nv + frames 6 + 0 if B fails"
+    assert function.pivot_numbers == (
+        "the joint at which M fails",
+        "nv + 6 k + r",
+        "nv + frames 6 + 0 if B fails",
     )
 
 

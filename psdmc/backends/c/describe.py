@@ -53,12 +53,10 @@ def _forms(target: Target) -> tuple[str, ...]:
 def _failure(function: Signature, target: Target) -> tuple[str, ...]:
     if not function.factorises:
         return ()
+    status = f"{function.name} returns 0, or 1 + {', or 1 + '.join(function.pivot_numbers)}."
     if not target.has_batches:
-        return (
-            f"{function.name} returns 0, or 1 + {function.pivot_number}.",
-            f"The {function.spoilt} of such a state are NaN.",
-        )
+        return (status, f"The {function.spoilt} of such a state are NaN.")
     return (
-        f"{function.name} returns 0, or 1 + {function.pivot_number}.",
+        status,
         f"A batch returns 0, or 1 + the first row that fails. The {function.spoilt} of such a state are NaN.",
     )
