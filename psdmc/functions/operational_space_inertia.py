@@ -43,13 +43,13 @@ SEEN_BY_FRAMES = SymmetricMatrix(
     hint="give mu > 0, such as 1e-3, or a pose in which the frame can move in all six directions",
 )
 
-
 Rows = Sequence[Sequence[Scalar]]
 
 
 def trace(g: Ingredients) -> Outputs:
     (mu,), q = g.inputs[MU.name], g.inputs["q"]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
+    # Frames have lengths in g.unit, named frames in metres.
     metric = [replace(frame, translation=scale(frame.translation, g.unit)) for frame in g.frames]
     jacobians = frame_jacobians(metric, g.named, q, g.root)
     found, signs = zip(
