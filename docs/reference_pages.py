@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,8 @@ def _described(item: Any, name: str) -> str:
 
 def _signature(function: Any, name: str) -> str:
     try:
-        return f"{name}{inspect.signature(function)}".replace("'", "")
+        found = re.sub(r"<function (\w+) at 0x[0-9a-f]+>", r"\1", str(inspect.signature(function)))
+        return f"{name}{found}".replace("'", "")
     except ValueError:
         return name
 

@@ -152,11 +152,12 @@ def emit_c(
 
     model      a model, or the path of a model file
     directory  folder for the package; it must be missing, empty, or already hold a package that psdmc wrote
-    lowering   how psdmc generates the arithmetic: "expanded" from E and P, "factored" from a recursion over the links, or
-               "auto", which is the one of these two that needs fewer operations
+    lowering   how psdmc generates the arithmetic. With "expanded", the code sums monomials, by the model's matrices E and P.
+               With "factored", it is a recursion over the links. With "auto", psdmc takes the one with fewer operations
     functions  names of the functions to generate, or one name; None: the default functions
     real       precision, "float64" or "float32"; None: the precision of the target
-    trig       how the code computes sines: "inline", "freestanding" (without libm) or "libm"; None: the method of the target
+    trig       how the code computes sines. "inline": by its own code, with libm only for angles over 1e5 rad;
+               "freestanding": without libm; "libm": always with libm; None: the method of the target
     name       name of the robot in C, with which all symbols begin; None: the name of the model
     force      True: also write into a folder with files that psdmc did not write, and over edited package files. psdmc
                deletes no file that it did not write. A file with the same name as a package file becomes NAME.orig

@@ -44,11 +44,10 @@ class InputError(PsdmcError):
 
 
 class DerivationError(PsdmcError):
-    """psdmc raises this error if a robot file has no mistake, but psdmc cannot derive a model with the given options.
+    """psdmc cannot derive a model with the given options, although the robot file has no mistake.
 
     For example, the matrices E and P of a robot with many joints can need too much memory. The option `expand=False`
-    leaves out E and P.
-    A psdmc command then ends with exit status 3.
+    leaves out E and P. A psdmc command then ends with exit status 3.
     """
 
     exit_status = 3

@@ -118,12 +118,13 @@ def with_price(
     words = ", ".join(f"{name} {-price:+.4f}" for name, price in cost.items())
     more = f" and {len(gone) - MOST_NAMED} more" if len(gone) > MOST_NAMED else ""
     note = (
-        f"essential parameters: {len(names) - len(gone)} of {len(names)} are kept; {len(gone)} are not told from the prior"
+        f"essential parameters: {len(names) - len(gone)} of {len(names)} are kept; {len(gone)} keep their "
+        "prior values, from which the log does not differ significantly"
         + (
             f" (F = {lesser.f:.2f}, at most {lesser.limit:.2f}): {', '.join(gone[:MOST_NAMED])}{more}"
             if gone
             else ""
         )
-        + f"; held-out R^2 moved by {words}"
+        + f"; change of held-out R^2: {words}"
     )
     return with_model(replace(fewer, facts={**fewer.facts, **facts}, notes=(*fewer.notes, note)))

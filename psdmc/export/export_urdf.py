@@ -53,12 +53,14 @@ class Exported:
 def export_urdf(
     model: DynamicsModel, path: str | Path, mjcf: bool | None = None, progress: Progress = silent
 ) -> Exported:
-    """Write a model as a URDF, with masses and inertias that are physically possible and give the model's theta_b.
+    """Write a model as a URDF, with masses and inertias that are physically possible and give the model's torques.
 
-    Many masses and inertias give the same theta_b. psdmc chooses those that are nearest to the ones in the robot file. If
-    the model comes from a URDF, psdmc copies names, limits and shapes from that file. If the model is
-    calibrated, its friction becomes the elements <dynamics>. After writing, psdmc reads the URDF with Pinocchio and compares
-    its torques with those of the model. If psdmc also wrote an MJCF, MuJoCo does the same for that file.
+    The torques depend only on the base parameters theta_b. Many masses and inertias give the same theta_b. The export
+    chooses those that are nearest to the ones in the robot file. If the model comes from a URDF, psdmc copies names,
+    limits and shapes from that file. If the model is calibrated, its friction becomes the elements <dynamics>.
+
+    After writing, psdmc reads the URDF with Pinocchio and compares its torques with those of the model. If psdmc also
+    wrote an MJCF, it compares the torques of that file with MuJoCo.
 
     Returns an object with the paths, the parameters of the links and the largest torque differences.
 

@@ -74,8 +74,8 @@ RECIPE = Recipe(
             ),
         ),
         theta=False,
-        summary="Compute the matrix A(q) of centroidal momentum: A qd is the linear and angular momentum of all links about "
-        "their centre of mass.",
+        summary="Compute the matrix A(q) of centroidal momentum: A qd is the robot's linear momentum, then "
+        "its angular momentum about its centre of mass.",
     ),
     "centroidal momentum matrix",
     trace,

@@ -57,7 +57,7 @@ RECIPE = Recipe(
                 "dv_dq",
                 ("frames", "6", "nv"),
                 means="three rows for the linear velocity (m/s), three for the angular velocity (rad/s); "
-                "column j for a change of q in the direction of joint rate j",
+                "column j for a change of q along joint rate j",
             ),
         ),
         theta=False,

@@ -119,12 +119,12 @@ class DynamicsModel(Answers):
 
     @property
     def n(self) -> int:
-        """Return the number of joints, with mimic joints, which follow another joint."""
+        """Return the number of joints. Mimic joints, which follow another joint, are counted, too."""
         return len(self.mechanism)
 
     @property
     def nq(self) -> int:
-        """Return the length of q: the joint positions, with four entries for a quaternion."""
+        """Return the number of entries of q. A joint with one coordinate has one entry, and a quaternion has four."""
         return self.mechanism.nq
 
     @property
@@ -156,7 +156,9 @@ class DynamicsModel(Answers):
 
     @property
     def p(self) -> int | None:
-        """Return the number of monomials, which are products of powers of q, sin q, cos q, qd and qdd.
+        """Return the number of monomials in the model's torques.
+
+        A monomial is a product of powers of q, sin q, cos q, qd and qdd.
 
         p is None if the model was derived with `expand=False`.
         """
@@ -173,7 +175,10 @@ class DynamicsModel(Answers):
 
     @property
     def is_reduced(self) -> bool:
-        """True if every base parameter has a pivot (see `pivots`), as in every model that psdmc derives."""
+        """True if each base parameter contains, with factor one, a standard parameter that no other base parameter contains.
+
+        This standard parameter is its pivot (see `pivots`). Every model that psdmc derives has pivots.
+        """
         return bool(self._leads.any(axis=1).all())
 
     @property
@@ -187,8 +192,9 @@ class DynamicsModel(Answers):
         """Return the matrix R, (11n, l), that computes standard parameters x = R @ theta_b from base parameters theta_b.
 
         Many vectors of standard parameters have the same theta_b, and R gives one of them. In x, the pivot of each base
-        parameter (see `pivots`) has the value of the base parameter. All other standard parameters are zero, except those
-        that an assumption such as `assume_zero` makes proportional to a pivot. For every theta_b, B @ x equals theta_b.
+        parameter (see `pivots`) has the value of the base parameter, and all other standard parameters are zero. There is
+        one exception: an assumption such as `assume_zero` can tie a standard parameter to a pivot by a fixed factor. Then
+        x contains the value of the pivot times this factor. B @ R is the identity, with the model's matrix B, (l, 11n).
         """
         leads = leading_rows(self.mechanism.parameter_span)
         column_of = {int(row): column for column, row in enumerate(leads)}
@@ -240,9 +246,10 @@ class DynamicsModel(Answers):
     def equivalent_parameters(self) -> Array:
         """Return a vector of standard parameters that gives the same torques as the model.
 
-        The vector has 11 numbers for each of the n links, and is `representative @ theta_b`, a product of the model's
-        matrix `representative` (11n, l) with the base parameters. Many other vectors give the same
-        torques. The returned vector does not describe the real links, and can contain negative masses.
+        The vector has 11 numbers for each of the n links: mass, first moments (3), inertias (6) and the drive inertia of
+        its joint. It is `representative @ theta_b`, with the model's matrix `representative`, (11n, l). Many other
+        vectors give the same torques. The returned vector does not describe the real links, and can contain negative
+        masses.
 
         Raises InputError if theta_b is unknown.
         """
@@ -268,10 +275,11 @@ class DynamicsModel(Answers):
             inertias        (n, 3, 3) kg m^2 about the centres of mass, along the axes of the link frames
             drive_inertias  (n,) kg m^2 (kg for a sliding joint); None: the drive inertias of the model
 
-        Pass the result as the argument `theta_b` of a function. Raises InputError if a number is not finite, or
-        exceeds the limit for numbers in robot files, or if a mass is negative. Raises InputError also if an inertia is not
-        symmetric or belongs to a link without mass, or if a link contradicts an assumption of the model, such as
-        `assume_zero`. Warns if an inertia is physically impossible for a rigid body.
+        Pass the result as the argument `theta_b` of a function. Warns if no rigid body can have a given inertia.
+
+        Raises InputError if a number is not finite, or is larger than robot files allow, or if a mass is negative. Raises
+        InputError also if an inertia is not symmetric, or belongs to a link without mass. The same error is raised if a
+        value is not zero, but the model was derived with the assumption that it is (option `assume_zero`).
         """
         x = bodies.parameters(self.mechanism, masses, coms, inertias, drive_inertias)
         return np.asarray(times(self.B, x))
@@ -381,8 +389,9 @@ class DynamicsModel(Answers):
             joint    name of the joint, or its number: 0 is the first joint
             numbers  True: the sum contains the values of theta_b; False: the symbols theta_b0, theta_b1 and so on
 
-        The symbols q1, qd1 and qdd1 are for the first joint. Raises InputError if the robot has no such joint, if the model
-        has no E and P, or if the torque has more than 2,000 monomials. Raises ToolchainError if SymPy is missing.
+        The symbols q1, qd1 and qdd1 are for joint 0. Raises InputError if the robot has no such joint, or if the torque
+        has more than 2,000 monomials. Raises InputError also if the model has no monomials, for example because it was
+        derived with `expand=False`. Raises ToolchainError if SymPy is missing.
         """
         values = self.known_theta_b() if numbers else None
         return symbolic.torque_expression(self.mechanism, self.expanded(), joint, values)

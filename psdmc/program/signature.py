@@ -190,10 +190,6 @@ TAU = Quantity("tau", ("nv",), means="joint torques (N m), or forces (N) of slid
 
 def jacobian_of(output: str, by: str) -> Quantity:
     """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
-    entry = (
-        "q in the direction of joint rate j (q[j] for joints with one coordinate)"
-        if by == "q"
-        else f"{by}[j]"
-    )
+    entry = "q along joint rate j (of q[j], if every joint has one coordinate)" if by == "q" else f"{by}[j]"
     means = f"derivatives of {output} by {by}: row i for {output}[i], column j for a change of {entry}"
     return Quantity(f"d{output}_d{by}", ("nv", "nv"), means=means)

@@ -25,17 +25,20 @@ if TYPE_CHECKING:
 
 COTANGENT = Quantity("cotangent", ("nv",), means="weights of the weighted sum")
 
-DQ, DQD, DQDD, DTAU = (
-    Quantity(f"d{name}", ("nv",), means=f"direction of {name}: its change, one entry per joint rate")
+_ENTRY = {
+    name: f"{name}; entry j is for {'a change of q along joint rate j' if name == 'q' else f'{name}[j]'}"
     for name in ("q", "qd", "qdd", "tau")
+}
+"""What an entry per joint rate belongs to."""
+
+DQ, DQD, DQDD, DTAU = (
+    Quantity(f"d{name}", ("nv",), means=f"change of {entry}") for name, entry in _ENTRY.items()
 )
 """Directions of inputs, and derivatives of outputs along them."""
 
 GRADIENT_Q, GRADIENT_QD, GRADIENT_QDD, GRADIENT_TAU = (
-    Quantity(
-        f"grad_{name}", ("nv",), means=f"gradient of the weighted sum by {name}, one entry per joint rate"
-    )
-    for name in ("q", "qd", "qdd", "tau")
+    Quantity(f"grad_{name}", ("nv",), means=f"gradient of the weighted sum by {entry}")
+    for name, entry in _ENTRY.items()
 )
 GRADIENT_THETA = Quantity("grad_theta_b", ("l",), means="gradient of the weighted sum by theta_b")
 """Derivatives of the weighted sum of outputs by each input."""

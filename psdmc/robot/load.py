@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -58,22 +59,7 @@ class LoadedRobot:
 
 
 def load_robot(
-    path: str | Path,
-    *,
-    base: str | None = None,
-    tip: str | None = None,
-    gravity: Sequence[float] | None = None,
-    drive_inertia: bool | Sequence[float] = False,
-    assume_zero: Sequence[str] = (),
-    snap: float = DEFAULT_SNAP,
-    frames: Sequence[str] = (),
-    tool: Sequence[float] | None = None,
-    lock: Mapping[str, float] | None = None,
-    floating: bool = False,
-    root: str | None = None,
-    xacro_args: Mapping[str, object] | None = None,
-    packages: Mapping[str, str | PathLike[str]] | None = None,
-    unknown: Sequence[str] = (),
+    path: str | Path, *, packages: Mapping[str, str | PathLike[str]] | None = None, **options: Any
 ) -> LoadedRobot:
     """The robot in a URDF, MJCF, xacro or DH TOML file (told apart by the suffixes .toml and .xacro, and by the root
     element). Options as in LoadOptions; `packages` are folders of ROS packages, by name, that a xacro file may look for.
@@ -82,63 +68,17 @@ def load_robot(
     """
     file = Path(path)
     text = robot_text(file)
-    options = checked_options(
-        base,
-        tip,
-        gravity,
-        drive_inertia,
-        assume_zero,
-        snap,
-        frames,
-        tool,
-        lock,
-        floating,
-        root,
-        xacro_args,
-        unknown,
-    )
-    text, source_format, options = as_source(file, text, options, checked_packages(packages))
+    text, source_format, found = as_source(file, text, checked_options(**options), checked_packages(packages))
     _refuse_size(len(text.encode(errors="replace")), file.name)
-    return _loaded(text, source_format, file.name, options)
+    return _loaded(text, source_format, file.name, found)
 
 
 def load_robot_text(
-    text: str,
-    source_format: SourceFormat,
-    *,
-    source_name: str = "robot",
-    base: str | None = None,
-    tip: str | None = None,
-    gravity: Sequence[float] | None = None,
-    drive_inertia: bool | Sequence[float] = False,
-    assume_zero: Sequence[str] = (),
-    snap: float = DEFAULT_SNAP,
-    frames: Sequence[str] = (),
-    tool: Sequence[float] | None = None,
-    lock: Mapping[str, float] | None = None,
-    floating: bool = False,
-    root: str | None = None,
-    xacro_args: Mapping[str, object] | None = None,
-    unknown: Sequence[str] = (),
+    text: str, source_format: SourceFormat, *, source_name: str = "robot", **options: Any
 ) -> LoadedRobot:
     """The robot in a text, such as the source embedded in a saved model; see load_robot."""
     _refuse_size(len(text.encode(errors="replace")), source_name)
-    options = checked_options(
-        base,
-        tip,
-        gravity,
-        drive_inertia,
-        assume_zero,
-        snap,
-        frames,
-        tool,
-        lock,
-        floating,
-        root,
-        xacro_args,
-        unknown,
-    )
-    return _loaded(text, source_format, source_name, options)
+    return _loaded(text, source_format, source_name, checked_options(**options))
 
 
 def _loaded(text: str, source_format: SourceFormat, source: str, options: LoadOptions) -> LoadedRobot:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -60,54 +60,44 @@ class LoadOptions:
         return {name: value for name, value in plain.items() if name not in LATER or value}
 
 
-def checked_options(
-    base: str | None,
-    tip: str | None,
-    gravity: Sequence[float] | None,
-    drive_inertia: bool | Sequence[float],
-    assume_zero: Sequence[str],
-    snap: float,
-    frames: Sequence[str] = (),
-    tool: Sequence[float] | None = None,
-    lock: Mapping[str, float] | None = None,
-    floating: bool = False,
-    root: str | None = None,
-    xacro_args: Mapping[str, object] | None = None,
-    unknown: Sequence[str] = (),
-) -> LoadOptions:
-    """The options as LoadOptions; InputError names the first that is wrong."""
-    for name, value, what in (("base", base, "link"), ("tip", tip, "link"), ("root", root, "body")):
-        if value is not None and not isinstance(value, str):
-            raise InputError(f"{name} is {shown(value)}, expected a {what}'s name", "give a text")
-    if not _are_texts_in_order(assume_zero):
-        raise InputError(f"assume-zero is {shown(assume_zero)}, expected texts", "such as link5:mx")
-    if not _are_texts_in_order(unknown):
-        raise InputError(
-            f"unknown is {shown(unknown)}, expected links' names", 'such as ["forearm"], or "all"'
-        )
-    if not isinstance(floating, bool):
-        raise InputError(f"floating is {shown(floating)}, expected True or False", "the default is False")
-    if floating and (base is not None or tip is not None):
+def checked_options(**given: Any) -> LoadOptions:
+    """The options as LoadOptions, each checked; InputError names the first that is wrong."""
+    options = LoadOptions(
+        **{name: CHECKS[name](value) if name in CHECKS else value for name, value in given.items()}
+    )
+    if options.floating and (options.base is not None or options.tip is not None):
         raise InputError(
             "--floating puts the whole robot on a free joint, --base and --tip cut a chain out of it",
             "leave --base and --tip out; --lock holds joints",
         )
-    drives = _drive_inertia(drive_inertia)
-    return LoadOptions(
-        base,
-        tip,
-        _gravity(gravity),
-        drives,
-        tuple(assume_zero),
-        _snap(snap),
-        _frames(frames),
-        _tool(tool),
-        _lock(lock),
-        floating,
-        root,
-        _xacro_args(xacro_args),
-        tuple(dict.fromkeys(unknown)),
-    )
+    return options
+
+
+def _name_of(option: str, what: str) -> Callable[[object], str | None]:
+    def checked(value: object) -> str | None:
+        if value is not None and not isinstance(value, str):
+            raise InputError(f"{option} is {shown(value)}, expected a {what}'s name", "give a text")
+        return value
+
+    return checked
+
+
+def _assume_zero(statements: Sequence[str]) -> tuple[str, ...]:
+    if not _are_texts_in_order(statements):
+        raise InputError(f"assume-zero is {shown(statements)}, expected texts", "such as link5:mx")
+    return tuple(statements)
+
+
+def _unknown(links: Sequence[str]) -> tuple[str, ...]:
+    if not _are_texts_in_order(links):
+        raise InputError(f"unknown is {shown(links)}, expected links' names", 'such as ["forearm"], or "all"')
+    return tuple(dict.fromkeys(links))
+
+
+def _floating(floating: object) -> bool:
+    if not isinstance(floating, bool):
+        raise InputError(f"floating is {shown(floating)}, expected True or False", "the default is False")
+    return floating
 
 
 def _frames(frames: Sequence[str]) -> tuple[str, ...]:
@@ -224,3 +214,21 @@ def _listed(values: object) -> str:
     return (
         shown(list(values)) if isinstance(values, Iterable) and not isinstance(values, str) else shown(values)
     )
+
+
+CHECKS: dict[str, Callable[[Any], Any]] = {
+    "base": _name_of("base", "link"),
+    "tip": _name_of("tip", "link"),
+    "root": _name_of("root", "body"),
+    "assume_zero": _assume_zero,
+    "unknown": _unknown,
+    "floating": _floating,
+    "drive_inertia": _drive_inertia,
+    "gravity": _gravity,
+    "snap": _snap,
+    "frames": _frames,
+    "tool": _tool,
+    "lock": _lock,
+    "xacro_args": _xacro_args,
+}
+"""By option: what checks its value and returns it as LoadOptions holds it."""

@@ -61,12 +61,12 @@ class RobotFacts:
 
     @property
     def n(self) -> int:
-        """Return the number of joints, without mimic joints, which follow another joint."""
+        """Return the number of joints. Mimic joints, which follow another joint, are not counted."""
         return self._interface.n
 
     @property
     def nq(self) -> int:
-        """Return the length of q: the joint positions, with four entries for a quaternion."""
+        """Return the number of entries of q. A joint with one coordinate has one entry, and a quaternion has four."""
         return self._interface.nq
 
     @property
@@ -272,8 +272,8 @@ class CompiledFunctions(RobotFacts):
     def pattern(self, name: str) -> tuple[Array, Array]:
         """Return the row indices and the column indices, (k,) each, of the k matrix entries that can differ from zero.
 
-        If rows and columns are the indices of 'mass_matrix_packed', `robot.mass_matrix(q)[..., rows, columns]` equals
-        `robot.mass_matrix_packed(q)`.
+        For example, after `rows, columns = robot.pattern('mass_matrix_packed')`, the array
+        `robot.mass_matrix(q)[..., rows, columns]` equals `robot.mass_matrix_packed(q)`.
 
         name  name of a function that returns one matrix, such as 'mass_matrix', 'regressor' or 'regressor_packed'
 

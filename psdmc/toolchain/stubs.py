@@ -81,7 +81,8 @@ _STATES = "For many states, the axes (...) count the states; for one state, ther
 _SIZES = {
     "nq": "nq is the length of q, which is the number of joints if every joint has one coordinate.",
     "nv": "nv is the number of joint rates.",
-    "nx": "nx is 2 nv: one row per joint rate for q_next, and one for qd_next.",
+    "nx": "nx is 2 nv: the first nv rows or columns are for q, the last nv for qd. A quaternion in q has three of them, "
+    "for a small rotation as a rotation vector.",
     "l": "l is the number of base parameters.",
     "frames": "frames is the number of named frames.",
     "nonzeros": "nonzeros is the number of entries that can differ from zero.",

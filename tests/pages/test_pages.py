@@ -54,7 +54,8 @@ SITE = (
         "benchmarks",
         "reliability",
         "calibration",
-        "mutation",
+        "how_tested",
+        "how-to/payload",
     )
     if KEPT
     else ()

@@ -172,7 +172,9 @@ def test_a_file_of_essential_parameters(arm, weak: Log, tmp_path: Path, known: b
         assert cost == pytest.approx(before - again.joints[joint].held_out.r2, abs=1e-9)
         assert cost < 5e-3
     (note,) = [note for note in found.notes if note.startswith("essential parameters")]
-    assert f"{len(gone)} are not told from the prior (F = " in note
+    assert (
+        f"{len(gone)} keep their prior values, from which the log does not differ significantly (F = " in note
+    )
     assert found.facts["f_of_dropped"] <= found.facts["f_limit"]
 
 
