@@ -10,6 +10,7 @@ from psdmc.program.signature import QD, QDD, TAU, Q, Signature
 from psdmc.recipes.accelerations import MASS_MATRIX, accelerations
 from psdmc.recipes.directions import (
     COTANGENT,
+    COTANGENT_OF_QDD,
     GRADIENT_Q,
     GRADIENT_QD,
     GRADIENT_TAU,
@@ -62,7 +63,7 @@ RECIPE = Recipe(
         "forward_dynamics_vjp",
         184,
         "qdd, and the gradient of cotangent . qdd by q, qd and tau",
-        (Q, QD, TAU, COTANGENT),
+        (Q, QD, TAU, COTANGENT_OF_QDD),
         (QDD, GRADIENT_Q, GRADIENT_QD, GRADIENT_TAU),
         theta=True,
         summary="Compute the accelerations qdd, and the gradients of "

@@ -42,7 +42,15 @@ RECIPE = Recipe(
         192,
         "inverse of the mass matrix M(q), both triangles",
         (Q,),
-        (Quantity("Minv", ("nv", "nv"), means="symmetric matrix, both triangles filled; SI units"),),
+        (
+            Quantity(
+                "Minv",
+                ("nv", "nv"),
+                means="symmetric matrix, both triangles filled; SI units",
+                unit="1/(J s^2)",
+                powers=(1, 1),
+            ),
+        ),
         theta=True,
         summary="Compute the inverse of the joint-space mass matrix M(q).",
         factorises=(MASS_MATRIX,),

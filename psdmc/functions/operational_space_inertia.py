@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from psdmc import reproducible
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.named_frames import frame_jacobians
-from psdmc.dynamics.scalar import Scalar, scale
+from psdmc.dynamics.scalar import Scalar
 from psdmc.dynamics.solve import Factors, factorize, projected
 from psdmc.program.factorisation import Structure, SymmetricMatrix
 from psdmc.program.operations import Op
@@ -30,6 +29,7 @@ MU = Quantity(
     largest=1.0,
     least=0.1,
     means="regularisation, 0 or more: 1/kg on the three linear axes, 1/(kg m^2) on the three angular axes",
+    unit="1/kg",
 )
 
 SEEN_BY_FRAMES = SymmetricMatrix(
@@ -49,19 +49,23 @@ Rows = Sequence[Sequence[Scalar]]
 def trace(g: Ingredients) -> Outputs:
     (mu,), q = g.inputs[MU.name], g.inputs["q"]
     factors = factorize(mass_matrix(g.frames, g.bodies, g.drives, q, g.choices))
-    # Frames have lengths in g.unit, named frames in metres.
-    metric = [replace(frame, translation=scale(frame.translation, g.unit)) for frame in g.frames]
-    jacobians = frame_jacobians(metric, g.named, q, g.root)
+    shift = [mu] * 3 + [mu * g.si(1.0, "1/m^2")] * 3
     found, signs = zip(
-        *(_inverse_and_sign(_regularised(factors, rows, mu), mu) for rows in jacobians), strict=True
+        *(
+            _inverse_and_sign(_regularised(factors, rows, shift), mu)
+            for rows in frame_jacobians(g.frames, g.named, q, g.root)
+        ),
+        strict=True,
     )
     return {"Lambda": list(found), PIVOTS: [*factors.pivots, *signs]}
 
 
-def _regularised(factors: Factors, jacobian: Rows, mu: Scalar) -> Rows:
-    """J M^-1 J^T + mu I."""
+def _regularised(factors: Factors, jacobian: Rows, shift: Sequence[Scalar]) -> Rows:
+    """J M^-1 J^T + mu I, whose diagonal is shifted by these."""
     rows = projected(factors, jacobian)
-    return [[entry + mu if i == j else entry for j, entry in enumerate(row)] for i, row in enumerate(rows)]
+    return [
+        [entry + shift[i] if i == j else entry for j, entry in enumerate(row)] for i, row in enumerate(rows)
+    ]
 
 
 def _inverse_and_sign(rows: Rows, mu: Scalar) -> tuple[Rows, Scalar]:
@@ -76,7 +80,7 @@ def reference(robot: RobotOnArrays, given: Mapping[str, Array]) -> Arrays:
     mass = np.moveaxis(robot.mass_matrix(given["q"]), 0, -1)
     factors = factorize([list(row) for row in mass])
     jacobians = frame_jacobians(robot.frames, robot.chain.frames, q)
-    matrices = [_regularised(factors, rows, mu) for rows in jacobians]
+    matrices = [_regularised(factors, rows, [mu] * 6) for rows in jacobians]
     with np.errstate(all="ignore"):
         signs = [_inverse_and_sign(rows, mu)[1] for rows in matrices]
         found = reproducible.inverse(entries(matrices, len(mu)))
@@ -114,6 +118,8 @@ RECIPE = Recipe(
                 ("frames", "6", "6"),
                 means="symmetric matrix of each frame: kg, kg m, kg m^2; three linear, then three angular axes, "
                 "of the base frame",
+                unit="kg m^2",
+                powers=(0, -1, -1),
             ),
         ),
         theta=True,

@@ -12,6 +12,7 @@ from psdmc.errors import InputError
 from psdmc.functions import DEFAULT, RECIPES, default_of
 from psdmc.garbage import collecting_rarely
 from psdmc.lower.accuracy import LIMIT
+from psdmc.lower.dimension_check import check_dimensions
 from psdmc.lower.expanded.lowering import lower_expanded
 from psdmc.lower.expanded.terms import COEFFICIENT_NOISE
 from psdmc.lower.factored import Arrangement, trace_dynamics, trace_geometry
@@ -71,6 +72,7 @@ def lower(
     recipes = [RECIPES[name] for name in wanted(functions, model.mechanism)]
     for number, recipe in enumerate(recipes):
         takes_theta = recipe.signature.theta
+        lowered.check(recipe)
         for theta in (False, True) if takes_theta and theta_variants else (False,):
             if not theta and model.theta_b is None and takes_theta:
                 continue
@@ -137,6 +139,16 @@ class _Lowered:
         self._traced: dict[tuple[str, bool], tuple[Program, ...]] = {}
         self._kernels: dict[tuple[str, bool], Kernel] = {}
         self._short: list[tuple[Program, Program]] = []
+
+    def check(self, recipe: Recipe) -> None:
+        """InputError where a function's trace adds unlike quantities."""
+        traced = RECIPES[recipe.packs.function] if recipe.packs else recipe
+        if traced.regions is None or self.model.nv <= TRACED:
+            check_dimensions(
+                traced,
+                self.geometry.reframed(self.geometry.feet[0]),
+                self._search(self.model.theta_b is None).robot,
+            )
 
     def kernel(self, recipe: Recipe, theta: bool) -> Kernel:
         """The kernel of one function, made once: another one may be a part of it."""

@@ -34,6 +34,7 @@ class SymmetricMatrix:
     axes       lengths of what must be positive: pivots, or one sign for each block
     number     which number a pivot or sign has that is not positive, from 0, in words; C returns 1 more
     failure    what has happened then, in Python's documentation: words that follow "If "
+    unit, powers  of these, as Quantity has them
     error      one line that Python raises as an error, in which {axis} stands for the name of an entry of that axis (such
                as {frames}) and {input} for a scalar input; empty: the results of such a state are NaN
     hint       the remedy, with the error
@@ -46,6 +47,8 @@ class SymmetricMatrix:
     failure: str
     error: str = ""
     hint: str = ""
+    unit: str = "1"
+    powers: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.axes or (len(self.axes) > 1 and self.structure is not Structure.BLOCKS):
@@ -54,5 +57,10 @@ class SymmetricMatrix:
     def in_blocks(self, count: str, number: str, failure: str) -> SymmetricMatrix:
         """So many of this matrix, one after the other."""
         return replace(
-            self, structure=Structure.BLOCKS, axes=(count, *self.axes), number=number, failure=failure
+            self,
+            structure=Structure.BLOCKS,
+            axes=(count, *self.axes),
+            powers=(0, *self.powers) if self.powers else (),
+            number=number,
+            failure=failure,
         )

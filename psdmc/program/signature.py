@@ -4,12 +4,13 @@ signature names, emission prints it."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 from psdmc.errors import InternalError
+from psdmc.program.dimensions import NUMBER, Dimension, dimension_of, times
 from psdmc.program.factorisation import SymmetricMatrix
 from psdmc.program.products import Product
 
@@ -63,12 +64,18 @@ class Quantity:
     largest  SI; tests draw an input from plus or minus this, or from
     least    up to it
     means    what Python's documentation says of it, with the unit
+    unit     SI unit that all entries have in common, such as 'kg m^2/s'; traces need it (lower/units.py)
+    powers   for each axis, the power of its own units in the unit of an entry; left out: zero. nq and nv have the units of
+             joint coordinates (rad or m), nx those of nv and then the same per second, l those of base parameters. The
+             first three of 6 are m, the others 1
     """
 
     name: str
     axes: tuple[str, ...] = ()
     largest: float = 1.0
     means: str = ""
+    unit: str = ""
+    powers: tuple[int, ...] = ()
     least: float | None = None
 
     def __post_init__(self) -> None:
@@ -76,6 +83,21 @@ class Quantity:
         wrong = [word for word in words if word not in WORDS and not word.isdecimal()]
         if wrong or not self.name.isidentifier():
             raise ValueError(f"{self.name!r} with axes {self.axes}: an axis is a number or one of {WORDS}")
+        if len(self.powers) not in (0, len(self.axes)):
+            raise ValueError(f"{self.name!r} has {len(self.powers)} powers for {len(self.axes)} axes")
+
+    @property
+    def dimension(self) -> Dimension:
+        """What all entries have in common."""
+        return dimension_of(self.unit)
+
+    def dimensions(self, axes: Mapping[str, Sequence[Dimension]]) -> list[Dimension]:
+        """The dimension of each entry, row by row; `axes` gives the own ones along each axis that is not a number."""
+        found = [self.dimension]
+        for axis, power in zip(self.axes, self.powers or (0,) * len(self.axes), strict=True):
+            own = axes[axis] if axis in axes else [NUMBER] * int(axis)
+            found = [times(each, along, power) for each in found for along in own]
+        return found
 
     def drawn(self, shares: Any) -> Any:
         """Values for tests, from shares between -1 and 1."""
@@ -87,6 +109,16 @@ class Quantity:
     def is_matrix(self) -> bool:
         """Whether it is a matrix, packed or not: many entries, which are stored as they are computed."""
         return len(self.axes) > 1 or "nonzeros" in self.axes
+
+
+@dataclass(frozen=True, slots=True)
+class Joined(Quantity):
+    """Several quantities, one after the other."""
+
+    parts: tuple[Quantity, ...] = ()
+
+    def dimensions(self, axes: Mapping[str, Sequence[Dimension]]) -> list[Dimension]:
+        return [each for part in self.parts for each in part.dimensions(axes)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,9 +168,11 @@ class Signature:
     @property
     def pivots(self) -> Quantity | None:
         """The pivots of all matrices that it factorises, which must be positive; None: it cannot fail."""
-        axes = [matrix.axes for matrix in self.factorises]
-        whole = axes[0] if len(axes) == 1 else ("+".join(map("*".join, axes)),)
-        return Quantity(PIVOTS, whole) if axes else None
+        parts = [Quantity(PIVOTS, each.axes, unit=each.unit, powers=each.powers) for each in self.factorises]
+        if len(parts) < 2:
+            return parts[0] if parts else None
+        whole = "+".join("*".join(part.axes) for part in parts)
+        return Joined(PIVOTS, (whole,), unit=parts[0].unit, parts=tuple(parts))
 
     @property
     def raises(self) -> bool:
@@ -180,16 +214,27 @@ PIVOTS = "pivot"
 """What the pivots and signs of a function's matrices are called in its traces."""
 
 Q = Quantity(
-    "q", ("nq",), math.pi, "joint positions: rad or m, or a unit quaternion for a ball joint or floating base"
+    "q",
+    ("nq",),
+    math.pi,
+    "joint positions: rad or m, or a unit quaternion for a ball joint or floating base",
+    "1",
+    (1,),
 )
-QD = Quantity("qd", ("nv",), 3.0, "joint rates, rad/s or m/s")
-QDD = Quantity("qdd", ("nv",), 5.0, "joint accelerations, rad/s^2 or m/s^2")
-TAU = Quantity("tau", ("nv",), means="joint torques (N m), or forces (N) of sliding joints")
+QD = Quantity("qd", ("nv",), 3.0, "joint rates, rad/s or m/s", "1/s", (1,))
+QDD = Quantity("qdd", ("nv",), 5.0, "joint accelerations, rad/s^2 or m/s^2", "1/s^2", (1,))
+TAU = Quantity(
+    "tau", ("nv",), means="joint torques (N m), or forces (N) of sliding joints", unit="J", powers=(-1,)
+)
 """Those of q, qd and qdd if states are drawn."""
 
 
 def jacobian_of(output: str, by: str) -> Quantity:
     """The matrix (nv, nv) of derivatives of joint torques or accelerations by another quantity with an entry per rate."""
     entry = "q along joint rate j (of q[j], if every joint has one coordinate)" if by == "q" else f"{by}[j]"
+    known = {quantity.name: quantity for quantity in (Q, QD, QDD, TAU)}
+    above, below = known.get(output, TAU), known[by]
+    unit = str(times(above.dimension, below.dimension, -1))
+    powers = (above.powers[0], -below.powers[0])
     means = f"derivatives of {output} by {by}: row i for {output}[i], column j for a change of {entry}"
-    return Quantity(f"d{output}_d{by}", ("nv", "nv"), means=means)
+    return Quantity(f"d{output}_d{by}", ("nv", "nv"), means=means, unit=unit, powers=powers)

@@ -18,6 +18,8 @@ MASS_MATRIX = SymmetricMatrix(
     ("nv",),
     number="the number of the joint, from 0, at which the mass matrix is not positive definite",
     failure="the mass matrix is not positive definite in a state",
+    unit="J s^2",
+    powers=(-2,),
 )
 """M(q), which functions solve or invert."""
 
